@@ -1,0 +1,182 @@
+"""Checks of a profile that its schema cannot express: references, duplicates, ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from .decode import line_of
+from .errors import ProfileError
+from .schema import Parameter, ProfileData
+from .values import raw_range, type_range, word_count
+
+Place = list[str | int]
+Finding = tuple[Place, str]
+
+
+def check(data: ProfileData, file: str, text: str) -> None:
+    """Raise ProfileError with the first ten faults of a profile, each with its line."""
+    findings = [finding for rule in RULES for finding in rule(data)]
+    if findings:
+        lines = [f"{file}:{line_of(text, place)}: {fault}" for place, fault in findings[:10]]
+        if len(findings) > 10:
+            lines.append(f"... and {len(findings) - 10} more faults.")
+        raise ProfileError("\n".join(lines))
+
+
+def _unique_codes(data: ProfileData) -> Iterator[Finding]:
+    for key in ("code", "address"):
+        seen: dict[object, str] = {}
+        for index, parameter in enumerate(data.parameters):
+            value = getattr(parameter, key)
+            if value in seen:
+                yield (
+                    ["parameters", index],
+                    f"parameter {parameter.code}: {key} {value} is already that of {seen[value]}.",
+                )
+            seen.setdefault(value, parameter.code)
+
+
+def _unique_quantities(data: ProfileData) -> Iterator[Finding]:
+    seen: dict[str, str] = {}
+    for index, parameter in enumerate(data.parameters):
+        if parameter.quantity is None:
+            continue
+        if parameter.quantity in seen:
+            yield (
+                ["parameters", index, "quantity"],
+                f"parameter {parameter.code}: {parameter.quantity} is already "
+                f"{seen[parameter.quantity]}.",
+            )
+        seen.setdefault(parameter.quantity, parameter.code)
+
+
+def _parameter_fields(data: ProfileData) -> Iterator[Finding]:
+    sources = {source.id for source in data.sources}
+    enumerations = {enumeration.id for enumeration in data.enumerations}
+    for index, parameter in enumerate(data.parameters):
+        for fault in _faults_of(parameter, sources, enumerations):
+            yield ["parameters", index], f"parameter {parameter.code}: {fault}"
+
+
+def _faults_of(parameter: Parameter, sources: set[str], enumerations: set[str]) -> Iterator[str]:
+    low, high = type_range(parameter)
+    minimum, maximum = raw_range(parameter)
+    if not (low <= minimum <= high and low <= maximum <= high):
+        yield f"range {minimum}..{maximum} does not fit {parameter.type}."
+    if minimum > maximum:
+        yield f"min {minimum} is above max {maximum}."
+    if parameter.factory is not None and not low <= parameter.factory <= high:
+        yield f"factory {parameter.factory} does not fit {parameter.type}."
+    if set(parameter.scale) <= {"0", "."}:
+        yield "scale is 0."
+    if parameter.enumeration and parameter.enumeration not in enumerations:
+        yield f"there is no enumeration {parameter.enumeration!r}."
+    if parameter.source.split()[0].rstrip(",;:") not in sources:
+        yield f"source {parameter.source!r} does not begin with the id of a source."
+    for raw in parameter.values:
+        if not raw.lstrip("-").isdecimal():
+            yield f"value {raw!r} is not a raw value in decimal."
+    numbers = [bit.bit for bit in parameter.bits]
+    if len(numbers) != len(set(numbers)):
+        yield "a bit is named twice."
+    if parameter.address + word_count(parameter) > 0x10000:
+        yield "runs past address 65535."
+
+
+def _enumeration_keys(data: ProfileData) -> Iterator[Finding]:
+    for index, enumeration in enumerate(data.enumerations):
+        for raw in enumeration.values:
+            if not raw.lstrip("-").isdecimal():
+                yield (
+                    ["enumerations", index],
+                    f"enumeration {enumeration.id}: {raw!r} is not a raw value in decimal.",
+                )
+
+
+def _references(data: ProfileData) -> Iterator[Finding]:
+    codes = {parameter.code for parameter in data.parameters}
+    for place, code in _referred(data):
+        if code and code not in codes:
+            yield place, f"{place[0]}: there is no parameter {code!r}."
+
+
+def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
+    for index, parameter in enumerate(data.parameters):
+        for code in (
+            parameter.min_from,
+            parameter.max_from,
+            parameter.rating,
+            parameter.scale_by.parameter if parameter.scale_by else "",
+        ):
+            yield ["parameters", index], code
+    for index, block in enumerate(data.blocks):
+        for code in (*block.slots, *block.values, *(c.parameter for c in block.choices)):
+            yield ["blocks", index], code
+    for index, chart in enumerate(data.charts):
+        marks = (chart.direction, chart.reached, chart.alarm, chart.local, chart.when)
+        for code in (chart.status, chart.command, *(m.parameter for m in marks if m)):
+            yield ["charts", index], code
+    for index, reference in enumerate(data.references):
+        yield ["references", index], reference.parameter
+        yield ["references", index], reference.feedback
+    for value in data.monitoring.values:
+        yield ["monitoring"], value.parameter
+        if value.high and not value.high.replace(".", "").isdecimal():
+            yield ["monitoring"], value.high
+    for code in (data.faults.parameter, *data.faults.history):
+        yield ["faults"], code
+    for setting in data.link.settings:
+        yield ["link"], setting.parameter
+    if watch := data.communication_fault:
+        yield ["communication_fault"], watch.timeout
+        yield ["communication_fault"], watch.reaction
+    identification = data.identification
+    for code in (identification.model_parameter, identification.class_parameter):
+        yield ["identification"], code
+    if speed := data.monitoring.speed_from:
+        for code in (speed.frequency, speed.poles, speed.result):
+            yield ["monitoring"], code
+    for server in data.addresses.servers:
+        yield ["addresses"], server.parameter
+
+
+def _states(data: ProfileData) -> Iterator[Finding]:
+    for index, chart in enumerate(data.charts):
+        ids = {state.id for state in chart.states}
+        for transition in chart.transitions:
+            for state in (transition.source, transition.target):
+                if state not in ids:
+                    yield ["charts", index], f"chart {chart.id}: there is no state {state!r}."
+        for state_ in chart.states:
+            if state_.value & ~state_.mask:
+                yield (
+                    ["charts", index],
+                    f"chart {chart.id}: state {state_.id} has value bits outside its mask.",
+                )
+
+
+def _functions(data: ProfileData) -> Iterator[Finding]:
+    codes = [function.code for function in data.functions]
+    for index, code in enumerate(codes):
+        if code in codes[:index]:
+            yield ["functions", index], f"function {code} is declared twice."
+    if 3 not in codes:
+        yield ["functions"], "function 3 is missing: nothing could be read."
+
+
+def _scales(data: ProfileData) -> Iterator[Finding]:
+    for index, parameter in enumerate(data.parameters):
+        if parameter.scale_by and not parameter.scale_by.scales:
+            yield ["parameters", index], f"parameter {parameter.code}: scale_by has no scales."
+
+
+RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
+    _unique_codes,
+    _unique_quantities,
+    _parameter_fields,
+    _enumeration_keys,
+    _references,
+    _states,
+    _functions,
+    _scales,
+)

@@ -1,0 +1,169 @@
+"""A profile at work: parameters by code, number, address and meaning."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from collections.abc import Iterable, Mapping
+from decimal import Decimal
+from functools import cached_property
+
+from .errors import UnknownParameter
+from .schema import Chart, FaultCode, Function, Parameter, ProfileData, Quantity
+
+_HEX = re.compile(r"^(?:16#|0x)([0-9a-f]+)$", re.IGNORECASE)
+_WORD = re.compile(r"^w ?([0-9 ]+)$", re.IGNORECASE)
+
+UNVERIFIED = frozenset({"analogy", "unverified"})
+
+
+def is_verified(parameter: Parameter) -> bool:
+    """Whether a manual or a public document of this family confirms the parameter."""
+    return parameter.confidence not in UNVERIFIED
+
+
+class Profile:
+    """A drive family's description, with the look-ups that the rest of the panel needs."""
+
+    def __init__(self, data: ProfileData) -> None:
+        self.data = data
+        self.parameters = tuple(data.parameters)
+        self._by_code = {p.code: p for p in self.parameters}
+        self._by_folded = _unique(self.parameters)
+        self._by_address = {p.address: p for p in self.parameters}
+        self._by_quantity: dict[Quantity, Parameter] = {
+            p.quantity: p for p in self.parameters if p.quantity is not None
+        }
+        self._enumerations = {
+            e.id: {int(raw): text for raw, text in e.values.items()} for e in data.enumerations
+        }
+        self._functions = {f.code: f for f in data.functions}
+        self._faults = {f.raw: f for f in data.faults.codes}
+
+    def __repr__(self) -> str:
+        return f"Profile({self.id!r})"
+
+    @property
+    def id(self) -> str:
+        """Id of the profile, as typed on a command line."""
+        return self.data.profile.id
+
+    @property
+    def name(self) -> str:
+        """Name of the drive family."""
+        return self.data.profile.name
+
+    @property
+    def vendor(self) -> str:
+        """Maker of the drive family."""
+        return self.data.profile.vendor
+
+    def __getitem__(self, code: str) -> Parameter:
+        """The parameter with exactly this code; raises UnknownParameter."""
+        try:
+            return self._by_code[code]
+        except KeyError:
+            raise UnknownParameter(f"{self.name} has no parameter {code!r}.") from None
+
+    def get(self, code: str) -> Parameter | None:
+        """The parameter with exactly this code, or None."""
+        return self._by_code.get(code)
+
+    def at(self, address: int) -> Parameter | None:
+        """The parameter at a wire address, or None."""
+        return self._by_address.get(address)
+
+    def quantity(self, quantity: Quantity) -> Parameter | None:
+        """The parameter that carries a quantity on this family, or None."""
+        return self._by_quantity.get(quantity)
+
+    def function(self, code: int) -> Function | None:
+        """A supported Modbus function with its limits, or None."""
+        return self._functions.get(code)
+
+    def fault(self, raw: int) -> FaultCode | None:
+        """The fault a raw fault code stands for, or None if the profile does not know it."""
+        return self._faults.get(raw)
+
+    @cached_property
+    def groups(self) -> tuple[str, ...]:
+        """Groups of parameters in the order of the profile."""
+        return tuple(dict.fromkeys(p.group for p in self.parameters))
+
+    def names(self, parameter: Parameter) -> Mapping[int, str]:
+        """Names of a parameter's raw values, its own before those of a shared enumeration."""
+        own = {int(raw): text for raw, text in parameter.values.items()}
+        return {**self._enumerations.get(parameter.enumeration, {}), **own}
+
+    def find(self, text: str) -> Parameter:
+        """The parameter a person means by a code, a manual's number or a wire address.
+
+        Codes in any case come first (`acc`, `1.05`, `F875`), then numbers of the manual
+        (`W9001`, `16#FD00`), then a wire address in decimal or hexadecimal. Raises
+        UnknownParameter with the nearest codes.
+        """
+        wanted = text.strip()
+        exact = self._by_code.get(wanted) or self._by_folded.get(wanted.casefold())
+        if exact is not None:
+            return exact
+        address = parse_address(wanted)
+        if address is not None and (found := self._by_address.get(address)):
+            return found
+        near = difflib.get_close_matches(wanted.casefold(), self._by_folded, n=3, cutoff=0.5)
+        hint = ", ".join(dict.fromkeys(self._by_folded[n].code for n in near))
+        raise UnknownParameter(
+            f"{self.name} has no parameter {text!r}."
+            + (f" Did you mean {hint}?" if hint else " Type a code, W9001, 16#2329 or 9001.")
+        )
+
+    def chart(self, raws: Mapping[str, int]) -> Chart | None:
+        """The state chart in force, given raw values by code; the first whose condition holds."""
+        fallback: Chart | None = None
+        for chart in self.data.charts:
+            if chart.when is None:
+                fallback = fallback or chart
+            elif raws.get(chart.when.parameter) in chart.when.values:
+                return chart
+        return fallback or (self.data.charts[0] if self.data.charts else None)
+
+    def scale(self, parameter: Parameter, raws: Mapping[str, int]) -> Decimal | None:
+        """What one count is worth, given raw values by code.
+
+        None where the scale follows another parameter whose value is not known: then the
+        value must be shown raw and never written.
+        """
+        if parameter.scale_by is None:
+            return Decimal(parameter.scale)
+        raw = raws.get(parameter.scale_by.parameter)
+        text = parameter.scale_by.scales.get(str(raw))
+        return Decimal(text) if text is not None else None
+
+
+def parse_address(text: str) -> int | None:
+    """A wire address from `W9001`, `16#2329`, `0x2329` or `9001`; None if it is none of these."""
+    if match := _HEX.match(text):
+        address = int(match[1], 16)
+    elif match := _WORD.match(text):
+        address = int(match[1].replace(" ", ""))
+    elif text.isdecimal():
+        address = int(text)
+    else:
+        return None
+    return address if address <= 0xFFFF else None
+
+
+def notations(parameter: Parameter) -> tuple[str, str, str]:
+    """The three notations of a parameter's place: drive code, manual's number, wire address."""
+    return parameter.code, parameter.number, f"{parameter.address} (16#{parameter.address:04X})"
+
+
+def _unique(parameters: Iterable[Parameter]) -> dict[str, Parameter]:
+    """Parameters by folded code and number; a folded name that two share is left out."""
+    found: dict[str, Parameter] = {}
+    shared: set[str] = set()
+    for parameter in parameters:
+        for name in {parameter.code.casefold(), parameter.number.casefold()}:
+            if name in found and found[name] is not parameter:
+                shared.add(name)
+            found[name] = parameter
+    return {name: p for name, p in found.items() if name not in shared}

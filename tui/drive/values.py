@@ -1,0 +1,253 @@
+"""Raw words and engineering values, both ways, without floats.
+
+A typed value is rounded half away from zero to what the drive can hold; a conversion says
+whether it was.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
+
+from .errors import ValueRefused
+from .schema import Bit, Parameter
+
+NOT_AVAILABLE = "-----"
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A raw value with its reading: number and unit, or a name, or the set bits."""
+
+    raw: int
+    number: Decimal | None
+    unit: str
+    text: str
+    """What a person reads, without the unit."""
+
+    @property
+    def display(self) -> str:
+        """Text and unit."""
+        return f"{self.text} {self.unit}" if self.unit else self.text
+
+
+@dataclass(frozen=True, slots=True)
+class Conversion:
+    """A raw value made from what a person typed, and whether it had to be rounded."""
+
+    raw: int
+    rounded: bool
+
+
+def word_count(parameter: Parameter) -> int:
+    """How many registers the parameter takes: 1 or 2."""
+    return 2 if parameter.type.endswith("32") else 1
+
+
+def from_words(parameter: Parameter, words: Sequence[int]) -> int:
+    """The raw value in the parameter's registers, sign and word order applied."""
+    if word_count(parameter) == 2:
+        low, high = words if parameter.low_word_first else reversed(words)
+        raw, width = (high << 16) | low, 32
+    else:
+        raw, width = words[0], 16
+    if parameter.type.startswith("int") and raw >= 1 << (width - 1):
+        raw -= 1 << width
+    return raw
+
+
+def to_words(parameter: Parameter, raw: int) -> tuple[int, ...]:
+    """The registers that carry a raw value; raises ValueRefused if it does not fit."""
+    low, high = type_range(parameter)
+    if not low <= raw <= high:
+        raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
+    if word_count(parameter) == 1:
+        return (raw & 0xFFFF,)
+    pair = (raw & 0xFFFF, (raw >> 16) & 0xFFFF)
+    return pair if parameter.low_word_first else (pair[1], pair[0])
+
+
+def type_range(parameter: Parameter) -> tuple[int, int]:
+    """Lowest and highest raw value that the parameter's type can hold."""
+    width = 32 if parameter.type.endswith("32") else 16
+    if parameter.type.startswith("int"):
+        return -(1 << (width - 1)), (1 << (width - 1)) - 1
+    return 0, (1 << width) - 1
+
+
+def raw_range(parameter: Parameter) -> tuple[int, int]:
+    """Lowest and highest raw value the profile allows, within the type."""
+    low, high = type_range(parameter)
+    return (
+        low if parameter.min is None else parameter.min,
+        high if parameter.max is None else parameter.max,
+    )
+
+
+def engineering(raw: int, scale: Decimal) -> Decimal:
+    """The engineering value of a raw one; its decimals are those of the scale."""
+    return raw * scale
+
+
+def decode(
+    parameter: Parameter, raw: int, names: Mapping[int, str], scale: Decimal | None
+) -> Value:
+    """A raw value as a person reads it.
+
+    A name where the raw value has one, the word in hexadecimal for bit words, else the
+    number with the decimals of its scale; without a scale the raw value itself, unit `raw`.
+    """
+    if parameter.bits:
+        return Value(raw, None, "", f"16#{raw & 0xFFFF:04X}")
+    if (name := names.get(raw)) is not None:
+        return Value(raw, None, "", name)
+    if is_enumeration(parameter):
+        return Value(raw, None, "", f"unknown ({raw})")
+    if scale is None:
+        return Value(raw, Decimal(raw), "raw", str(raw))
+    number = engineering(raw, scale)
+    return Value(raw, number, parameter.unit, f"{number:f}")
+
+
+def is_enumeration(parameter: Parameter) -> bool:
+    """Whether the raw values are names rather than a number."""
+    named = bool(parameter.enumeration or parameter.values)
+    return named and not parameter.unit and parameter.scale == "1" and not _is_number(parameter)
+
+
+def _is_number(parameter: Parameter) -> bool:
+    """A plain number may name special values; it then allows more raw values than it names."""
+    if parameter.enumeration or parameter.min is None or parameter.max is None:
+        return False
+    return parameter.max - parameter.min + 1 > 4 * len(parameter.values)
+
+
+def set_bits(bits: Sequence[Bit], word: int) -> list[Bit]:
+    """The named bits that are 1 in a word."""
+    return [bit for bit in bits if word >> bit.bit & 1]
+
+
+def encode(
+    parameter: Parameter, text: str, names: Mapping[int, str], scale: Decimal | None
+) -> Conversion:
+    """A raw value from what a person typed: a name, a number with or without unit, a word.
+
+    Raises ValueRefused when the text is none of these, the scale is not known, the raw
+    value is out of the profile's range or sets a reserved bit.
+    """
+    typed = text.strip()
+    raw = _named(typed, names)
+    rounded = False
+    if raw is None and typed.lower().startswith(("16#", "0x")):
+        raw = _hexadecimal(parameter, typed)
+    if raw is None:
+        if scale is None:
+            raise ValueRefused(
+                f"{parameter.code}: its scale follows {_scale_source(parameter)}, which was not"
+                " read; nothing can be written."
+            )
+        number = _number(parameter, typed, names)
+        counts = number / scale
+        raw = int(counts.to_integral_value(ROUND_HALF_UP))
+        rounded = counts != raw
+    check_raw(parameter, raw, names, scale)
+    return Conversion(raw, rounded)
+
+
+def check_raw(
+    parameter: Parameter, raw: int, names: Mapping[int, str], scale: Decimal | None
+) -> None:
+    """Raise ValueRefused unless the profile lets the parameter hold this raw value."""
+    low, high = raw_range(parameter)
+    if not low <= raw <= high and raw not in names:
+        raise ValueRefused(
+            f"{parameter.code}: {_plain(parameter, raw, scale)} is out of range, "
+            f"{_plain(parameter, low, scale)} to {_plain(parameter, high, scale)}."
+        )
+    to_words(parameter, raw)
+    if is_enumeration(parameter) and raw not in names:
+        raise ValueRefused(f"{parameter.code}: {raw} is none of its values.")
+    taken = [bit for bit in parameter.reserved if raw >> bit & 1]
+    if taken:
+        bits = ", ".join(str(bit) for bit in taken)
+        raise ValueRefused(f"{parameter.code}: reserved bit {bits} must stay 0.")
+
+
+def _plain(parameter: Parameter, raw: int, scale: Decimal | None) -> str:
+    if scale is None:
+        return f"raw {raw}"
+    return f"{engineering(raw, scale):f} {parameter.unit}".rstrip()
+
+
+def _scale_source(parameter: Parameter) -> str:
+    return parameter.scale_by.parameter if parameter.scale_by else "another parameter"
+
+
+def _named(typed: str, names: Mapping[int, str]) -> int | None:
+    folded = typed.casefold()
+    return next((raw for raw, name in names.items() if name.casefold() == folded), None)
+
+
+def _hexadecimal(parameter: Parameter, typed: str) -> int:
+    try:
+        word = int(typed[3:] if typed.startswith("16#") else typed[2:], 16)
+    except ValueError:
+        raise ValueRefused(f"{parameter.code}: {typed!r} is no hexadecimal word.") from None
+    if not 0 <= word < 1 << (16 * word_count(parameter)):
+        raise ValueRefused(f"{parameter.code}: {typed} does not fit {parameter.type}.")
+    low, high = type_range(parameter)
+    return word if word <= high else word - (high - low + 1)
+
+
+def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decimal:
+    bare = typed
+    if parameter.unit and bare.casefold().endswith(parameter.unit.casefold()):
+        bare = bare[: -len(parameter.unit)].rstrip()
+    try:
+        number = Decimal(bare.replace(",", ".").replace(" ", "").replace("_", ""))
+    except InvalidOperation:
+        number = Decimal("NaN")
+    if not number.is_finite():
+        choice = ", ".join(list(names.values())[:4])
+        wanted = f"one of {choice}" if choice else f"a number in {parameter.unit or 'counts'}"
+        raise ValueRefused(f"{parameter.code}: {typed!r} is not {wanted}.")
+    return number
+
+
+def speed_from_frequency(raw_frequency: int, poles: int) -> int:
+    """Speed in rpm from a raw output frequency in 0.01 Hz and the number of poles.
+
+    The drive's own rounding: (F x 12 + 5 x poles) / (poles x 10), cut to an integer.
+    Source: ATV21 Modbus manual 8.3, FE90. Raises ValueRefused for less than one pole.
+    """
+    if poles < 1:
+        raise ValueRefused(f"{poles} poles: a motor has at least 2.")
+    return (raw_frequency * 12 + 5 * poles) // (poles * 10)
+
+
+def percent_of(percent: Decimal, rating: Decimal) -> Decimal:
+    """A percentage in the unit of its rating, to the rating's decimals, half away from zero."""
+    return (percent * rating / 100).quantize(
+        Decimal(1).scaleb(int(rating.as_tuple().exponent)), ROUND_HALF_UP
+    )
+
+
+__all__ = [
+    "NOT_AVAILABLE",
+    "Conversion",
+    "Value",
+    "check_raw",
+    "decode",
+    "encode",
+    "engineering",
+    "from_words",
+    "is_enumeration",
+    "percent_of",
+    "raw_range",
+    "set_bits",
+    "speed_from_frequency",
+    "to_words",
+    "type_range",
+    "word_count",
+]
