@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from decimal import Decimal
 from functools import cached_property
 
@@ -126,16 +126,21 @@ class Profile:
                 return chart
         return fallback or (self.data.charts[0] if self.data.charts else None)
 
-    def scale(self, parameter: Parameter, raws: Mapping[str, int]) -> Decimal | None:
+    def scale(
+        self, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
+    ) -> Decimal | None:
         """What one count is worth, given raw values by code.
 
-        None where the scale follows another parameter whose value is not known: then the
-        value must be shown raw and never written.
+        `absent` names parameters that the drive said it does not have. None where the scale
+        follows another parameter whose value is not known: then the value must be shown raw
+        and never written.
         """
-        if parameter.scale_by is None:
+        follows = parameter.scale_by
+        if follows is None:
             return Decimal(parameter.scale)
-        raw = raws.get(parameter.scale_by.parameter)
-        text = parameter.scale_by.scales.get(str(raw))
+        text = follows.scales.get(str(raws.get(follows.parameter)))
+        if text is None and follows.parameter in absent:
+            text = follows.absent
         return Decimal(text) if text is not None else None
 
 

@@ -252,6 +252,8 @@ class ScaleBy(Table, frozen=True, kw_only=True):
 
     parameter: str
     scales: dict[str, DecimalText]
+    absent: DecimalText | None = None
+    """Scale where the drive says that it has no such parameter; without it the scale is unknown."""
 
 
 class Parameter(Table, frozen=True, kw_only=True):

@@ -1,0 +1,179 @@
+"""Which requests read a set of parameters with the least time on the wire.
+
+Exact for what it considers: every split of the wanted addresses into runs of neighbours that
+the drive allows, with or without one stretch of each indirect block or scanner table whose
+slots are known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from .errors import DriveError
+from .profile import Profile
+from .schema import Block, Parameter
+from .values import word_count
+
+REQUEST_CHARACTERS = 8
+"""Characters of a function 3 request: address, function, start, count, checksum."""
+REPLY_CHARACTERS = 5
+"""Characters of its reply beside the words: address, function, byte count, checksum."""
+
+
+@dataclass(frozen=True, slots=True)
+class WireTiming:
+    """What the line takes for an exchange; all in seconds."""
+
+    character: float = 11 / 19200
+    silence: float = 3.5 * 11 / 19200
+    turnaround: float = 0.005
+
+    def read(self, words: int) -> float:
+        """Time of one read of so many words: request, turnaround, reply and both silences."""
+        characters = REQUEST_CHARACTERS + REPLY_CHARACTERS + 2 * words
+        return characters * self.character + 2 * self.silence + self.turnaround
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a parameter's words stand in a reply: the offset of the first one."""
+
+    code: str
+    offset: int
+
+
+@dataclass(frozen=True, slots=True)
+class ReadRequest:
+    """One function 3 request and the parameters found in its reply."""
+
+    address: int
+    count: int
+    places: tuple[Place, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ReadPlan:
+    """Requests in the order of their addresses, and their time on the wire in seconds."""
+
+    requests: tuple[ReadRequest, ...]
+    seconds: float
+
+
+def plan_reads(
+    profile: Profile,
+    codes: Iterable[str],
+    timing: WireTiming = WireTiming(),
+    slots: Mapping[str, int] | None = None,
+) -> ReadPlan:
+    """The cheapest requests for these parameters.
+
+    `slots` holds the raw values of block and scanner slots that are known to be in force; a
+    block none of whose slots is known is not used. Raises DriveError for a parameter that can
+    only be written, UnknownParameter for one that the profile does not have.
+    """
+    wanted = {code: profile[code] for code in dict.fromkeys(codes)}
+    for parameter in wanted.values():
+        if parameter.access == "w":
+            raise DriveError(f"{parameter.code} of {profile.name} can only be written.")
+    best: ReadPlan | None = None
+    options = [list(_stretches(profile, block, slots or {})) for block in profile.data.blocks]
+    for choice in product(*([None, *stretches] for stretches in options)):
+        used = [stretch for stretch in choice if stretch is not None]
+        covered = {place.code for stretch in used for place in stretch.places}
+        if any(not covered & set(wanted) for _ in used):
+            continue
+        rest = [p for code, p in wanted.items() if code not in covered]
+        requests = [*_runs(profile, rest, timing), *(_only(stretch, wanted) for stretch in used)]
+        seconds = sum(timing.read(request.count) for request in requests)
+        if best is None or (seconds, len(requests)) < (best.seconds, len(best.requests)):
+            best = ReadPlan(tuple(sorted(requests, key=lambda r: r.address)), seconds)
+    return best or ReadPlan((), 0.0)
+
+
+def _only(request: ReadRequest, wanted: Mapping[str, Parameter]) -> ReadRequest:
+    places = tuple(place for place in request.places if place.code in wanted)
+    return ReadRequest(request.address, request.count, places)
+
+
+def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iterator[ReadRequest]:
+    """Every read of a read block whose slots all stand for a known parameter."""
+    if block.direction != "read":
+        return
+    assigned = [_assigned(profile, block, slots.get(slot)) for slot in block.slots]
+    first_ones = [0] if block.fixed_start else range(len(assigned))
+    for first in first_ones:
+        places: list[Place] = []
+        for offset, code in enumerate(assigned[first : first + block.max_words]):
+            if code is None:
+                break
+            places.append(Place(code, offset))
+            if len(places) >= block.min_words:
+                yield ReadRequest(block.address + first, len(places), tuple(places))
+
+
+def _assigned(profile: Profile, block: Block, raw: int | None) -> str | None:
+    """The code that a slot's raw value stands for; None where it is free or not known."""
+    if raw is None:
+        return None
+    if block.selects_by == "address":
+        parameter = profile.at(raw) if raw else None
+        return parameter.code if parameter and word_count(parameter) == 1 else None
+    return next((c.parameter for c in block.choices if c.raw == raw), None)
+
+
+def _runs(
+    profile: Profile, parameters: Sequence[Parameter], timing: WireTiming
+) -> list[ReadRequest]:
+    """The cheapest split of parameters into runs of neighbours, by dynamic programming."""
+    ordered = sorted(parameters, key=lambda p: p.address)
+    best: list[tuple[float, int]] = [(0.0, 0)]
+    for end in range(1, len(ordered) + 1):
+        choices = [
+            (best[start][0] + timing.read(count), start)
+            for start in range(end)
+            if (count := _run_length(profile, ordered[start:end])) is not None
+        ]
+        best.append(min(choices))
+    runs: list[ReadRequest] = []
+    end = len(ordered)
+    while end:
+        start = best[end][1]
+        runs.append(_request(ordered[start:end]))
+        end = start
+    return runs[::-1]
+
+
+def _span(run: Sequence[Parameter]) -> int:
+    return max(p.address + word_count(p) for p in run) - run[0].address
+
+
+def _request(run: Sequence[Parameter]) -> ReadRequest:
+    first = run[0].address
+    return ReadRequest(first, _span(run), tuple(Place(p.code, p.address - first) for p in run))
+
+
+def _run_length(profile: Profile, run: Sequence[Parameter]) -> int | None:
+    """Words of a read over this run, or None where the drive does not allow it."""
+    count = _span(run)
+    if len(run) == 1:
+        return count
+    reading = profile.data.reading
+    function = profile.function(3)
+    longest = (function.max_read if function else None) or 1
+    if reading.single_words_only or count > longest:
+        return None
+    if not reading.gaps_readable and not _all_known(profile, run[0].address, count):
+        return None
+    return count
+
+
+def _all_known(profile: Profile, address: int, count: int) -> bool:
+    at = address
+    while at < address + count:
+        parameter = profile.at(at)
+        if parameter is None or parameter.access == "w":
+            return False
+        at += word_count(parameter)
+    return True

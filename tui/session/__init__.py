@@ -1,0 +1,1 @@
+"""One connected drive: identification, monitoring and reading; no screen, no Modbus library."""

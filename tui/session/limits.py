@@ -1,0 +1,38 @@
+"""From a profile to the limits that the shared line keeps for its device."""
+
+from __future__ import annotations
+
+from tui.bus.limits import Limits, Window
+from tui.drive.profile import Profile
+from tui.drive.schema import Block
+
+
+def limits_of(profile: Profile) -> Limits:
+    """What a drive of this family may be sent; the line refuses everything else."""
+    functions = {function.code: function for function in profile.data.functions}
+    read, write, both = (functions.get(code) for code in (3, 16, 23))
+    diagnose = functions.get(8)
+    return Limits(
+        functions=frozenset(functions),
+        max_read=(read.max_read if read else None) or 1,
+        max_write=(write.max_write if write else None) or 1,
+        max_read_23=(both.max_read if both else None) or 0,
+        max_write_23=(both.max_write if both else None) or 0,
+        single_words_only=profile.data.reading.single_words_only,
+        read_windows=_windows(profile.data.blocks, "read"),
+        write_windows=_windows(profile.data.blocks, "write"),
+        subfunctions=frozenset(diagnose.subfunctions if diagnose else ()),
+        broadcast_functions=frozenset(c for c, function in functions.items() if function.broadcast),
+        exceptions={
+            e.code: f"{e.name}: {e.meaning}" if e.name else e.meaning
+            for e in profile.data.exceptions
+        },
+    )
+
+
+def _windows(blocks: list[Block], direction: str) -> tuple[Window, ...]:
+    return tuple(
+        Window(block.address, block.min_words, block.max_words, block.fixed_start)
+        for block in blocks
+        if block.direction == direction
+    )

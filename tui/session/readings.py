@@ -1,0 +1,61 @@
+"""A parameter's value as it was read: what it is, when it was on the wire, how good it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from enum import StrEnum
+
+from tui.drive.schema import Parameter
+from tui.drive.values import NOT_AVAILABLE, Value
+
+
+class Quality(StrEnum):
+    """Whether a value may be taken for the present one."""
+
+    GOOD = "good"
+    STALE = "stale"
+    BAD = "bad"
+
+
+@dataclass(frozen=True, slots=True)
+class Reading:
+    """One parameter as last read; `time` is when its reply was complete, time.monotonic()."""
+
+    parameter: Parameter
+    raw: int | None
+    value: Value | None
+    quality: Quality
+    time: float
+    error: str = ""
+
+    @property
+    def text(self) -> str:
+        """What a person reads, without the unit; dashes where there is no value."""
+        return self.value.text if self.value is not None else NOT_AVAILABLE
+
+    @property
+    def unit(self) -> str:
+        """The unit of the value, or that of the parameter while there is none."""
+        return self.value.unit if self.value is not None else self.parameter.unit
+
+    @property
+    def number(self) -> float | None:
+        """The engineering value for bars and trends; None for names, words and bad values."""
+        if self.value is None or self.value.number is None:
+            return None
+        return float(self.value.number)
+
+    def age(self, now: float) -> float:
+        """Seconds since the value was on the wire."""
+        return max(0.0, now - self.time)
+
+    def aged(self, now: float, longest: float) -> Reading:
+        """The same reading, stale if it is good and older than `longest` seconds."""
+        if self.quality is Quality.GOOD and self.age(now) > longest:
+            return replace(self, quality=Quality.STALE)
+        return self
+
+    @classmethod
+    def bad(cls, parameter: Parameter, time: float, error: str) -> Reading:
+        """A parameter without a value, and why."""
+        return cls(parameter, None, None, Quality.BAD, time, error)
