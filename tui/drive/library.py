@@ -140,6 +140,15 @@ def identify(reference: str) -> list[str]:
     return [profile_id for _, profile_id in sorted(fits, reverse=True)]
 
 
+def mentions_function(path: Path, code: int) -> bool:
+    """Whether a profile file declares a Modbus function, without decoding the file."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return False
+    return re.search(rf"^\[\[functions\]\]\s+code\s*=\s*{code}\b", text, re.MULTILINE) is not None
+
+
 _PREFIXES = re.compile(r"^reference_prefixes\s*=\s*\[([^\]]*)\]", re.MULTILINE)
 
 

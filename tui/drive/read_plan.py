@@ -7,7 +7,7 @@ slots are known.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -66,11 +66,13 @@ def plan_reads(
     codes: Iterable[str],
     timing: WireTiming = WireTiming(),
     slots: Mapping[str, int] | None = None,
+    unreadable: Collection[str] = (),
 ) -> ReadPlan:
     """The cheapest requests for these parameters.
 
     `slots` holds the raw values of block and scanner slots that are known to be in force; a
-    block none of whose slots is known is not used. Raises DriveError for a parameter that can
+    block none of whose slots is known is not used. `unreadable` names parameters that this drive
+    refused: no run goes over them. Raises DriveError for a parameter that can
     only be written, UnknownParameter for one that the profile does not have.
     """
     wanted = {code: profile[code] for code in dict.fromkeys(codes)}
@@ -85,7 +87,10 @@ def plan_reads(
         if any(not covered & set(wanted) for _ in used):
             continue
         rest = [p for code, p in wanted.items() if code not in covered]
-        requests = [*_runs(profile, rest, timing), *(_only(stretch, wanted) for stretch in used)]
+        requests = [
+            *_runs(profile, rest, timing, unreadable),
+            *(_only(stretch, wanted) for stretch in used),
+        ]
         seconds = sum(timing.read(request.count) for request in requests)
         if best is None or (seconds, len(requests)) < (best.seconds, len(best.requests)):
             best = ReadPlan(tuple(sorted(requests, key=lambda r: r.address)), seconds)
@@ -124,7 +129,10 @@ def _assigned(profile: Profile, block: Block, raw: int | None) -> str | None:
 
 
 def _runs(
-    profile: Profile, parameters: Sequence[Parameter], timing: WireTiming
+    profile: Profile,
+    parameters: Sequence[Parameter],
+    timing: WireTiming,
+    unreadable: Collection[str],
 ) -> list[ReadRequest]:
     """The cheapest split of parameters into runs of neighbours, by dynamic programming."""
     ordered = sorted(parameters, key=lambda p: p.address)
@@ -133,7 +141,7 @@ def _runs(
         choices = [
             (best[start][0] + timing.read(count), start)
             for start in range(end)
-            if (count := _run_length(profile, ordered[start:end])) is not None
+            if (count := _run_length(profile, ordered[start:end], unreadable)) is not None
         ]
         best.append(min(choices))
     runs: list[ReadRequest] = []
@@ -154,7 +162,9 @@ def _request(run: Sequence[Parameter]) -> ReadRequest:
     return ReadRequest(first, _span(run), tuple(Place(p.code, p.address - first) for p in run))
 
 
-def _run_length(profile: Profile, run: Sequence[Parameter]) -> int | None:
+def _run_length(
+    profile: Profile, run: Sequence[Parameter], unreadable: Collection[str]
+) -> int | None:
     """Words of a read over this run, or None where the drive does not allow it."""
     count = _span(run)
     if len(run) == 1:
@@ -164,16 +174,16 @@ def _run_length(profile: Profile, run: Sequence[Parameter]) -> int | None:
     longest = (function.max_read if function else None) or 1
     if reading.single_words_only or count > longest:
         return None
-    if not reading.gaps_readable and not _all_known(profile, run[0].address, count):
+    if not reading.gaps_readable and not _all_known(profile, run[0].address, count, unreadable):
         return None
     return count
 
 
-def _all_known(profile: Profile, address: int, count: int) -> bool:
+def _all_known(profile: Profile, address: int, count: int, unreadable: Collection[str]) -> bool:
     at = address
     while at < address + count:
         parameter = profile.at(at)
-        if parameter is None or parameter.access == "w":
+        if parameter is None or parameter.access == "w" or parameter.code in unreadable:
             return False
         at += word_count(parameter)
     return True

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
+import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -17,7 +17,8 @@ from tui.drive.values import decode, from_words, word_count
 from .limits import limits_of
 from .readings import Quality, Reading
 
-BLOCK_EFFECT_UNKNOWN = frozenset({"after-reset"})
+ASK_AGAIN = 30.0
+"""Seconds after which a poll asks again for a parameter that the drive refused."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,8 +44,8 @@ class Reader:
     device: int
     profile: Profile
     _scale_sources: dict[str, Raw] = field(default_factory=dict)
-    _refused: set[str] = field(default_factory=set)
-    _plans: dict[frozenset[str], ReadPlan] = field(default_factory=dict)
+    _refused: dict[str, Raw] = field(default_factory=dict)
+    _plans: dict[tuple[frozenset[str], frozenset[str]], ReadPlan] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.line.describe(self.device, limits_of(self.profile))
@@ -75,15 +76,18 @@ class Reader:
             self._scale_sources.update(await self._raws(missing, priority))
 
     async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
-        found: dict[str, Raw] = {}
-        plan = self._plan(codes - self._refused)
-        for request in plan.requests:
+        found = self._still_refused(codes) if priority >= Priority.POLL else {}
+        for request in self._plan(codes - self._refused.keys()).requests:
             found.update(await self._exchange(request, priority))
-        alone = [code for code in codes if code not in found]
-        for code in alone:
+        for code in codes - found.keys():
             found[code] = await self._alone(self.profile[code], priority)
         self._note_scale_sources(found)
         return found
+
+    def _still_refused(self, codes: frozenset[str]) -> dict[str, Raw]:
+        """Refusals young enough that a poll need not ask again."""
+        oldest = time.monotonic() - ASK_AGAIN
+        return {c: r for c, r in self._refused.items() if c in codes and r.time > oldest}
 
     def _note_scale_sources(self, found: Mapping[str, Raw]) -> None:
         """A scale source that is read for its own sake is fresher than the one kept."""
@@ -91,9 +95,12 @@ class Reader:
             self._scale_sources[code] = found[code]
 
     def _plan(self, codes: frozenset[str]) -> ReadPlan:
-        if codes not in self._plans:
-            self._plans[codes] = plan_reads(self.profile, sorted(codes), self._timing())
-        return self._plans[codes]
+        key = (codes, frozenset(self._refused))
+        if key not in self._plans:
+            self._plans[key] = plan_reads(
+                self.profile, sorted(codes), self._timing(), unreadable=key[1]
+            )
+        return self._plans[key]
 
     def _timing(self) -> WireTiming:
         link = self.line.link
@@ -115,7 +122,8 @@ class Reader:
         except DeviceException as refusal:
             if several:
                 return {}
-            return {p.code: self._refusal(refusal) for p in request.places}
+            self._refused.update({p.code: self._refusal(refusal) for p in request.places})
+            return {p.code: self._refused[p.code] for p in request.places}
         unknown = self.profile.data.reading.unknown_word
         found: dict[str, Raw] = {}
         for place in request.places:
@@ -132,14 +140,14 @@ class Reader:
                 self.device, parameter.address, count, priority=priority
             )
         except DeviceException as refusal:
-            self._refused.add(parameter.code)
-            return self._refusal(refusal)
-        self._refused.discard(parameter.code)
+            self._refused[parameter.code] = self._refusal(refusal)
+            return self._refused[parameter.code]
+        self._refused.pop(parameter.code, None)
         return Raw(reply.time, from_words(parameter, reply.words))
 
     def _refusal(self, refusal: DeviceException) -> Raw:
         absent = refusal.code == self.profile.data.reading.unknown_exception
-        return Raw(asyncio.get_running_loop().time(), None, str(refusal), absent)
+        return Raw(time.monotonic(), None, str(refusal), absent)
 
     def _reading(self, parameter: Parameter, raw: Raw) -> Reading:
         if raw.raw is None:

@@ -1,0 +1,43 @@
+"""One connected drive: what it is, what it shows, what is asked of it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tui.bus.line import Line, Priority
+from tui.drive.profile import Profile
+
+from .identify import DriveIdentity
+from .monitor import Monitor
+from .reader import Reader
+from .readings import Reading
+
+
+class DriveSession:
+    """A drive on a line, with its profile and its monitor.
+
+    The monitor works in the line's loop; `read` belongs to the loop of its caller.
+    """
+
+    def __init__(
+        self, line: Line, device: int, profile: Profile, identity: DriveIdentity | None = None
+    ) -> None:
+        self.line = line
+        self.device = device
+        self.profile = profile
+        self.identity = identity
+        self.monitor = Monitor(line, device, profile)
+        self._reader = Reader(line, device, profile)
+
+    async def read(
+        self, codes: Sequence[str], *, priority: Priority = Priority.OPERATOR_READ
+    ) -> dict[str, Reading]:
+        """Readings by code; a parameter that the drive refuses is bad, the others are not hurt.
+
+        Raises the line's errors (no answer, line lost) and UnknownParameter.
+        """
+        return await self._reader.read(codes, priority=priority)
+
+    def close(self) -> None:
+        """Stop watching; the line stays open."""
+        self.monitor.stop()

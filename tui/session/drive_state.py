@@ -1,0 +1,104 @@
+"""What a drive does, in words, from the readings of one cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tui.drive.chart import UNKNOWN, ChartState, Direction, read_chart
+from tui.drive.profile import Profile
+from tui.drive.schema import Bit, FaultCode, Parameter, StateKind
+from tui.drive.values import set_bits
+
+from .readings import Quality, Reading
+
+
+@dataclass(frozen=True, slots=True)
+class DriveState:
+    """The state of a drive; a part is None where the words that tell it were not read."""
+
+    id: str
+    name: str
+    kind: StateKind
+    direction: Direction | None
+    reached: bool | None
+    alarm: bool | None
+    local: bool | None
+    fault: FaultCode | None
+    """The fault that the drive is in now."""
+    fault_raw: int | None
+    """The raw fault code as read, the last fault where the family keeps it."""
+    alarms: tuple[Bit, ...]
+    headline: str
+
+
+def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState:
+    """The state that these readings tell; stale and bad ones tell nothing."""
+    raws = {
+        code: reading.raw
+        for code, reading in readings.items()
+        if reading.raw is not None and reading.quality is Quality.GOOD
+    }
+    chart = read_chart(profile, raws)
+    fault_raw = raws.get(profile.data.faults.parameter)
+    fault = _present_fault(profile, chart, fault_raw)
+    return DriveState(
+        id=chart.state.id,
+        name=chart.state.name,
+        kind=chart.kind,
+        direction=chart.direction,
+        reached=chart.reached,
+        alarm=chart.alarm,
+        local=chart.local,
+        fault=fault,
+        fault_raw=fault_raw,
+        alarms=_alarms(profile, raws),
+        headline=_headline(chart, fault),
+    )
+
+
+def _present_fault(profile: Profile, chart: ChartState, raw: int | None) -> FaultCode | None:
+    """The fault now: a family that keeps its last fault is in it only while its chart says so."""
+    faults = profile.data.faults
+    if raw is None or raw == faults.none:
+        return None
+    if chart.kind != "fault" and (faults.shows_last or chart.state is not UNKNOWN):
+        return None
+    return profile.fault(raw) or FaultCode(raw=raw, code=f"code {raw}", name="Not in the profile")
+
+
+def _alarms(profile: Profile, raws: Mapping[str, int]) -> tuple[Bit, ...]:
+    found: list[Bit] = []
+    for code, raw in raws.items():
+        found += [bit for bit in set_bits(profile[code].bits, raw) if bit.alarm]
+    return tuple(found)
+
+
+_WORDS: dict[StateKind, str] = {
+    "starting": "starting up",
+    "blocked": "not ready",
+    "ready": "ready",
+    "stopped": "stopped",
+    "running": "running",
+    "stopping": "stopping",
+    "fault": "fault",
+    "unknown": "unknown state",
+}
+
+
+def _headline(chart: ChartState, fault: FaultCode | None) -> str:
+    words = _WORDS[chart.kind]
+    if chart.kind == "running" and chart.direction is not None:
+        return f"{words} {chart.direction}"
+    if chart.kind == "fault" and fault is not None:
+        return f"{words} {fault.code}"
+    return words
+
+
+def channel_text(parameter: Parameter, reading: Reading | None) -> str:
+    """Who commands or gives the reference, from an enumeration or a word of one bit a channel."""
+    if reading is None or reading.raw is None:
+        return ""
+    if parameter.bits:
+        return ", ".join(bit.name for bit in set_bits(parameter.bits, reading.raw)) or "none"
+    return reading.text

@@ -1,0 +1,122 @@
+"""Finding out which drive answers at an address, and which profile fits it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from tui.bus.errors import DeviceException, ExchangeError, NoAnswer
+from tui.bus.line import Identification, Line, Priority
+from tui.drive import library
+
+VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
+
+
+@dataclass(frozen=True, slots=True)
+class DriveIdentity:
+    """What a drive says of itself, and the profiles that fit."""
+
+    device: int
+    vendor: str
+    reference: str
+    version: str
+    name: str
+    profile: str | None
+    """The one profile that fits best, or None."""
+    candidates: tuple[str, ...]
+    """Every profile that may fit, best first."""
+
+    @property
+    def version_text(self) -> str:
+        """The version as a person reads it: 0201 is 2.1."""
+        if len(self.version) == 4 and self.version.isdecimal():
+            return f"{int(self.version[:2])}.{int(self.version[2:])}"
+        return self.version
+
+
+@dataclass(frozen=True, slots=True)
+class ScanResult:
+    """What one address answered: a drive, or a fault that is not silence."""
+
+    device: int
+    identity: DriveIdentity | None
+    error: str = ""
+
+
+async def identify(line: Line, device: int) -> DriveIdentity:
+    """Ask a drive who it is by function 43.
+
+    A drive that refuses the function is there, but nameless. One that stays silent is asked
+    for the status word of each family that has no function 43. Raises NoAnswer where nothing
+    answers at all, and the line's other errors.
+    """
+    try:
+        answer = await line.identify(device, priority=Priority.OPERATOR_READ)
+    except DeviceException:
+        return DriveIdentity(device, "", "", "", "", None, ())
+    except NoAnswer:
+        candidates = await _nameless_families(line, device)
+        if not candidates:
+            raise
+        return DriveIdentity(device, "", "", "", "", None, candidates)
+    return await asyncio.to_thread(_identity, device, answer)
+
+
+def _identity(device: int, answer: Identification) -> DriveIdentity:
+    texts = {
+        number: value.decode("ascii", errors="replace").strip("\0 ")
+        for number, value in answer.objects.items()
+    }
+    reference = texts.get(REFERENCE, "")
+    candidates = tuple(library.identify(reference)) if reference else ()
+    return DriveIdentity(
+        device=device,
+        vendor=texts.get(VENDOR, ""),
+        reference=reference,
+        version=texts.get(VERSION, ""),
+        name=texts.get(NAME, ""),
+        profile=candidates[0] if candidates else None,
+        candidates=candidates,
+    )
+
+
+async def _nameless_families(line: Line, device: int) -> tuple[str, ...]:
+    """Profiles without function 43 whose status word the device lets be read."""
+    probes = await asyncio.to_thread(_status_words_without_identification)
+    for address, profiles in probes.items():
+        try:
+            await line.read(device, address, 1, priority=Priority.OPERATOR_READ)
+        except DeviceException:
+            continue
+        except NoAnswer:
+            continue
+        return profiles
+    return ()
+
+
+def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
+    found: dict[int, tuple[str, ...]] = {}
+    for listing in library.listings():
+        if library.mentions_function(listing.path, 43):
+            continue
+        profile = library.load(listing.id)
+        status = profile.quantity("status_word")
+        if status is not None:
+            found[status.address] = (*found.get(status.address, ()), profile.id)
+    return found
+
+
+async def scan(line: Line, devices: Iterable[int], found: Callable[[ScanResult], None]) -> None:
+    """Ask each address in turn; `found` hears of every one that is not silent.
+
+    Raises the line's errors that are not one drive's: closed, lost.
+    """
+    for device in devices:
+        try:
+            result = ScanResult(device, await identify(line, device))
+        except NoAnswer:
+            continue
+        except ExchangeError as fault:
+            result = ScanResult(device, None, str(fault))
+        found(result)
