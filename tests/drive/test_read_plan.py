@@ -1,0 +1,177 @@
+"""Read plans: never past a limit, never dearer than any other split, all values covered."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tui.drive.errors import DriveError, UnknownParameter
+from tui.drive.profile import Profile
+from tui.drive.read_plan import ReadPlan, WireTiming, plan_reads
+from tui.drive.schema import ProfileData
+
+TIMING = WireTiming(character=11 / 19200, silence=3.5 * 11 / 19200, turnaround=0.005)
+
+
+def profile_of(
+    addresses: Sequence[int],
+    *,
+    longest: int = 29,
+    gaps: bool = False,
+    single: bool = False,
+    blocks: Sequence[dict[str, object]] = (),
+    write_only: Sequence[int] = (),
+) -> Profile:
+    """A profile with a word P<address> at each address."""
+    tables = {
+        "profile": {"id": "plan", "name": "Plan", "vendor": "Nobody", "version": "1"},
+        "link": {"baud": 19200, "format": "8E1"},
+        "sources": [{"id": "manual", "title": "None"}],
+        "functions": [{"code": 3, "name": "Read", "max_read": longest}],
+        "reading": {"gaps_readable": gaps, "single_words_only": single},
+        "monitoring": {"values": []},
+        "blocks": list(blocks),
+        "parameters": [
+            {
+                "code": f"P{a}",
+                "name": f"Word {a}",
+                "number": f"W{a}",
+                "address": a,
+                "access": "w" if a in write_only else "rw",
+                "group": "All",
+                "source": "manual",
+                "confidence": "manual",
+            }
+            for a in addresses
+        ],
+    }
+    return Profile(msgspec.convert(tables, ProfileData))
+
+
+def spans(plan: ReadPlan) -> list[tuple[int, int]]:
+    return [(request.address, request.count) for request in plan.requests]
+
+
+def codes(addresses: Sequence[int]) -> list[str]:
+    return [f"P{address}" for address in addresses]
+
+
+def covered(plan: ReadPlan) -> list[str]:
+    return sorted(place.code for request in plan.requests for place in request.places)
+
+
+def test_neighbours_are_read_together() -> None:
+    profile = profile_of(range(3201, 3212))
+    assert spans(plan_reads(profile, codes([3201, 3202, 3204]), TIMING)) == [(3201, 4)]
+
+
+def test_an_unknown_gap_is_not_read_over() -> None:
+    profile = profile_of([10, 11, 13])
+    assert spans(plan_reads(profile, codes([10, 11, 13]), TIMING)) == [(10, 2), (13, 1)]
+
+
+def test_a_readable_gap_is_read_over_when_cheaper() -> None:
+    profile = profile_of([10, 11, 13, 80], gaps=True)
+    assert spans(plan_reads(profile, codes([10, 11, 13, 80]), TIMING)) == [(10, 4), (80, 1)]
+
+
+def test_the_longest_read_is_kept() -> None:
+    profile = profile_of(range(100, 160), longest=20)
+    plan = plan_reads(profile, codes(range(100, 160)), TIMING)
+    assert sorted(count for _, count in spans(plan)) == [20, 20, 20]
+
+
+def test_single_words_only() -> None:
+    profile = profile_of([1, 2, 3], single=True)
+    assert spans(plan_reads(profile, codes([1, 2, 3]), TIMING)) == [(1, 1), (2, 1), (3, 1)]
+
+
+def test_a_refused_parameter_is_not_read_over() -> None:
+    profile = profile_of([1, 2, 3])
+    plan = plan_reads(profile, codes([1, 3]), TIMING, unreadable={"P2"})
+    assert spans(plan) == [(1, 1), (3, 1)]
+
+
+def test_a_word_that_can_only_be_written_is_refused() -> None:
+    profile = profile_of([1, 2], write_only=[2])
+    with pytest.raises(DriveError, match="only be written"):
+        plan_reads(profile, ["P2"], TIMING)
+
+
+def test_an_unknown_code_is_named() -> None:
+    with pytest.raises(UnknownParameter, match="'P9'"):
+        plan_reads(profile_of([1]), ["P9"], TIMING)
+
+
+BLOCK = {
+    "id": "read-block",
+    "name": "Indirect block",
+    "direction": "read",
+    "address": 0x1875,
+    "min_words": 2,
+    "max_words": 5,
+    "slots": ["P2165", "P2166", "P2167"],
+    "selects_by": "choice",
+    "choices": [{"raw": 1, "parameter": "P500"}, {"raw": 2, "parameter": "P900"}],
+    "fixed_start": True,
+}
+
+
+def test_an_indirect_block_is_used_when_its_slots_are_known() -> None:
+    profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
+    wanted = codes([500, 900])
+    slots = {"P2165": 1, "P2166": 2, "P2167": 0}
+    plan = plan_reads(profile, wanted, TIMING, slots=slots)
+    assert spans(plan) == [(0x1875, 2)]
+    assert covered(plan) == sorted(wanted)
+    assert spans(plan_reads(profile, wanted, TIMING)) == [(500, 1), (900, 1)]
+
+
+def test_a_block_with_a_free_first_slot_is_not_used() -> None:
+    profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
+    plan = plan_reads(profile, codes([900]), TIMING, slots={"P2165": 0, "P2166": 2})
+    assert spans(plan) == [(900, 1)]
+
+
+def splits(items: Sequence[int]) -> Iterator[list[Sequence[int]]]:
+    """Every way to cut a sorted list into runs."""
+    if not items:
+        yield []
+        return
+    for cut in range(1, len(items) + 1):
+        for rest in splits(items[cut:]):
+            yield [items[:cut], *rest]
+
+
+@settings(deadline=None)
+@given(
+    known=st.sets(st.integers(0, 24), min_size=1, max_size=16),
+    share=st.randoms(use_true_random=False),
+    longest=st.integers(1, 12),
+    gaps=st.booleans(),
+    turnaround=st.floats(0.0, 0.02),
+)
+def test_no_split_is_cheaper(
+    known: set[int], share: object, longest: int, gaps: bool, turnaround: float
+) -> None:
+    timing = WireTiming(11 / 19200, 3.5 * 11 / 19200, turnaround)
+    profile = profile_of(sorted(known), longest=longest, gaps=gaps)
+    wanted = sorted(a for a in known if share.random() < 0.6)  # type: ignore[attr-defined]
+    plan = plan_reads(profile, codes(wanted), timing)
+    assert covered(plan) == sorted(codes(wanted))
+    for address, count in spans(plan):
+        assert count <= longest
+        assert gaps or set(range(address, address + count)) <= known
+    cheapest = min(
+        sum(timing.read(run[-1] - run[0] + 1) for run in split)
+        for split in splits(wanted)
+        if all(
+            run[-1] - run[0] < longest and (gaps or set(range(run[0], run[-1] + 1)) <= known)
+            for run in split
+        )
+    )
+    assert plan.seconds == pytest.approx(cheapest)
