@@ -9,7 +9,7 @@ from tui.drive.profile import Profile
 
 from .identify import DriveIdentity
 from .monitor import Monitor
-from .reader import Reader
+from .reader import Rating, Reader
 from .readings import Reading
 
 
@@ -37,6 +37,11 @@ class DriveSession:
         Raises the line's errors (no answer, line lost) and UnknownParameter.
         """
         return await self._reader.read(codes, priority=priority)
+
+    def rate(self, code: str, rating: Rating) -> None:
+        """Tell what 100 % of a parameter is, from the drive's nameplate."""
+        self._reader.ratings[code] = rating
+        self.monitor.reader.ratings[code] = rating
 
     def close(self) -> None:
         """Stop watching; the line stays open."""

@@ -69,7 +69,7 @@ class Monitor:
         self.profile = profile
         self.period = 0.5
         """Wished time of a cycle in seconds; read anew at each."""
-        self._reader = Reader(line, device, profile)
+        self.reader = Reader(line, device, profile)
         self._latest: Snapshot | None = None
         self._trend: deque[TrendPoint] = deque()
         self._listeners: tuple[Listener, ...] = ()
@@ -137,7 +137,7 @@ class Monitor:
             due = [*fast, *slow] if started >= slow_due else fast
             error = ""
             try:
-                readings.update(await self._reader.read(due or slow, priority=Priority.POLL))
+                readings.update(await self.reader.read(due or slow, priority=Priority.POLL))
             except LineError as fault:
                 error = str(fault)
             else:

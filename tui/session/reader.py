@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from decimal import Decimal
 
 from tui.bus.errors import DeviceException
 from tui.bus.line import Line, Priority, Reply
@@ -12,11 +14,14 @@ from tui.bus.link import TcpLink, character_time, silence
 from tui.drive.profile import Profile
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
 from tui.drive.schema import Parameter
-from tui.drive.values import decode, from_words, word_count
+from tui.drive.values import Value, decode, from_words, percent_of, word_count
 
 from .limits import limits_of
 from .readings import Quality, Reading
 
+SOURCE_AGE = 5.0
+"""Seconds for which a poll trusts a word that others' values depend on; an operator's read
+never does."""
 ASK_AGAIN = 30.0
 """Seconds after which a poll asks again for a parameter that the drive refused."""
 
@@ -32,6 +37,14 @@ class Raw:
     """True where the drive itself said that it has no such word."""
 
 
+@dataclass(frozen=True, slots=True)
+class Rating:
+    """What 100 % is: a number and its unit."""
+
+    number: Decimal
+    unit: str
+
+
 @dataclass(slots=True)
 class Reader:
     """Reads parameters of one drive and keeps what their scales depend on.
@@ -43,7 +56,9 @@ class Reader:
     line: Line
     device: int
     profile: Profile
-    _scale_sources: dict[str, Raw] = field(default_factory=dict)
+    ratings: dict[str, Rating] = field(default_factory=dict)
+    """What 100 % is, by code, where a person has told it from the nameplate."""
+    _sources: dict[str, Raw] = field(default_factory=dict)
     _refused: dict[str, Raw] = field(default_factory=dict)
     _plans: dict[tuple[frozenset[str], frozenset[str]], ReadPlan] = field(default_factory=dict)
 
@@ -55,25 +70,28 @@ class Reader:
     ) -> dict[str, Reading]:
         """Readings by code, in the order asked for."""
         wanted = list(dict.fromkeys(codes))
-        await self._read_scale_sources(wanted, priority)
+        await self._read_sources(wanted, priority)
         raws = await self._raws(frozenset(wanted), priority)
         return {code: self._reading(self.profile[code], raws[code]) for code in wanted}
 
     def forget(self) -> None:
         """Read scales and refused parameters anew: another drive may answer now."""
-        self._scale_sources.clear()
+        self._sources.clear()
         self._refused.clear()
         self._plans.clear()
 
-    async def _read_scale_sources(self, codes: list[str], priority: Priority) -> None:
-        sources = {
-            parameter.scale_by.parameter
-            for code in codes
-            if (parameter := self.profile[code]).scale_by is not None
-        }
-        missing = frozenset(sources - set(self._scale_sources))
-        if missing:
-            self._scale_sources.update(await self._raws(missing, priority))
+    async def _read_sources(self, codes: list[str], priority: Priority) -> None:
+        sources = {source for code in codes for source in _depends_on(self.profile[code])}
+        oldest = time.monotonic() - SOURCE_AGE if priority >= Priority.POLL else math.inf
+        due = frozenset(
+            code
+            for code in sources - set(codes)
+            if code not in self._sources or self._sources[code].time < oldest
+        )
+        if due:
+            self._sources.update(await self._raws(due, priority))
+        for code in sources & set(codes):
+            self._sources.setdefault(code, Raw(0.0, None))
 
     async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
@@ -81,7 +99,7 @@ class Reader:
             found.update(await self._exchange(request, priority))
         for code in codes - found.keys():
             found[code] = await self._alone(self.profile[code], priority)
-        self._note_scale_sources(found)
+        self._note_sources(found)
         return found
 
     def _still_refused(self, codes: frozenset[str]) -> dict[str, Raw]:
@@ -89,10 +107,10 @@ class Reader:
         oldest = time.monotonic() - ASK_AGAIN
         return {c: r for c, r in self._refused.items() if c in codes and r.time > oldest}
 
-    def _note_scale_sources(self, found: Mapping[str, Raw]) -> None:
+    def _note_sources(self, found: Mapping[str, Raw]) -> None:
         """A scale source that is read for its own sake is fresher than the one kept."""
-        for code in self._scale_sources.keys() & found.keys():
-            self._scale_sources[code] = found[code]
+        for code in self._sources.keys() & found.keys():
+            self._sources[code] = found[code]
 
     def _plan(self, codes: frozenset[str]) -> ReadPlan:
         key = (codes, frozenset(self._refused))
@@ -152,13 +170,32 @@ class Reader:
     def _reading(self, parameter: Parameter, raw: Raw) -> Reading:
         if raw.raw is None:
             return Reading.bad(parameter, raw.time, raw.error)
-        sources = {
-            code: source.raw
-            for code, source in self._scale_sources.items()
-            if source.raw is not None
-        }
-        scale = self.profile.scale(
-            parameter, sources, absent={c for c, s in self._scale_sources.items() if s.absent}
-        )
-        value = decode(parameter, raw.raw, self.profile.names(parameter), scale)
-        return Reading(parameter, raw.raw, value, Quality.GOOD, raw.time)
+        value = self._value(parameter, raw.raw)
+        physical = self._physical(parameter, value)
+        return Reading(parameter, raw.raw, value, Quality.GOOD, raw.time, physical=physical)
+
+    def _value(self, parameter: Parameter, raw: int) -> Value:
+        known = {code: one.raw for code, one in self._sources.items() if one.raw is not None}
+        absent = {code for code, one in self._sources.items() if one.absent}
+        scale = self.profile.scale(parameter, known, absent)
+        return decode(parameter, raw, self.profile.names(parameter), scale)
+
+    def _physical(self, parameter: Parameter, value: Value) -> Value | None:
+        """A percentage in the unit of its rating: the person's, else the drive's own."""
+        if parameter.unit != "%" or value.number is None:
+            return None
+        rating = self.ratings.get(parameter.code)
+        source = self._sources.get(parameter.rating)
+        if rating is None and source is not None and source.raw is not None:
+            own = self._value(self.profile[parameter.rating], source.raw)
+            rating = Rating(own.number, own.unit) if own.number is not None else None
+        if rating is None:
+            return None
+        number = percent_of(value.number, rating.number)
+        return Value(value.raw, number, rating.unit, f"{number:f}")
+
+
+def _depends_on(parameter: Parameter) -> list[str]:
+    """Parameters without which this one's value cannot be told."""
+    scale = parameter.scale_by.parameter if parameter.scale_by else ""
+    return [code for code in (scale, parameter.rating) if code]

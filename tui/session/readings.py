@@ -27,6 +27,8 @@ class Reading:
     quality: Quality
     time: float
     error: str = ""
+    physical: Value | None = None
+    """The value of a percentage in the unit of its rating, once that is known."""
 
     @property
     def text(self) -> str:
