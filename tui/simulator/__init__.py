@@ -1,0 +1,18 @@
+"""Simulated drives on a simulated line, served over a pseudo-terminal, a port or TCP."""
+
+from .drive import SimulatedDrive
+from .endpoints import ByteStream
+from .errors import SimulatorError
+from .simulation import Simulation
+from .spec import DriveSpec, FaultRates, LineTiming, parse_drives
+
+__all__ = [
+    "ByteStream",
+    "DriveSpec",
+    "FaultRates",
+    "LineTiming",
+    "SimulatedDrive",
+    "Simulation",
+    "SimulatorError",
+    "parse_drives",
+]

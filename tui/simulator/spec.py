@@ -1,0 +1,120 @@
+"""What a simulated line is made of: drives, line timing and the rates of provoked line faults."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+
+from .errors import SimulatorError
+
+DEFAULT_ADDRESS = 1
+LAST_ADDRESS = 247
+
+
+@dataclass(frozen=True)
+class DriveSpec:
+    """One simulated drive.
+
+    `sets` are raw values by parameter code (or number, or address) in force from power-up; a
+    monitored word among them keeps its value. `%MW20` and `IPC1`..`IPC4` set words of an
+    Altivar 71's cards. `protects` names parameters that the line cannot see. `identity`
+    replaces objects of function 43 by their id. `run_hz` starts the motor at power-up as if a
+    run order came from the terminals; with `wander` that reference changes now and then.
+    """
+
+    profile: str
+    address: int = DEFAULT_ADDRESS
+    sets: Mapping[str, int] = field(default_factory=dict)
+    protects: frozenset[str] = frozenset()
+    name: str = ""
+    identity: Mapping[int, str] = field(default_factory=dict)
+    run_hz: float = 0.0
+    wander: bool = False
+
+
+@dataclass(frozen=True)
+class LineTiming:
+    """Baud and character format of the line, and whether the line keeps their time."""
+
+    baud: int = 19200
+    format: str = "8E1"
+    real_time: bool = False
+
+    @property
+    def bits_per_character(self) -> int:
+        """Bits of one character on the wire: start, data, parity if any, stop bits."""
+        return 1 + int(self.format[0]) + (self.format[1] != "N") + int(self.format[2])
+
+    @property
+    def character(self) -> float:
+        """Time of one character on the wire, in seconds."""
+        return self.bits_per_character / self.baud
+
+    @property
+    def silence(self) -> float:
+        """Silence that ends a frame, in s: 3.5 characters, 1.75 ms above 19200 baud."""
+        return 0.00175 if self.baud > 19200 else 3.5 * self.character
+
+
+@dataclass(frozen=True)
+class FaultRates:
+    """Probability of each line fault per reply, 0..1; at most one fault hits a reply.
+
+    `late_by` is the range of the extra delay of a late reply, in s.
+    """
+
+    late: float = 0.0
+    lost: float = 0.0
+    duplicated: float = 0.0
+    truncated: float = 0.0
+    corrupted: float = 0.0
+    noise: float = 0.0
+    foreign: float = 0.0
+    late_by: tuple[float, float] = (0.3, 1.5)
+
+    def __post_init__(self) -> None:
+        """Refuse rates that are no probabilities or add up to more than 1."""
+        rates = self.by_kind()
+        wrong = [kind for kind, rate in rates.items() if not 0 <= rate <= 1]
+        if wrong:
+            raise SimulatorError(f"The rate of {wrong[0]} replies must be between 0 and 1.")
+        if sum(rates.values()) > 1 + 1e-9:
+            raise SimulatorError("The rates of line faults add up to more than 1.")
+
+    def by_kind(self) -> dict[str, float]:
+        """The rates by kind of fault, in a fixed order."""
+        return {f.name: getattr(self, f.name) for f in fields(self) if f.name != "late_by"}
+
+
+def parse_drives(text: str) -> list[DriveSpec]:
+    """Drives from `atv71@2,atv21`: profiles with addresses, missing ones the next free from 1.
+
+    Raises SimulatorError with what is wrong in the text.
+    """
+    wanted: list[tuple[str, int | None]] = []
+    for part in text.split(","):
+        profile, sign, address = part.strip().partition("@")
+        if not profile:
+            raise SimulatorError(
+                f"{text!r} names no profile between its commas; write it like atv71@2,atv21."
+            )
+        wanted.append((profile.strip().lower(), _address(part, address) if sign else None))
+    taken: set[int] = set()
+    for _, given in wanted:
+        if given in taken:
+            raise SimulatorError(f"Two simulated drives have address {given}; give each its own.")
+        if given is not None:
+            taken.add(given)
+    drives = []
+    for profile, given in wanted:
+        if given is None:
+            given = next(a for a in range(DEFAULT_ADDRESS, LAST_ADDRESS + 1) if a not in taken)
+            taken.add(given)
+        drives.append(DriveSpec(profile, given))
+    return drives
+
+
+def _address(part: str, text: str) -> int:
+    if text.strip().isdecimal() and 1 <= int(text) <= LAST_ADDRESS:
+        return int(text)
+    raise SimulatorError(f"{part.strip()!r}: the address after @ must be 1 to {LAST_ADDRESS}.")
