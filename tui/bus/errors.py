@@ -1,0 +1,145 @@
+"""Errors of a line, of its links and of single exchanges, in words for the person at the panel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class LineError(Exception):
+    """Something about a line is wrong; the text says what happened and what to do next."""
+
+
+class LinkSyntaxError(LineError):
+    """A typed link cannot be understood; the text shows the forms that can."""
+
+
+class PortBusy(LineError):
+    """A serial port is held by another program; `holder` names it where the system tells."""
+
+    def __init__(self, path: str, holder: str | None = None) -> None:
+        self.path = path
+        self.holder = holder
+        who = f"in use by {holder}" if holder else "in use by another program"
+        super().__init__(f"{path} is {who}. Close that program, or choose another port.")
+
+
+class PortMissing(LineError):
+    """A serial port is not there; `ports` are those that are."""
+
+    def __init__(self, path: str, ports: Sequence[str] = ()) -> None:
+        self.path = path
+        self.ports = tuple(ports)
+        there = f"Ports here: {', '.join(ports)}." if ports else "No serial port is here."
+        super().__init__(f"{path} does not exist. {there} Check the adapter and the name.")
+
+
+class PortRefused(LineError):
+    """A serial port is there but cannot be opened: no permission, or settings it does not take."""
+
+    def __init__(self, path: str, reason: str) -> None:
+        self.path = path
+        super().__init__(f"{path} cannot be opened: {reason}")
+
+
+class LineClosed(LineError):
+    """The line was closed by the program itself."""
+
+    def __init__(self, text: str = "The line is closed.") -> None:
+        super().__init__(text)
+
+
+class LineLost(LineError):
+    """The line went away or cannot be reached; it is tried again by itself."""
+
+
+class LineBusy(LineError):
+    """Too many requests wait for the line; this one was not queued."""
+
+
+class RequestRefused(LineError):
+    """A request that was never sent: past the device's limits, or the line is read-only."""
+
+
+class ExchangeError(LineError):
+    """A request was sent and not answered as it should be.
+
+    `device` is the id asked, `function` the function code, `address` the first register (0 for
+    functions without one).
+    """
+
+    def __init__(self, device: int, function: int, address: int, text: str) -> None:
+        self.device = device
+        self.function = function
+        self.address = address
+        super().__init__(text)
+
+
+def _asked(function: int, address: int) -> str:
+    return f"function {function}" + (f", register {address}" if function in _WITH_ADDRESS else "")
+
+
+_WITH_ADDRESS = frozenset({3, 4, 6, 16, 23})
+
+
+class NoAnswer(ExchangeError):
+    """Nothing came back in time, or the device is being left alone for `retry_in` seconds."""
+
+    def __init__(
+        self,
+        device: int,
+        function: int,
+        address: int,
+        detail: str = "",
+        *,
+        retry_in: float | None = None,
+    ) -> None:
+        self.retry_in = retry_in
+        self.detail = detail
+        text = detail or f"Device {device} did not answer ({_asked(function, address)})."
+        if retry_in is not None:
+            text += f" It is asked again in {retry_in:.1f} s."
+        super().__init__(device, function, address, text)
+
+
+class ChecksumFault(ExchangeError):
+    """What came back was damaged or cut short; `received` are the bytes."""
+
+    def __init__(
+        self, device: int, function: int, address: int, detail: str = "", received: bytes = b""
+    ) -> None:
+        self.received = received
+        self.detail = detail
+        text = detail or (
+            f"The answer of device {device} was damaged ({_asked(function, address)}). "
+            "Check wiring, termination and the format of the line."
+        )
+        super().__init__(device, function, address, text)
+
+
+class WrongReply(ExchangeError):
+    """A whole answer came back that does not belong to the request; it was thrown away."""
+
+    def __init__(
+        self, device: int, function: int, address: int, detail: str = "", received: bytes = b""
+    ) -> None:
+        self.received = received
+        self.detail = detail
+        text = f"Device {device} answered something else than asked ({_asked(function, address)})"
+        super().__init__(device, function, address, f"{text}: {detail}." if detail else f"{text}.")
+
+
+class DeviceException(ExchangeError):
+    """The device refused the request with a Modbus exception `code`; `meaning` says why."""
+
+    def __init__(
+        self, device: int, function: int, address: int, code: int, meaning: str = ""
+    ) -> None:
+        self.code = code
+        self.meaning = meaning
+        why = f": {meaning}" if meaning else ""
+        super().__init__(
+            device,
+            function,
+            address,
+            f"Device {device} refused {_asked(function, address)} with exception {code}{why}.",
+        )

@@ -1,0 +1,118 @@
+"""Values that a line shows and takes: priorities, states, replies, counters, timing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from enum import Enum, IntEnum
+
+
+class Priority(IntEnum):
+    """What goes out first; within one priority, first come first served."""
+
+    STOP = 0
+    OPERATOR_WRITE = 1
+    OPERATOR_READ = 2
+    POLL = 3
+    BACKGROUND = 4
+
+
+class LineStatus(Enum):
+    """Whether the line can be used now."""
+
+    CLOSED = "closed"
+    CONNECTING = "connecting"
+    CONNECTED = "connected"
+    LOST = "lost"
+
+
+@dataclass(frozen=True, slots=True)
+class LineState:
+    """State of a line; times are those of the line's clock (time.monotonic)."""
+
+    status: LineStatus
+    reason: str
+    """One sentence for a person, empty when there is nothing to say."""
+    since: float
+    next_try: float | None = None
+    """When a lost line is tried again."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceState:
+    """What the line has seen of one device."""
+
+    answers: bool | None
+    """Whether its last request was answered; None before the first."""
+    failures: int
+    """Requests not answered in a row."""
+    silent_since: float | None
+    next_try: float | None
+    """When polls are sent again; None when they are sent now."""
+    turnaround: float | None
+    """Seconds from the end of a request to the start of its reply, longest of the recent ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """Words of a checked reply; `time` when its last byte was on the wire."""
+
+    words: tuple[int, ...]
+    time: float
+
+
+@dataclass(frozen=True, slots=True)
+class Identification:
+    """Objects of function 43/14; `conformity` as the device gives it."""
+
+    conformity: int
+    objects: Mapping[int, bytes]
+
+
+@dataclass(frozen=True, slots=True)
+class Counters:
+    """What happened on a line since it was opened."""
+
+    requests: int = 0
+    replies: int = 0
+    timeouts: int = 0
+    checksum: int = 0
+    wrong: int = 0
+    exceptions: int = 0
+    resyncs: int = 0
+    """Replies found behind or between bytes that did not belong to them."""
+    stale: int = 0
+    """Whole frames that came when none was due, and were thrown away."""
+    bytes_out: int = 0
+    bytes_in: int = 0
+    busy_seconds: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Seconds and counts that govern a line."""
+
+    first_timeout: float = 1.0
+    """Time-out until a device's turnaround is known, and the longest ever waited."""
+    min_timeout: float = 0.15
+    """The shortest time-out that measured turnarounds may lead to."""
+    scan_timeout: float = 0.4
+    """Time-out of background requests to a device that never answered yet."""
+    late_reply: float = 2.0
+    """How long after a request its reply may still come; a request whose reply could be
+    mistaken for it is held back until then."""
+    turnaround_delay: float = 0.1
+    """Quiet time after a broadcast."""
+    retries: int = 1
+    """Repeats of an operator's read without an answer, and of reads with a damaged one."""
+    back_off_first: float = 1.0
+    back_off_longest: float = 10.0
+    reconnect_first: float = 0.5
+    reconnect_longest: float = 5.0
+    connect_timeout: float = 3.0
+    frame_gap: float = 0.02
+    """Least silence that ends a damaged reply: adapters hand over bytes in lumps (FTDI 16 ms)."""
+    frame_gap_tcp: float = 0.08
+    """The same for RTU over TCP."""
+    queue_length: int = 256
+    trace_length: int = 1000

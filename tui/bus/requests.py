@@ -1,0 +1,1 @@
+"""Requests as frozen values, and what the reply of each must look like."""
