@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -64,18 +64,22 @@ def open_line(text: str, *, read_only: bool = False, wait: float | None = None) 
     return OpenLine(text, line, simulation)
 
 
-def demo_line(drives: Iterable[tuple[str, int]], hertz: Iterable[float]) -> OpenLine:
-    """One simulated line whose motors already run, for a first look."""
+def demo_line(drives: Mapping[str, float]) -> OpenLine:
+    """One simulated line whose motors already run, for a first look.
+
+    `drives` gives each profile's frequency in Hz; addresses count from 1.
+    """
     from tui.simulator import DriveSpec, Simulation
 
-    specs = [DriveSpec(profile, address) for profile, address in drives]
+    specs = [
+        DriveSpec(profile, address, run_hz=hertz, wander=True)
+        for address, (profile, hertz) in enumerate(drives.items(), start=1)
+    ]
     simulation = Simulation(specs)
-    link = _serve(simulation)
-    for spec, frequency in zip(specs, hertz, strict=True):
-        simulation.drive(spec.address).run(frequency)
-    line = Line(link)
+    line = Line(_serve(simulation))
     line.open()
-    return OpenLine("sim:" + ",".join(f"{s.profile}@{s.address}" for s in specs), line, simulation)
+    text = ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
+    return OpenLine(SIMULATED + text, line, simulation)
 
 
 def _simulate(drives: str) -> tuple[Simulation, Link]:

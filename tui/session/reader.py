@@ -95,9 +95,9 @@ class Reader:
 
     async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
-        for request in self._plan(codes - self._refused.keys()).requests:
+        for request in self._plan(codes.difference(self._refused)).requests:
             found.update(await self._exchange(request, priority))
-        for code in codes - found.keys():
+        for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
         self._note_sources(found)
         return found

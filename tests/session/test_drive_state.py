@@ -1,0 +1,110 @@
+"""The state of a drive in words, from status words as the families give them."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.drive.profile import Profile
+from tui.drive.values import decode
+from tui.session.drive_state import channel_text, drive_state
+from tui.session.readings import Quality, Reading
+
+from .fakes import parameter, profile_of
+
+CHART = {
+    "id": "drivecom",
+    "name": "Drivecom",
+    "kind": "drivecom",
+    "status": "ETA",
+    "states": [
+        {"id": "ready", "name": "Ready", "kind": "ready", "mask": 0x6F, "value": 0x21},
+        {"id": "enabled", "name": "Enabled", "kind": "running", "mask": 0x6F, "value": 0x27},
+        {"id": "fault", "name": "Fault", "kind": "fault", "mask": 0x4F, "value": 0x08},
+    ],
+    "direction": {"parameter": "ETA", "bit": 15},
+    "reached": {"parameter": "ETA", "bit": 10},
+}
+IO_CHART = {
+    "id": "io",
+    "name": "I/O profile",
+    "kind": "io",
+    "when": {"parameter": "CHCF", "values": [3]},
+    "status": "ETA",
+    "states": [{"id": "run", "name": "Running", "kind": "running", "mask": 4, "value": 4}],
+}
+
+
+def drive(shows_last: bool = True) -> Profile:
+    return profile_of(
+        parameter("ETA", 3201, bits=[{"bit": 7, "name": "warning", "alarm": True}]),
+        parameter("LFT", 7121),
+        parameter("CHCF", 8401),
+        charts=[CHART, IO_CHART],
+        faults={
+            "parameter": "LFT",
+            "shows_last": shows_last,
+            "codes": [{"raw": 18, "code": "ObF", "name": "Overbraking"}],
+        },
+    )
+
+
+def readings(profile: Profile, quality: Quality = Quality.GOOD, **raws: int) -> dict[str, Reading]:
+    return {
+        code: Reading(p, raw, decode(p, raw, profile.names(p), None), quality, 0.0)
+        for code, raw in raws.items()
+        if (p := profile[code])
+    }
+
+
+@pytest.mark.parametrize(
+    ("word", "headline", "reached"),
+    [
+        (0x0631, "ready", True),
+        (0x0627, "running forward", True),
+        (0x8237, "running reverse", False),
+        (0x0000, "unknown state", False),
+    ],
+)
+def test_headline(word: int, headline: str, reached: bool) -> None:
+    state = drive_state(drive(), readings(drive(), ETA=word))
+    assert (state.headline, state.reached) == (headline, reached)
+
+
+def test_a_fault_is_named_and_its_number_kept() -> None:
+    state = drive_state(drive(), readings(drive(), ETA=0x0228, LFT=18))
+    assert state.headline == "fault ObF"
+    assert state.fault is not None
+    assert state.fault.name == "Overbraking"
+
+
+def test_a_fault_the_profile_does_not_know_shows_its_number() -> None:
+    state = drive_state(drive(), readings(drive(), ETA=0x0008, LFT=99))
+    assert state.headline == "fault code 99"
+
+
+def test_the_last_fault_of_a_running_drive_is_no_present_fault() -> None:
+    state = drive_state(drive(), readings(drive(), ETA=0x0027, LFT=18))
+    assert (state.fault, state.fault_raw, state.kind) == (None, 18, "running")
+
+
+def test_stale_words_tell_nothing() -> None:
+    state = drive_state(drive(), readings(drive(), Quality.STALE, ETA=0x0027))
+    assert (state.kind, state.direction) == ("unknown", None)
+
+
+def test_the_chart_follows_the_control_profile() -> None:
+    state = drive_state(drive(), readings(drive(), ETA=0x0004, CHCF=3))
+    assert state.id == "run"
+
+
+def test_alarms_are_the_set_bits_marked_as_such() -> None:
+    state = drive_state(drive(), readings(drive(), ETA=0x00A1))
+    assert [bit.name for bit in state.alarms] == ["warning"]
+
+
+def test_a_channel_word_is_told_by_its_bits() -> None:
+    bits = [{"bit": 0, "name": "terminals"}, {"bit": 3, "name": "Modbus"}]
+    profile = profile_of(parameter("CCC", 8442, bits=bits))
+    reading = readings(profile, CCC=8)["CCC"]
+    assert channel_text(profile["CCC"], reading) == "Modbus"
+    assert channel_text(profile["CCC"], None) == ""
