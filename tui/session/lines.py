@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,7 @@ from tui.bus.line import Line
 from tui.bus.link import Link, RtuTcpLink, SerialLink, label, parse_link
 
 if TYPE_CHECKING:
-    from tui.simulator import Simulation
+    from tui.simulator import DriveSpec, Simulation
 
 SIMULATED = "sim:"
 
@@ -24,16 +24,13 @@ class OpenLine:
     """As it was typed."""
     line: Line
     simulation: Simulation | None = None
+    devices: tuple[int, ...] = ()
+    """Addresses known to be taken: those of a simulated line, else none."""
 
     @property
     def label(self) -> str:
         """How the line is called on a screen."""
         return self.text if self.simulation else label(self.line.link)
-
-    @property
-    def devices(self) -> tuple[int, ...]:
-        """Addresses known to be taken: those of a simulated line, else none."""
-        return self.simulation.addresses if self.simulation else ()
 
     def close(self) -> None:
         """Close the line, then what it was connected to."""
@@ -48,20 +45,11 @@ def open_line(text: str, *, read_only: bool = False, wait: float | None = None) 
     With `wait` it returns connected, or raises the line's error after so many seconds;
     without, it connects by itself. Raises LinkSyntaxError, UnknownProfile, ProfileError.
     """
-    simulation: Simulation | None = None
     if text.casefold().startswith(SIMULATED):
-        simulation, link = _simulate(text[len(SIMULATED) :])
-    else:
-        link = parse_link(text)
-    line = Line(link, read_only=read_only)
-    try:
-        line.open(wait=wait)
-    except BaseException:
-        line.close()
-        if simulation is not None:
-            simulation.stop()
-        raise
-    return OpenLine(text, line, simulation)
+        from tui.simulator import parse_drives
+
+        return _simulated(parse_drives(text[len(SIMULATED) :]), read_only=read_only, wait=wait)
+    return _opened(OpenLine(text, Line(parse_link(text), read_only=read_only)), wait)
 
 
 def demo_line(drives: Mapping[str, float]) -> OpenLine:
@@ -69,29 +57,45 @@ def demo_line(drives: Mapping[str, float]) -> OpenLine:
 
     `drives` gives each profile's frequency in Hz; addresses count from 1.
     """
-    from tui.simulator import DriveSpec, Simulation
+    from tui.simulator import DriveSpec
 
-    specs = [
-        DriveSpec(profile, address, run_hz=hertz, wander=True)
-        for address, (profile, hertz) in enumerate(drives.items(), start=1)
-    ]
+    return _simulated(
+        [
+            DriveSpec(profile, address, run_hz=hertz, wander=True)
+            for address, (profile, hertz) in enumerate(drives.items(), start=1)
+        ]
+    )
+
+
+def _simulated(
+    specs: Sequence[DriveSpec], *, read_only: bool = False, wait: float | None = None
+) -> OpenLine:
+    from tui.simulator import Simulation
+
     simulation = Simulation(specs)
-    line = Line(_serve(simulation))
-    line.open()
-    text = ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
-    return OpenLine(SIMULATED + text, line, simulation)
+    line = Line(_serve(simulation), read_only=read_only)
+    text = SIMULATED + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
+    devices = tuple(spec.address for spec in specs)
+    return _opened(OpenLine(text, line, simulation, devices), wait)
 
 
-def _simulate(drives: str) -> tuple[Simulation, Link]:
-    from tui.simulator import Simulation, parse_drives
-
-    simulation = Simulation(parse_drives(drives))
-    return simulation, _serve(simulation)
+def _opened(opened: OpenLine, wait: float | None) -> OpenLine:
+    """The line, connecting; closed with all behind it if it cannot be opened."""
+    try:
+        opened.line.open(wait=wait)
+    except BaseException:
+        opened.close()
+        raise
+    return opened
 
 
 def _serve(simulation: Simulation) -> Link:
     """Start a simulation where the panel reaches it: a pseudo-terminal, or loopback."""
     simulation.start()
-    if os.name == "posix":
-        return SerialLink(simulation.serve_pty())
-    return RtuTcpLink(*simulation.serve_rtu_tcp())
+    try:
+        if os.name == "posix":
+            return SerialLink(simulation.serve_pty())
+        return RtuTcpLink(*simulation.serve_rtu_tcp())
+    except BaseException:
+        simulation.stop()
+        raise

@@ -185,7 +185,7 @@ class Monitor:
         """A failed cycle leaves a gap in the trend, never a repeated value."""
         readings = snapshot.readings
         values = tuple(
-            readings[code].number if code in readings and not snapshot.error else None
+            readings[code].number if code and code in readings and not snapshot.error else None
             for code in self._trend_codes
         )
         self._trend.append(TrendPoint(snapshot.time, values))
