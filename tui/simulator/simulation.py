@@ -1,19 +1,33 @@
-"""A simulated line at work."""
+"""A simulated line at work: its drives, its time, and the endpoints that reach it."""
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 
+from tui.drive.library import load
 from tui.drive.profile import Profile
 
+from .conversation import Conversation, RtuConversation, TcpConversation
 from .drive import SimulatedDrive
-from .endpoints import ByteStream
+from .endpoints import ByteStream, Endpoint, PtyEndpoint, StreamEndpoint, TcpEndpoint
+from .errors import SimulatorError
+from .faults import FaultPlan
+from .line import SimulatedLine
 from .spec import DriveSpec, FaultRates, LineTiming
+
+TICK = 0.05
+"""Time in s between two steps of the drives while nobody asks them anything."""
 
 
 class Simulation:
-    """Simulated drives on one line, with the ways to reach it."""
+    """Simulated drives on one line, with the ways to reach it.
+
+    The drives' time passes from `start` to `stop`, in a thread of its own; every endpoint has
+    a thread too. `profiles` takes the place of the installed profiles, by id. Raises
+    SimulatorError for two drives with one address, UnknownProfile, UnknownParameter.
+    """
 
     def __init__(
         self,
@@ -24,7 +38,28 @@ class Simulation:
         seed: int = 0,
         profiles: Mapping[str, Profile] | None = None,
     ) -> None:
-        raise NotImplementedError
+        self.timing = timing or LineTiming()
+        addresses = [spec.address for spec in drives]
+        twice = next((a for a in addresses if addresses.count(a) > 1), None)
+        if twice is not None:
+            raise SimulatorError(f"Two simulated drives have address {twice}; give each its own.")
+        own = profiles or {}
+        self.line = SimulatedLine(
+            [
+                SimulatedDrive(
+                    own.get(spec.profile) or load(spec.profile),
+                    spec,
+                    timing=self.timing,
+                    seed=seed,
+                )
+                for spec in drives
+            ],
+            self.timing,
+        )
+        self.faults = FaultPlan(faults or FaultRates(), seed)
+        self._endpoints: list[Endpoint] = []
+        self._ticker: threading.Thread | None = None
+        self._stopping = threading.Event()
 
     def __enter__(self) -> Simulation:
         self.start()
@@ -39,35 +74,86 @@ class Simulation:
         self.stop()
 
     def start(self) -> None:
-        """Start the simulated time."""
+        """Let the drives' time pass; nothing happens where it does already."""
+        if self._ticker is None:
+            self._stopping.clear()
+            self.line.start()
+            self._ticker = threading.Thread(target=self._tick, name="simulated time", daemon=True)
+            self._ticker.start()
+
+    def _tick(self) -> None:
+        while not self._stopping.wait(TICK):
+            self.line.advance()
 
     def stop(self) -> None:
         """End every way to reach the line and the simulated time."""
+        for endpoint in self._endpoints:
+            endpoint.unplug()
+        self._endpoints.clear()
+        if self._ticker is not None:
+            self._stopping.set()
+            self._ticker.join()
+            self._ticker = None
+            self.line.running = False
 
     def serve_pty(self, link: str | None = None) -> str:
-        """Serve the line on a pseudo-terminal; returns the path to open."""
-        raise NotImplementedError
+        """Serve the line on a pseudo-terminal; returns the path to open.
+
+        With `link` that path is a symbolic link made there, taken away at the end. Raises
+        SimulatorError where the system has no pseudo-terminals or the path is taken.
+        """
+        endpoint = PtyEndpoint(self._rtu, link)
+        self._add(endpoint)
+        return endpoint.path
 
     def serve_tcp(self, host: str = "127.0.0.1", port: int = 0) -> tuple[str, int]:
-        """Serve the drives over Modbus TCP; returns host and port."""
-        raise NotImplementedError
+        """Serve the drives over Modbus TCP, by unit; returns host and port.
+
+        Raises SimulatorError where the port cannot be had.
+        """
+        endpoint = TcpEndpoint(lambda: TcpConversation(self.line, self.faults), host, port)
+        self._add(endpoint)
+        return endpoint.address
 
     def serve_rtu_tcp(self, host: str = "127.0.0.1", port: int = 0) -> tuple[str, int]:
-        """Serve the line's bytes over TCP; returns host and port."""
-        raise NotImplementedError
+        """Serve the line's bytes over TCP; returns host and port.
+
+        Raises SimulatorError where the port cannot be had.
+        """
+        endpoint = TcpEndpoint(self._rtu, host, port)
+        self._add(endpoint)
+        return endpoint.address
 
     def serve_stream(self, stream: ByteStream) -> None:
-        """Serve the line on an opened port."""
-        raise NotImplementedError
+        """Serve the line on an opened port, which is closed at the end."""
+        self._add(StreamEndpoint(self._paced_rtu, stream))
+
+    def _rtu(self) -> Conversation:
+        return RtuConversation(self.line, self.faults)
+
+    def _paced_rtu(self) -> Conversation:
+        return RtuConversation(self.line, self.faults, paced=True)
+
+    def _add(self, endpoint: Endpoint) -> None:
+        self.start()
+        endpoint.plug()
+        self._endpoints.append(endpoint)
 
     def drive(self, address: int) -> SimulatedDrive:
-        """The drive that has this address now."""
-        raise NotImplementedError
+        """The drive that has this address now; raises SimulatorError."""
+        return self.line.drive(address)
+
+    @property
+    def drives(self) -> tuple[SimulatedDrive, ...]:
+        """All drives of the line."""
+        return self.line.drives
 
     def unplug(self) -> None:
-        """Pull the plug of every endpoint."""
-        raise NotImplementedError
+        """Pull the plug of every endpoint: terminals and connections go away."""
+        for endpoint in self._endpoints:
+            endpoint.unplug()
 
     def replug(self) -> None:
-        """Put the plug back."""
-        raise NotImplementedError
+        """Put the plug back: links and TCP ports are where they were."""
+        for endpoint in self._endpoints:
+            endpoint.plug()

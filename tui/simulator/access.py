@@ -1,0 +1,196 @@
+"""Reading and writing a drive's words as its manual allows: limits, blocks, scanner, ranges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+from tui.drive.profile import Profile
+from tui.drive.schema import Block, Function, Parameter
+from tui.drive.values import from_words, is_enumeration, raw_range, to_words, word_count
+
+from .registers import Registers
+from .rules import Traits
+
+NO_VALUE = 0x8000
+
+
+class Refused(Exception):
+    """A request the drive does not fulfil: an exception code, or None for silence."""
+
+    def __init__(self, code: int | None) -> None:
+        super().__init__(code)
+        self.code = code
+
+
+class DriveWords:
+    """The words of the drive's own server, with everything the manual says about access."""
+
+    def __init__(
+        self,
+        profile: Profile,
+        traits: Traits,
+        registers: Registers,
+        *,
+        blocked: Callable[[Parameter], bool],
+        written: Callable[[Parameter], None],
+    ) -> None:
+        self._profile = profile
+        self._refusals = traits.refusals
+        self._limits_follow = traits.limits_follow
+        self._registers = registers
+        self._blocked = blocked
+        self._written = written
+        self._reading = profile.data.reading
+        self._scanner: dict[int, tuple[Block, int]] = {}
+        """Words that stand for another parameter: their block and place in it."""
+        for block in profile.data.blocks:
+            if not block.fixed_start:
+                for place, address in enumerate(self._value_addresses(block)):
+                    self._scanner[address] = (block, place)
+
+    def _value_addresses(self, block: Block) -> list[int]:
+        if block.values:
+            return [self._profile[code].address for code in block.values]
+        return [block.address + place for place in range(block.max_words)]
+
+    # Reading
+
+    def read(self, address: int, count: int, function: Function) -> list[int]:
+        """The words of a read; raises Refused as the drive would."""
+        self._check_count(count, function.max_read, function)
+        block = self._fixed_block(address, count, "read")
+        if block is not None:
+            return [self._slot_word(block, place) for place in range(count)]
+        if self._reading.single_words_only and count != 1:
+            raise Refused(self._refusals.wrong_shape)
+        words = [self._word(a) for a in range(address, address + count)]
+        missing = words.count(None)
+        if missing == count or (missing and not self._fills_gaps()):
+            raise Refused(self._unknown_read())
+        filler = self._reading.unknown_word or 0
+        return [filler if word is None else word for word in words]
+
+    def _fills_gaps(self) -> bool:
+        return self._reading.unknown_word is not None or self._reading.gaps_readable
+
+    def _unknown_read(self) -> int | None:
+        silent = self._refusals.unknown_address is None
+        return None if silent else self._reading.unknown_exception
+
+    def _word(self, address: int) -> int | None:
+        if address > 0xFFFF:
+            return None
+        if (place := self._scanner.get(address)) and place[0].direction == "read":
+            return self._slot_word(*place)
+        return self._registers.word(address) if self._registers.owner(address) else None
+
+    def _fixed_block(self, address: int, count: int, direction: str) -> Block | None:
+        for block in self._profile.data.blocks:
+            if block.fixed_start and block.direction == direction and block.address == address:
+                if not block.min_words <= count <= block.max_words:
+                    raise Refused(self._refusals.wrong_shape)
+                return block
+        return None
+
+    def _slot_word(self, block: Block, place: int) -> int:
+        """The live word behind a place of a block; no value where none or nothing known is."""
+        target = self._target(block, place)
+        if target is None:
+            return NO_VALUE if block.selects_by == "choice" else 0
+        known = self._registers.owner(target)
+        return self._registers.word(target) if known else NO_VALUE
+
+    def _target(self, block: Block, place: int) -> int | None:
+        """The address that a place of a block stands for; None where it stands for nothing."""
+        if place >= len(block.slots):
+            return None
+        raw = self._registers.in_force(self._profile[block.slots[place]])
+        if block.selects_by == "address":
+            return (raw & 0xFFFF) or None
+        chosen = next((c.parameter for c in block.choices if c.raw == raw), None)
+        return self._profile[chosen].address if chosen else None
+
+    # Writing
+
+    def write(self, address: int, words: Sequence[int], function: Function) -> None:
+        """Take words as the drive does; raises Refused.
+
+        Unknown addresses and forbidden values refuse the whole request. A word that cannot be
+        written now refuses the rest of it: what stood before it has been written.
+        """
+        self._check_count(len(words), function.max_write, function)
+        block = self._fixed_block(address, len(words), "write") if len(words) > 1 else None
+        if block is None and self._reading.single_words_only and len(words) != 1:
+            raise Refused(self._refusals.wrong_shape)
+        entries = [
+            (address + place, self._write_target(block, address, place), word)
+            for place, word in enumerate(words)
+        ]
+        for _, target, word in entries:
+            if target is not None:
+                self._check_value(target, word)
+        for own, target, word in entries:
+            if target is not None:
+                self._apply(target, word)
+            if own != target and block is None and self._registers.owner(own):
+                self._registers.write_word(own, word)
+
+    def _write_target(self, block: Block | None, address: int, place: int) -> int | None:
+        if block is not None:
+            target = self._target(block, place)
+            if target is None:
+                raise Refused(self._refusals.not_now)
+            return target
+        scanned = self._scanner.get(address + place)
+        if scanned is None:
+            return address + place
+        if scanned[0].direction == "read":
+            raise Refused(self._refusals.read_only)
+        return self._target(*scanned)
+
+    def _check_value(self, address: int, word: int) -> None:
+        parameter = self._registers.owner(address) if address <= 0xFFFF else None
+        if parameter is None:
+            raise Refused(self._refusals.unknown_address)
+        if parameter.access == "r" or word_count(parameter) == 2:
+            return
+        raw = from_words(parameter, [word])
+        low, high = raw_range(parameter)
+        names = self._profile.names(parameter)
+        named = raw in names
+        if not named and (not low <= raw <= high or (names and is_enumeration(parameter))):
+            raise Refused(self._refusals.out_of_range)
+        if self._within(parameter, raw) != raw and not self._limits_follow:
+            raise Refused(self._refusals.out_of_range)
+
+    def _within(self, parameter: Parameter, raw: int) -> int:
+        """The raw value cut to the parameters that limit it."""
+        for code, bound in ((parameter.min_from, max), (parameter.max_from, min)):
+            limit = self._registers.named(code) if code else None
+            if limit and (limit.unit, limit.scale) == (parameter.unit, parameter.scale):
+                raw = bound(raw, self._registers.present(limit))
+        return raw
+
+    def _apply(self, address: int, word: int) -> None:
+        parameter = self._registers.owner(address)
+        assert parameter is not None
+        if parameter.access == "r":
+            raise Refused(self._refusals.read_only)
+        if self._blocked(parameter):
+            raise Refused(self._refusals.not_now)
+        if word_count(parameter) == 1:
+            word = to_words(parameter, self._within(parameter, from_words(parameter, [word])))[0]
+        self._registers.write_word(address, word)
+        self._written(parameter)
+
+    def _check_count(self, count: int, limit: int | None, function: Function) -> None:
+        if count < 1:
+            raise Refused(self._refusals.wrong_shape)
+        if limit is not None and count > limit:
+            raise Refused(past_limit(function, self._refusals.wrong_shape))
+
+
+def past_limit(function: Function, refusal: int | None) -> int | None:
+    """How a request past a function's limit is refused: an exception, or None for silence."""
+    silent = function.past_limit == "silence" or refusal is None
+    return None if silent else function.past_limit_exception

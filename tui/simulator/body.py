@@ -1,0 +1,142 @@
+"""What the parts of a simulated drive share: registers, motor, terminal order, fault, watch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from tui.drive.profile import Profile
+from tui.drive.schema import Parameter, Quantity
+
+from .motor import MotorState, Rating, Stop
+from .registers import Registers
+from .rules import Traits
+
+
+@dataclass(frozen=True, slots=True)
+class ActiveFault:
+    """A fault the drive has; it can be reset once its cause is gone."""
+
+    raw: int
+    code: str
+    persists: bool = False
+
+
+class Fallback(Enum):
+    """What a silent line makes the drive do without a fault."""
+
+    STOP = "stop"
+    SPEED = "fallback speed"
+    MAINTAIN = "maintain"
+
+
+@dataclass
+class Body:
+    """The state of one simulated drive."""
+
+    profile: Profile
+    traits: Traits
+    registers: Registers
+    rating: Rating
+    motor: MotorState = field(default_factory=MotorState)
+    terminal_hz: float | None = None
+    """Reference in Hz of a run order at the terminals; None: no order there."""
+    fault: ActiveFault | None = None
+    fallback: Fallback | None = None
+    alarms: int = 0
+    """Alarm word as provoked, beside what the motor itself raises."""
+    saving: float = 0.0
+    """Time in s that an EEPROM save still takes; nothing can be written meanwhile."""
+    sequence: int = 0
+    _order: dict[str, int] = field(default_factory=dict)
+    """When a command or reference was last written by the line, by code."""
+
+    # Parameters by meaning
+
+    def parameter(self, quantity: Quantity) -> Parameter | None:
+        """The parameter that carries a quantity, or None."""
+        return self.profile.quantity(quantity)
+
+    def raw(self, quantity: Quantity, default: int = 0) -> int:
+        """Raw value in force of a quantity; the default where the family has none."""
+        found = self.parameter(quantity)
+        return default if found is None else self.registers.in_force(found)
+
+    def value(self, quantity: Quantity, default: float) -> float:
+        """Engineering value in force of a quantity; the default where the family has none."""
+        found = self.parameter(quantity)
+        return default if found is None else self.engineering(found)
+
+    def engineering(self, parameter: Parameter) -> float:
+        """Engineering value in force of a parameter."""
+        return self.registers.in_force(parameter) * self.scale(parameter)
+
+    def scale(self, parameter: Parameter) -> float:
+        """What one count is worth, after the parameter that its scale follows."""
+        raws: dict[str, int] = {}
+        if parameter.scale_by is not None:
+            other = self.profile[parameter.scale_by.parameter]
+            raws[other.code] = self.registers.in_force(other)
+        scale = self.profile.scale(parameter, raws)
+        return float(parameter.scale if scale is None else scale)
+
+    def setting(self, code: str, default: int) -> int:
+        """Raw value in force of a setting by its code in any case; the default without it."""
+        found = self.registers.named(code)
+        return default if found is None else self.registers.in_force(found)
+
+    def show(self, quantity: Quantity, engineering: float) -> None:
+        """Put an engineering value into the word of a quantity, if the family has one."""
+        if found := self.parameter(quantity):
+            self.registers.put(found, round(engineering / self.scale(found)))
+
+    def show_raw(self, quantity: Quantity, raw: int) -> None:
+        """Put a raw value into the word of a quantity, if the family has one."""
+        if found := self.parameter(quantity):
+            self.registers.put(found, raw)
+
+    def show_code(self, code: str, raw: int) -> None:
+        """Put a raw value into a word by its code, if the family has it."""
+        if found := self.registers.named(code):
+            self.registers.put(found, raw)
+
+    # Orders of the line
+
+    def note_order(self, parameter: Parameter) -> None:
+        """Remember that the line wrote an order."""
+        self.sequence += 1
+        self._order[parameter.code] = self.sequence
+
+    def ordered_at(self, parameter: Parameter | None) -> int:
+        """When the line last wrote this order, as a running number; 0: not since power-up."""
+        return self._order.get(parameter.code, 0) if parameter else 0
+
+    def forget_orders(self) -> None:
+        """Forget what the line ordered, as a power-down does."""
+        self._order.clear()
+
+    @property
+    def was_ordered(self) -> bool:
+        """Whether a command or a reference was written since power-up."""
+        return bool(self._order)
+
+    # Ramps
+
+    def ramps(self, second: bool = False) -> tuple[float, float]:
+        """Acceleration and deceleration in Hz/s, after the drive's own ramp times."""
+        span = self.value("rated_frequency", self.rating.frequency)
+        up = self.value("acceleration_2" if second else "acceleration", 3.0)
+        down = self.value("deceleration_2" if second else "deceleration", 3.0)
+        return span / max(up, 0.01), span / max(down, 0.01)
+
+    def rates(self, stop: Stop, second: bool = False) -> tuple[float, float]:
+        """Ramps as `stop` changes them: a fast stop divides the deceleration time by DCF."""
+        up, down = self.ramps(second)
+        if stop is Stop.FAST:
+            down *= self.setting("DCF", 4) or 1000
+        return up, down
+
+    @property
+    def turning(self) -> bool:
+        """Whether the drive supplies the motor."""
+        return self.motor.energised or self.motor.braking

@@ -1,0 +1,258 @@
+"""Commands and status words of the Altivar 21.
+
+Source: ATV21 Modbus manual 8.4 to 8.8. Stop, coast and reset follow the command word only while
+the line has the command; the emergency stop always does.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from tui.drive.schema import Parameter, Quantity
+
+from .body import Body, Fallback
+from .motor import Order, Stop
+
+(PRESETS, RAMP_2, INJECTION, REVERSE, RUN, COAST, EMERGENCY, RESET, OWN_REFERENCE, OWN_COMMAND) = (
+    0x0007,
+    1 << 6,
+    1 << 7,
+    1 << 9,
+    1 << 10,
+    1 << 11,
+    1 << 12,
+    1 << 13,
+    1 << 14,
+    1 << 15,
+)
+ENERGY_RESET, STALL_2 = 1 << 1, 1 << 12
+SERIAL_COMMAND, SERIAL_REFERENCE, PRESET_REFERENCE, ANALOGUE_REFERENCE = 2, 4, 255, 1
+EMERGENCY_FAULT = 17
+REACHED_HZ = 0.05
+PRESET_QUANTITIES: tuple[Quantity, ...] = (
+    "preset_speed_1",
+    "preset_speed_2",
+    "preset_speed_3",
+    "preset_speed_4",
+    "preset_speed_5",
+    "preset_speed_6",
+    "preset_speed_7",
+)
+BEFORE_FAULT = {"FE00": "FD00", "FE01": "FD01", "FE42": "FD42", "FE49": "FD49"} | {
+    "FE06": "FD06",
+    "FE07": "FD07",
+}
+"""Words that keep, while a fault is present, what their twin was at the trip."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sources:
+    """Where command and reference come from now."""
+
+    command: bool
+    reference: bool
+    preset: int
+
+
+class Altivar21Chart:
+    """The orders and the status of one Altivar 21."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._stop = Stop.RAMP
+        self._last = 0
+        self._latched = False
+        """Whether the emergency stop is in force; a fault reset ends it."""
+        self._target_hz = 0.0
+
+    def power_up(self) -> None:
+        """Nothing is ordered by the line, nothing is latched."""
+        self._last = 0
+        self._latched = False
+        self._stop = Stop.RAMP
+
+    def terminal_order(self) -> None:
+        """A run order at the terminals acts as long as the line has not taken the command."""
+
+    def written(self, parameter: Parameter) -> None:
+        """Follow a word that the line wrote."""
+        if parameter.quantity != "command_word":
+            return
+        word = self._word
+        rising = word & ~self._last
+        self._last = word
+        if rising & EMERGENCY:
+            self._latched = True
+        if rising & RESET and self._sources().command:
+            self.reset_fault()
+
+    @property
+    def emergency(self) -> bool:
+        """Whether an emergency stop was ordered that has not tripped the drive yet."""
+        return self._latched and self._body.fault is None
+
+    @property
+    def _word(self) -> int:
+        return self._body.raw("command_word") & 0xFFFF
+
+    def _sources(self) -> Sources:
+        word = self._word
+        command = bool(word & OWN_COMMAND) or self._body.setting("CMOD", 0) == SERIAL_COMMAND
+        reference = bool(word & OWN_REFERENCE)
+        reference = reference or self._body.setting("FMOD", 1) == SERIAL_REFERENCE
+        return Sources(command, reference, word & PRESETS if command else 0)
+
+    def trip(self, stop: Stop) -> None:
+        """Stop the motor as the fault asks and show the fault."""
+        self._stop = stop
+
+    def reset_fault(self) -> None:
+        """Clear the fault if its cause is gone."""
+        fault = self._body.fault
+        if fault is not None and not fault.persists:
+            self._body.fault = None
+            self._latched = False
+            self._stop = Stop.RAMP
+
+    @property
+    def running(self) -> bool:
+        """Whether words that cannot be changed while running are locked."""
+        return self._body.turning
+
+    # What the motor is told
+
+    def _run_ordered(self) -> bool:
+        body = self._body
+        if body.fault is not None or body.fallback is Fallback.STOP:
+            return False
+        if self._sources().command:
+            return bool(self._word & RUN) and not self._word & COAST
+        return body.terminal_hz is not None
+
+    def _wanted(self) -> float:
+        """The reference in Hz, signed by direction."""
+        body = self._body
+        sources = self._sources()
+        hz = body.terminal_hz or 0.0
+        if sources.preset:
+            hz = body.value(PRESET_QUANTITIES[sources.preset - 1], 5.0 * sources.preset)
+        elif sources.reference:
+            hz = self._line_reference()
+        reverse = sources.command and self._word & REVERSE
+        return -hz if reverse else hz
+
+    def _line_reference(self) -> float:
+        body = self._body
+        frequency, speed = body.parameter("command_frequency"), body.parameter("command_speed")
+        if speed is not None and body.ordered_at(speed) > body.ordered_at(frequency):
+            return body.engineering(speed) * self.poles / 120
+        return body.engineering(frequency) if frequency is not None else 0.0
+
+    @property
+    def poles(self) -> int:
+        """Poles of the motor."""
+        raw = round(self._body.value("motor_poles", self._body.rating.poles))
+        return raw if raw >= 2 else self._body.rating.poles
+
+    def _cut(self, hz: float) -> float:
+        body = self._body
+        high = min(body.value("high_speed", 1e9) or 1e9, body.value("max_frequency", 1e9) or 1e9)
+        size = min(max(abs(hz), body.value("low_speed", 0.0)), high)
+        return -size if hz < 0 else size
+
+    def order(self) -> Order:
+        """What the motor has to do now."""
+        body = self._body
+        remote = self._sources().command
+        second = remote and bool(self._word & RAMP_2)
+        up, down = body.rates(self._stop if body.fault else Stop.RAMP, second)
+        base = Order(acceleration=up, deceleration=down)
+        moving = body.motor.frequency != 0
+        if body.fault is not None:
+            return self._stopping_order(base, moving)
+        if remote and self._word & INJECTION:
+            return replace(base, injection=True)
+        if self._run_ordered():
+            self._target_hz = self._cut(self._wanted())
+            return replace(base, energised=True, target=self._target_hz)
+        self._target_hz = 0.0
+        coast = remote and self._word & COAST
+        return replace(base, energised=moving and not coast, target=0.0)
+
+    def _stopping_order(self, base: Order, moving: bool) -> Order:
+        if self._stop is Stop.INJECTION:
+            return replace(base, injection=bool(self._body.motor.rotor))
+        slow = self._stop in (Stop.RAMP, Stop.FAST)
+        return replace(base, energised=moving and slow, target=0.0)
+
+    # What the line is shown
+
+    def show(self) -> None:
+        """Put the status words of the present state into their registers."""
+        body = self._body
+        sources = self._sources()
+        motor = body.motor
+        if body.fault is None:
+            for before, now in BEFORE_FAULT.items():
+                if twin := body.registers.named(now):
+                    body.show_code(before, body.registers.present(twin))
+        alarms = body.alarms | (1 << 2 if motor.motor_thermal >= 100 else 0)
+        body.show_raw("alarm_word", alarms)
+        body.show_raw("status_word", self._status(alarms))
+        body.show_raw("status_word_2", self._status_2(sources))
+        reached = motor.energised and abs(motor.frequency - self._target_hz) < REACHED_HZ
+        body.show_raw("status_word_3", (1 << 12 | 1 << 13) if reached else 0)
+        body.show_code("FE45", SERIAL_COMMAND if sources.command else 0)
+        body.show_code("FE46", self._reference_source(sources))
+        body.show_code("FD06", 1 if body.terminal_hz is not None else 0)
+        body.show_code("FD07", self._outputs())
+        body.show("frequency_reference", abs(self._wanted()))
+        body.show("ramp_output", abs(motor.frequency))
+        body.show("output_frequency", abs(motor.frequency))
+
+    def _reference_source(self, sources: Sources) -> int:
+        if sources.preset:
+            return PRESET_REFERENCE
+        return SERIAL_REFERENCE if sources.reference else ANALOGUE_REFERENCE
+
+    def _outputs(self) -> int:
+        relay = self._body.setting("FA50", 0) & 1
+        return relay | (1 << 2 if self._body.fault else 0)
+
+    def _status(self, alarms: int) -> int:
+        body = self._body
+        motor = body.motor
+        remote = self._sources().command
+        fault = body.fault is not None
+        coast = remote and bool(self._word & COAST)
+        ready = not fault and motor.mains > 0
+        run = self._run_ordered() or motor.frequency != 0
+        reverse = motor.frequency < 0 or (remote and bool(self._word & REVERSE))
+        marks = (
+            (fault, 0),
+            (fault, 1),
+            (alarms != 0, 2),
+            (motor.mains <= 0, 3),
+            (remote and bool(self._word & 1 << 4), 4),
+            (remote and bool(self._word & 1 << 5), 5),
+            (remote and bool(self._word & RAMP_2), 6),
+            (motor.braking, 7),
+            (reverse, 9),
+            (run, 10),
+            (coast, 11),
+            (self._latched, 12),
+            (ready and run and not coast, 13),
+            (ready, 14),
+        )
+        return sum(1 << bit for given, bit in marks if given)
+
+    def _status_2(self, sources: Sources) -> int:
+        word = self._body.raw("command_word_2") & 0xFFFF
+        stall = word & STALL_2 if self._word & OWN_COMMAND else 0
+        ramp = 1 << 8 if sources.command and self._word & RAMP_2 else 0
+        return (word & ENERGY_RESET) | stall | ramp
+
+    @property
+    def energy_reset(self) -> bool:
+        """Whether the line holds the energy counters at 0."""
+        return bool(self._body.raw("command_word_2") & ENERGY_RESET)

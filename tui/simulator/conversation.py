@@ -1,0 +1,184 @@
+"""Bytes in, bytes out: where a frame ends and when its reply is on the wire.
+
+No input, no output, no clock of its own: an endpoint feeds what it reads, asks when it has to
+come back, and writes what is due. Times are those of a monotonic clock, in s.
+"""
+
+from __future__ import annotations
+
+import heapq
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from .faults import FaultPlan
+from .frames import is_whole, request_length
+from .line import SimulatedLine
+
+IDLE = 0.05
+"""Silence in s that ends a frame of unknown length where the line does not keep real time."""
+MBAP = 7
+MAX_MBAP_LENGTH = 254
+
+
+class Conversation(Protocol):
+    """One end of the line, as an endpoint uses it."""
+
+    def feed(self, data: bytes, now: float, /) -> None:
+        """Take bytes that have just come in."""
+
+    def poll(self, now: float, /) -> bytes:
+        """The bytes that are due to be written by now."""
+
+    @property
+    def due(self) -> float | None:
+        """When `poll` has to be called next; None: not before more bytes come."""
+
+
+@dataclass(order=True)
+class _Sending:
+    """Bytes being sent: when the next of them is on the wire, and the time of each."""
+
+    time: float
+    number: int
+    data: bytes = field(compare=False)
+    character: float = field(compare=False)
+
+
+class _Outbox:
+    """What waits to be written, paced character by character where it has to be."""
+
+    def __init__(self) -> None:
+        self._heap: list[_Sending] = []
+        self._number = 0
+
+    def put(self, start: float, data: bytes, character: float) -> None:
+        self._number += 1
+        heapq.heappush(self._heap, _Sending(start + character, self._number, data, character))
+
+    def take(self, now: float) -> bytes:
+        out = b""
+        while self._heap and self._heap[0].time <= now:
+            sending = heapq.heappop(self._heap)
+            ready = len(sending.data)
+            if sending.character:
+                ready = min(ready, 1 + int((now - sending.time) / sending.character))
+            out += sending.data[:ready]
+            if rest := sending.data[ready:]:
+                later = sending.time + ready * sending.character
+                item = _Sending(later, sending.number, rest, sending.character)
+                heapq.heappush(self._heap, item)
+        return out
+
+    @property
+    def due(self) -> float | None:
+        return self._heap[0].time if self._heap else None
+
+
+class RtuConversation:
+    """Modbus RTU on one medium.
+
+    In real time a frame ends with 3.5 characters of silence, and what comes sooner belongs to
+    it: two requests without that silence between them are one blob that no drive understands.
+    A `paced` medium (a real port) spends the time of its characters itself. Without real time
+    a frame ends as soon as it has the length it announces, or after a short silence.
+    """
+
+    def __init__(self, line: SimulatedLine, faults: FaultPlan, *, paced: bool = False) -> None:
+        self._line = line
+        self._timing = line.timing
+        self._faults = faults
+        self._paced = paced
+        self._buffer = b""
+        self._received = 0.0
+        """When the last character was, or will have been, on the wire."""
+        self._outbox = _Outbox()
+
+    def feed(self, data: bytes, now: float) -> None:
+        """Take bytes that have just come in."""
+        if self._buffer and now >= self._end:
+            self._finish()
+        if self._paced or not self._timing.real_time:
+            self._received = now
+        else:
+            self._received = max(self._received, now) + len(data) * self._timing.character
+        self._buffer += data
+        if not self._timing.real_time or self._paced:
+            expected = request_length(self._buffer)
+            if expected == len(self._buffer) and is_whole(self._buffer):
+                self._finish()
+
+    @property
+    def _end(self) -> float:
+        """When the silence after the received bytes has lasted long enough."""
+        silence = self._timing.silence if self._timing.real_time else IDLE
+        return self._received + (max(silence, IDLE) if self._paced else silence)
+
+    def poll(self, now: float) -> bytes:
+        """The bytes that are due to be written by now."""
+        if self._buffer and now >= self._end:
+            self._finish()
+        return self._outbox.take(now)
+
+    @property
+    def due(self) -> float | None:
+        """When `poll` has to be called next."""
+        times = [self._end] if self._buffer else []
+        if self._outbox.due is not None:
+            times.append(self._outbox.due)
+        return min(times, default=None)
+
+    def _finish(self) -> None:
+        frame, self._buffer = self._buffer, b""
+        reply = self._line.receive(frame)
+        if reply is None:
+            return
+        start, character = self._received, 0.0
+        if self._timing.real_time:
+            start += max(reply.turnaround, self._timing.silence)
+            character = 0.0 if self._paced else self._timing.character
+        for delay, data in self._faults.carry(reply.data):
+            self._outbox.put(start + delay, data, character)
+
+
+class TcpConversation:
+    """Modbus TCP on one connection."""
+
+    def __init__(self, line: SimulatedLine, faults: FaultPlan) -> None:
+        self._line = line
+        self._faults = faults
+        self._buffer = b""
+        self._outbox = _Outbox()
+        self.broken = False
+        """True once the client sent something that is no Modbus TCP."""
+
+    def feed(self, data: bytes, now: float) -> None:
+        """Take bytes that have just come in."""
+        self._buffer += data
+        while not self.broken and len(self._buffer) >= MBAP:
+            length = int.from_bytes(self._buffer[4:6], "big")
+            if self._buffer[2:4] != b"\0\0" or not 2 <= length <= MAX_MBAP_LENGTH:
+                self.broken = True
+                return
+            if len(self._buffer) < 6 + length:
+                return
+            message, self._buffer = self._buffer[: 6 + length], self._buffer[6 + length :]
+            self._answer(message, now)
+
+    def _answer(self, message: bytes, now: float) -> None:
+        unit = message[6]
+        reply = self._line.ask(unit, message[MBAP:])
+        if reply is None:
+            return
+        wait = reply.turnaround if self._line.timing.real_time else 0.0
+        for delay, replier, pdu in self._faults.carry_message(unit, reply.data):
+            head = message[:4] + (len(pdu) + 1).to_bytes(2, "big") + bytes([replier])
+            self._outbox.put(now + wait + delay, head + pdu, 0.0)
+
+    def poll(self, now: float) -> bytes:
+        """The bytes that are due to be written by now."""
+        return self._outbox.take(now)
+
+    @property
+    def due(self) -> float | None:
+        """When `poll` has to be called next."""
+        return self._outbox.due

@@ -1,0 +1,76 @@
+"""The words a simulated drive has when it leaves the factory and was set up for its motor."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from decimal import ROUND_HALF_UP, Decimal
+
+from tui.drive.profile import Profile
+from tui.drive.schema import Parameter, Quantity
+from tui.drive.values import is_enumeration, raw_range, type_range
+
+from .motor import Rating
+
+
+def first_values(profile: Profile, rating: Rating, line_first: Mapping[str, int]) -> dict[str, int]:
+    """A raw value for every parameter: commissioned, factory, from the rating, or the lowest.
+
+    `line_first` are raw values by code, in any case, of a drive set up for its line.
+    """
+    chosen = {code.casefold(): raw for code, raw in line_first.items()}
+    plate = _plate(rating)
+    values: dict[str, int] = {}
+    for parameter in profile.parameters:
+        raw = chosen.get(parameter.code.casefold())
+        if raw is None:
+            raw = parameter.factory
+        if raw is None and parameter.quantity in plate:
+            raw = to_raw(profile, parameter, plate[parameter.quantity])
+        values[parameter.code] = _lowest(profile, parameter) if raw is None else raw
+    return values
+
+
+def _plate(rating: Rating) -> dict[Quantity | None, float]:
+    return {
+        "rated_frequency": rating.frequency,
+        "rated_voltage": rating.voltage,
+        "rated_current": rating.current,
+        "rated_speed": rating.speed,
+        "motor_poles": rating.poles,
+        "drive_current": rating.drive_current,
+        "thermal_current": rating.current,
+        "high_speed": rating.frequency,
+        "max_frequency": 1.2 * rating.frequency,
+        "low_speed": 0.0,
+        "acceleration": 3.0,
+        "deceleration": 3.0,
+        "acceleration_2": 5.0,
+        "deceleration_2": 5.0,
+        "switching_frequency": 4.0,
+        "preset_speed_1": 10.0,
+        "preset_speed_2": 15.0,
+        "preset_speed_3": 20.0,
+        "preset_speed_4": 25.0,
+        "preset_speed_5": 30.0,
+        "preset_speed_6": 35.0,
+        "preset_speed_7": 40.0,
+        "ramp_increment": 1,
+    }
+
+
+def _lowest(profile: Profile, parameter: Parameter) -> int:
+    """0, or the nearest value that the parameter may have."""
+    if parameter.access == "r":
+        return 0
+    names = profile.names(parameter)
+    if names and is_enumeration(parameter):
+        return 0 if 0 in names else min(names, key=abs)
+    low, high = raw_range(parameter)
+    return min(max(0, low), high)
+
+
+def to_raw(profile: Profile, parameter: Parameter, value: float) -> int:
+    """The raw value nearest to an engineering value, within the type; factory scale."""
+    counts = Decimal(repr(float(value))) / Decimal(parameter.scale)
+    low, high = type_range(parameter)
+    return min(max(int(counts.to_integral_value(ROUND_HALF_UP)), low), high)

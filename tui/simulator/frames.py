@@ -1,0 +1,48 @@
+"""Modbus RTU frames: checksum and the length a request announces. Pure functions."""
+
+from __future__ import annotations
+
+
+def _table() -> tuple[int, ...]:
+    table = []
+    for byte in range(256):
+        crc = byte
+        for _ in range(8):
+            crc = (crc >> 1) ^ (0xA001 if crc & 1 else 0)
+        table.append(crc)
+    return tuple(table)
+
+
+_CRC = _table()
+_MIN_FRAME = 4
+_LENGTHS = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 7: 4, 8: 8, 11: 4, 12: 4, 17: 4, 22: 10, 43: 7}
+_COUNTED = {15: (6, 9), 16: (6, 9), 23: (10, 13)}
+"""Functions whose request carries a byte count: its place, and the bytes beside the counted."""
+
+
+def crc16(data: bytes) -> int:
+    """Checksum of a frame's bytes: polynomial 16#A001, start 16#FFFF."""
+    crc = 0xFFFF
+    for byte in data:
+        crc = (crc >> 8) ^ _CRC[(crc ^ byte) & 0xFF]
+    return crc
+
+
+def seal(body: bytes) -> bytes:
+    """A whole frame: the body with its checksum, low byte first."""
+    return body + crc16(body).to_bytes(2, "little")
+
+
+def is_whole(frame: bytes) -> bool:
+    """Whether the bytes are one frame with a right checksum."""
+    return len(frame) >= _MIN_FRAME and crc16(frame[:-2]) == int.from_bytes(frame[-2:], "little")
+
+
+def request_length(head: bytes) -> int | None:
+    """How long a request will be, as far as its first bytes tell; None where they do not."""
+    if len(head) < 2:
+        return None
+    if counted := _COUNTED.get(head[1]):
+        place, rest = counted
+        return rest + head[place] if len(head) > place else None
+    return _LENGTHS.get(head[1])

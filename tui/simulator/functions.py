@@ -1,0 +1,191 @@
+"""The Modbus functions of a simulated server: request in, reply or silence out."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from tui.drive.schema import Function, Identification
+
+from .access import Refused, past_limit
+from .rules import Refusals
+
+MEI_IDENTIFICATION = 14
+COUNTER_RESET, CHECKSUM_COUNT, FRAME_COUNT, ECHO = 10, 12, 14, 0
+NAME_LENGTH = 16
+
+
+class Words(Protocol):
+    """Words a server reads and writes."""
+
+    def read(self, address: int, count: int, function: Function, /) -> list[int]:
+        """Words from an address; raises Refused."""
+
+    def write(self, address: int, words: Sequence[int], function: Function, /) -> None:
+        """Write words at an address; raises Refused."""
+
+
+@dataclass
+class Counters:
+    """What function 8 counts, of frames to the drive's own address."""
+
+    frames: int = 0
+    checksum_errors: int = 0
+
+    def count_frame(self) -> None:
+        """One more frame, modulo 65536."""
+        self.frames = (self.frames + 1) & 0xFFFF
+
+    def count_checksum_error(self) -> None:
+        """One more frame with a wrong checksum; stays at 65535."""
+        self.checksum_errors = min(self.checksum_errors + 1, 0xFFFF)
+
+    def reset(self) -> None:
+        """All counters to 0."""
+        self.frames = self.checksum_errors = 0
+
+
+@dataclass
+class Server:
+    """One Modbus server: its words, functions, identity and counters."""
+
+    words: Words
+    functions: Mapping[int, Function]
+    refusals: Refusals
+    identification: Identification = field(default_factory=Identification)
+    identity: Mapping[int, bytes] = field(default_factory=dict)
+    counters: Counters = field(default_factory=Counters)
+
+    def answer(self, pdu: bytes) -> bytes | None:
+        """The reply to a request without address and checksum; None where it stays silent."""
+        if not pdu:
+            return None
+        function = self.functions.get(pdu[0])
+        handler = _HANDLERS.get(pdu[0])
+        try:
+            if function is None or handler is None:
+                raise Refused(self.refusals.unknown_function)
+            return bytes([pdu[0]]) + handler(self, function, pdu[1:])
+        except Refused as refusal:
+            return self._refuse(pdu[0], refusal.code)
+
+    def _refuse(self, function: int, code: int | None) -> bytes | None:
+        if code is None:
+            return None
+        head = bytes([function | 0x80])
+        if function == 43 and self.identification.exception_has_mei_byte:
+            head += bytes([MEI_IDENTIFICATION])
+        return head + bytes([code])
+
+
+def _wrong_shape(server: Server) -> Refused:
+    return Refused(server.refusals.wrong_shape)
+
+
+def _packed(words: Sequence[int]) -> bytes:
+    return bytes([2 * len(words)]) + struct.pack(f">{len(words)}H", *words)
+
+
+def _read(server: Server, function: Function, body: bytes) -> bytes:
+    if len(body) != 4:
+        raise _wrong_shape(server)
+    address, count = struct.unpack(">HH", body)
+    return _packed(server.words.read(address, count, function))
+
+
+def _write_one(server: Server, function: Function, body: bytes) -> bytes:
+    if len(body) != 4:
+        raise _wrong_shape(server)
+    address, word = struct.unpack(">HH", body)
+    server.words.write(address, [word], function)
+    return body
+
+
+def _write_many(server: Server, function: Function, body: bytes) -> bytes:
+    address, words = _written_words(server, body, function)
+    server.words.write(address, words, function)
+    return body[:4]
+
+
+def _written_words(server: Server, body: bytes, function: Function) -> tuple[int, list[int]]:
+    """Address and words of a write; a count past the limit is judged before its bytes."""
+    if len(body) < 5:
+        raise _wrong_shape(server)
+    address, count, size = struct.unpack(">HHB", body[:5])
+    if function.max_write is not None and count > function.max_write:
+        raise Refused(past_limit(function, server.refusals.wrong_shape))
+    if size != 2 * count or len(body) - 5 != size:
+        raise _wrong_shape(server)
+    return address, list(struct.unpack(f">{count}H", body[5:]))
+
+
+def _read_write(server: Server, function: Function, body: bytes) -> bytes:
+    """Function 23: the write is made first, as the Modbus specification says."""
+    if len(body) < 9:
+        raise _wrong_shape(server)
+    address, count = struct.unpack(">HH", body[:4])
+    if function.max_read is not None and count > function.max_read:
+        raise Refused(past_limit(function, server.refusals.wrong_shape))
+    write_address, words = _written_words(server, body[4:], function)
+    server.words.write(write_address, words, function)
+    return _packed(server.words.read(address, count, function))
+
+
+def _diagnose(server: Server, function: Function, body: bytes) -> bytes:
+    if len(body) < 4:
+        raise _wrong_shape(server)
+    code = int.from_bytes(body[:2], "big")
+    if function.subfunctions and code not in function.subfunctions:
+        raise Refused(server.refusals.unknown_function)
+    if code == ECHO:
+        return body
+    if body[2:] != b"\0\0":
+        raise _wrong_shape(server)
+    if code == COUNTER_RESET:
+        server.counters.reset()
+        return body
+    counts = {CHECKSUM_COUNT: "checksum_errors", FRAME_COUNT: "frames"}
+    if code not in counts:
+        raise Refused(server.refusals.unknown_function)
+    return body[:2] + struct.pack(">H", getattr(server.counters, counts[code]))
+
+
+def _identify(server: Server, function: Function, body: bytes) -> bytes:
+    """Function 43/14; the ATV21 has its own codes for a wrong field, the others 1 and 2."""
+    own_codes = not server.identification.exception_has_mei_byte
+    if len(body) != 3 or body[0] != MEI_IDENTIFICATION:
+        raise Refused(1)
+    _, read_id, first = body
+    if not 1 <= read_id <= server.identification.highest_read_device_id:
+        raise Refused(3 if own_codes else 1)
+    single = read_id == 4
+    if first not in server.identity if single else first != 0:
+        raise Refused(3 if own_codes else 2)
+    chosen = {first: server.identity[first]} if single else server.identity
+    objects = b"".join(bytes([i, len(text)]) + text for i, text in sorted(chosen.items()))
+    head = bytes([MEI_IDENTIFICATION, read_id, server.identification.conformity, 0, 0])
+    return head + bytes([len(chosen)]) + objects
+
+
+_HANDLERS: Mapping[int, Callable[[Server, Function, bytes], bytes]] = {
+    3: _read,
+    6: _write_one,
+    8: _diagnose,
+    16: _write_many,
+    23: _read_write,
+    43: _identify,
+}
+
+
+def identity_of(
+    identification: Identification, name: str, replaced: Mapping[int, str]
+) -> dict[int, bytes]:
+    """The objects a drive identifies itself with: the profile's examples, its name, its own."""
+    objects = {o.id: o.example for o in identification.objects if o.example}
+    for item in identification.objects:
+        if name and item.meaning == "name":
+            objects[item.id] = name[:NAME_LENGTH]
+    objects.update(replaced)
+    return {i: text.encode("ascii", "replace") for i, text in objects.items()}

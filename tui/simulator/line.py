@@ -1,0 +1,101 @@
+"""One simulated line: which drive a frame is for, and what comes back."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from .drive import SimulatedDrive
+from .errors import SimulatorError
+from .frames import is_whole, seal
+from .spec import LineTiming
+
+FRESH = 0.004
+"""Age in s up to which the drives' values are fresh enough to answer with."""
+ANY_UNIT = 255
+"""Unit that Modbus TCP clients use for the only device behind an address."""
+
+
+@dataclass(frozen=True, slots=True)
+class Reply:
+    """A reply on its way: its bytes, and the drive's turnaround in s."""
+
+    data: bytes
+    turnaround: float
+
+
+class SimulatedLine:
+    """Drives on one line, in one simulated time."""
+
+    def __init__(
+        self,
+        drives: Sequence[SimulatedDrive],
+        timing: LineTiming,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.drives = tuple(drives)
+        self.timing = timing
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._last = clock()
+        self.running = False
+        """Whether the drives' time passes with the clock."""
+
+    def start(self) -> None:
+        """Let the drives' time pass from now on."""
+        with self._lock:
+            self._last = self._clock()
+            self.running = True
+
+    def advance(self, at_least: float = 0.0) -> None:
+        """Bring the drives' time up to the clock, if they are behind by more than this, in s."""
+        with self._lock:
+            now = self._clock()
+            elapsed = now - self._last
+            if not self.running or elapsed <= at_least:
+                return
+            self._last = now
+        for drive in self.drives:
+            drive.step(elapsed)
+
+    def drive(self, address: int) -> SimulatedDrive:
+        """The drive that has this address now; raises SimulatorError."""
+        for drive in self.drives:
+            if drive.address == address:
+                return drive
+        known = ", ".join(str(d.address) for d in self.drives) or "none"
+        raise SimulatorError(f"No simulated drive has address {address}. Addresses: {known}.")
+
+    def receive(self, frame: bytes) -> Reply | None:
+        """What comes back for what was received between two silences; None for silence."""
+        listening = [d for d in self.drives if d.hears(self.timing)]
+        if not is_whole(frame):
+            for drive in listening:
+                if len(frame) >= 4 and drive.answers_at(frame[0]):
+                    drive.count_checksum_error()
+            return None
+        address, pdu = frame[0], frame[1:-2]
+        reply = self._ask(listening, address, pdu)
+        if reply is None:
+            return None
+        return Reply(seal(bytes([address]) + reply.data), reply.turnaround)
+
+    def ask(self, unit: int, pdu: bytes) -> Reply | None:
+        """What comes back for a message of Modbus TCP; the reply's data is a PDU."""
+        if unit == ANY_UNIT and len(self.drives) == 1:
+            unit = self.drives[0].address
+        return self._ask(self.drives, unit, pdu)
+
+    def _ask(self, drives: Sequence[SimulatedDrive], address: int, pdu: bytes) -> Reply | None:
+        self.advance(FRESH)
+        reply: Reply | None = None
+        for drive in drives:
+            if drive.is_called(address):
+                drive.obey(pdu)
+            elif reply is None and drive.answers_at(address):
+                answer = drive.answer(address, pdu)
+                if answer is not None:
+                    reply = Reply(answer, drive.turnaround)
+        return reply

@@ -1,0 +1,59 @@
+"""Commands that move a drive's settings between working memory, EEPROM and factory values.
+
+Sources: ATV312 communication variables, CMI and SCS; ATV71 communication parameters guide.
+A save, and a recall, are only taken while the motor is not supplied.
+"""
+
+from __future__ import annotations
+
+from tui.drive.schema import Parameter
+
+from .body import Body
+
+CMI_FACTORY, CMI_SAVE, CMI_RESTORE = 1 << 0, 1 << 1, 1 << 2
+SAVE_TIME = 0.5
+LINE_ROLES = frozenset({"address", "baud", "format", "parity", "protocol", "timeout", "delay"})
+
+
+class Memory:
+    """Follows the words that save, recall and restore settings."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._last = 0
+
+    def power_up(self) -> None:
+        """No command is pending."""
+        self._last = 0
+
+    def written(self, parameter: Parameter) -> None:
+        """Follow a word that the line wrote."""
+        if parameter.quantity == "extended_command_word":
+            self._extended(parameter)
+        elif parameter.quantity == "save_settings" and self._body.registers.present(parameter):
+            self._save()
+            self._body.registers.put(parameter, 0)
+
+    def _extended(self, parameter: Parameter) -> None:
+        word = self._body.registers.present(parameter) & 0xFFFF
+        rising = word & ~self._last
+        if not self._body.turning:
+            if rising & CMI_FACTORY:
+                self._body.registers.to_factory(self._kept())
+            if rising & CMI_SAVE:
+                self._save()
+            if rising & CMI_RESTORE and not self._body.traits.access_levels:
+                self._body.registers.recall(self._kept())
+        shown = word & ~(CMI_FACTORY | CMI_SAVE)
+        self._body.registers.put(parameter, shown)
+        self._last = shown
+
+    def _save(self) -> None:
+        if not self._body.turning:
+            self._body.registers.save()
+            self._body.saving = SAVE_TIME
+
+    def _kept(self) -> frozenset[str]:
+        """Settings of the line keep their value when others are recalled."""
+        settings = self._body.profile.data.link.settings
+        return frozenset(s.parameter for s in settings if s.role in LINE_ROLES)

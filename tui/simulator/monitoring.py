@@ -1,0 +1,102 @@
+"""From the motor's physical values to a drive's monitoring words, in the profile's units."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+
+from tui.drive.schema import Quantity
+from tui.drive.values import speed_from_frequency
+
+from .body import Body
+from .motor import MotorState
+
+Converter = Callable[[Body, MotorState], float]
+
+
+def _part(value: float, whole: float) -> float:
+    return 100 * value / whole if whole else 0.0
+
+
+_HOUR_UNITS: Mapping[str, float] = {"h": 1.0, "": 1.0, "min": 60.0, "s": 3600.0}
+
+
+def _hours(name: str) -> dict[str, Converter]:
+    def in_units(factor: float) -> Converter:
+        return lambda body, motor: factor * float(getattr(motor, name))
+
+    return {unit: in_units(factor) for unit, factor in _HOUR_UNITS.items()}
+
+
+BY_UNIT: Mapping[Quantity, Mapping[str, Converter]] = {
+    "motor_current": {
+        "A": lambda body, motor: motor.current,
+        "%": lambda body, motor: _part(motor.current, body.rating.drive_current),
+    },
+    "motor_voltage": {
+        "V": lambda body, motor: motor.voltage,
+        "%": lambda body, motor: _part(motor.voltage, body.rating.voltage),
+    },
+    "mains_voltage": {"V": lambda body, motor: motor.mains},
+    "dc_bus": {
+        "V": lambda body, motor: motor.dc_bus,
+        "%": lambda body, motor: _part(motor.dc_bus, body.rating.voltage * math.sqrt(2)),
+    },
+    "torque": {"%": lambda body, motor: motor.torque},
+    "power": {
+        "kW": lambda body, motor: max(0.0, motor.power),
+        "W": lambda body, motor: max(0.0, 1000 * motor.power),
+        "%": lambda body, motor: _part(motor.power, body.rating.power),
+    },
+    "input_power": {
+        "kW": lambda body, motor: motor.input_power,
+        "W": lambda body, motor: 1000 * motor.input_power,
+    },
+    "drive_thermal": {"%": lambda body, motor: motor.drive_thermal},
+    "motor_thermal": {"%": lambda body, motor: motor.motor_thermal},
+    "motor_load": {"%": lambda body, motor: abs(motor.torque)},
+    "drive_load": {"%": lambda body, motor: _part(motor.current, body.rating.drive_current)},
+    "energy": {
+        "kWh": lambda body, motor: motor.energy,
+        "Wh": lambda body, motor: 1000 * motor.energy,
+        "MWh": lambda body, motor: motor.energy / 1000,
+    },
+    "run_hours": _hours("run_hours"),
+    "power_on_hours": _hours("on_hours"),
+}
+"""Quantities by the units that profiles may give them; the first stands for a missing unit."""
+
+COUNTER_UNITS = 1 | 2 << 2 | 2 << 4
+"""UNT of the ATV71: energy in kWh, times in h."""
+
+
+def show_motor(body: Body) -> None:
+    """Put the motor's present values into the monitoring words."""
+    motor = body.motor
+    for quantity, converters in BY_UNIT.items():
+        parameter = body.parameter(quantity)
+        if parameter is not None:
+            converter = converters.get(parameter.unit) or next(iter(converters.values()))
+            body.show(quantity, converter(body, motor))
+    _show_speed(body)
+    if body.traits.power_bit:
+        body.show_code("UNT", COUNTER_UNITS)
+
+
+def _show_speed(body: Body) -> None:
+    """Speed as the profile's formula gives it, else that of the rotor, signed where it can be."""
+    poles = round(body.value("motor_poles", body.rating.poles))
+    poles = poles if poles >= 2 else body.rating.poles
+    formula = body.profile.data.monitoring.speed_from
+    if formula and formula.result:
+        raw = body.registers.present(body.profile[formula.frequency])
+        body.show_code(formula.result, speed_from_frequency(raw, poles))
+        return
+    parameter = body.parameter("speed")
+    if parameter is None:
+        return
+    rpm = body.motor.rotor * 120 / poles
+    signed = parameter.type.startswith("int")
+    if parameter.unit == "Hz":
+        rpm = body.motor.rotor
+    body.show("speed", rpm if signed else abs(rpm))

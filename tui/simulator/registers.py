@@ -1,0 +1,140 @@
+"""The words of a simulated drive: present, in force, saved; held and protected ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+from tui.drive.profile import Profile
+from tui.drive.schema import Parameter
+from tui.drive.values import from_words, to_words, type_range, word_count
+
+ORDERS = frozenset(
+    {
+        "command_word",
+        "command_word_2",
+        "extended_command_word",
+        "command_frequency",
+        "command_speed",
+    }
+)
+"""Quantities that are orders of the line: no family keeps them over a power-down."""
+
+
+class Registers:
+    """Words by wire address, behind parameters by code.
+
+    A written word is *present* at once. It is *in force* at once, or after the next power-up
+    where the profile says so. It is *saved* at once where the drive writes its EEPROM, on
+    command where it keeps a working copy, and never where it is kept in memory only.
+    """
+
+    def __init__(self, profile: Profile, initial: Mapping[str, int]) -> None:
+        self.profile = profile
+        self._words: dict[int, int] = {}
+        self._in_force: dict[int, int] = {}
+        self._owner: dict[int, Parameter] = {}
+        self._held: set[str] = set()
+        self._protected: set[int] = set()
+        self._folded = {p.code.casefold(): p for p in profile.parameters}
+        for parameter in profile.parameters:
+            for offset in range(word_count(parameter)):
+                self._owner.setdefault(parameter.address + offset, parameter)
+            self._store(parameter, initial[parameter.code])
+        self._factory = dict(self._words)
+        self._own = {address for address, p in self._owner.items() if p.access == "r"}
+        self._volatile = {address for address, p in self._owner.items() if is_volatile(p)}
+        self._saved = {a: word for a, word in self._words.items() if a not in self._own}
+
+    # What the line sees
+
+    def owner(self, address: int) -> Parameter | None:
+        """The parameter a word belongs to; None for an unknown or protected word."""
+        return None if address in self._protected else self._owner.get(address)
+
+    def word(self, address: int) -> int:
+        """The present word at a known address."""
+        return self._words[address]
+
+    def write_word(self, address: int, word: int) -> None:
+        """Take a word from the line; storage and effect follow the profile."""
+        parameter = self._owner[address]
+        self._words[address] = word & 0xFFFF
+        if parameter.effective == "at-once":
+            self._in_force[address] = word & 0xFFFF
+        if parameter.storage in ("eeprom", "unknown") and address not in self._volatile:
+            self._saved[address] = word & 0xFFFF
+
+    # What the drive itself sees
+
+    def named(self, code: str) -> Parameter | None:
+        """The parameter with this code in any case, or None."""
+        return self._folded.get(code.casefold())
+
+    def present(self, parameter: Parameter) -> int:
+        """The raw value as the line reads it."""
+        return from_words(parameter, [self._words[a] for a in _addresses(parameter)])
+
+    def in_force(self, parameter: Parameter) -> int:
+        """The raw value the drive acts on."""
+        return from_words(parameter, [self._in_force[a] for a in _addresses(parameter)])
+
+    def put(self, parameter: Parameter, raw: int) -> None:
+        """Show a raw value of the drive's own; a held parameter keeps what it was set to."""
+        if parameter.code not in self._held:
+            self._store(parameter, raw)
+
+    def settle(self, parameter: Parameter, raw: int) -> None:
+        """Put a raw value in force, present and saved, as if it had always been there."""
+        self._store(parameter, raw)
+        for address in _addresses(parameter):
+            self._saved[address] = self._words[address]
+
+    def hold(self, parameter: Parameter) -> None:
+        """Keep a monitored value where it is, whatever the motor does."""
+        self._held.add(parameter.code)
+
+    def protect(self, parameters: Iterable[Parameter]) -> None:
+        """Make parameters unknown to the line."""
+        self._protected = {a for p in parameters for a in _addresses(p)}
+
+    # Memory
+
+    def save(self) -> None:
+        """Copy the present words to the EEPROM, as a save command does."""
+        for address, word in self._words.items():
+            if address not in self._volatile and address not in self._own:
+                self._saved[address] = word
+
+    def restore(self) -> None:
+        """Take the saved words as the present ones, as at power-up."""
+        self._words.update(self._saved)
+        self._in_force.update(self._saved)
+
+    def recall(self, keep: frozenset[str]) -> None:
+        """Take the saved words as the present ones, except those whose code is kept."""
+        for address, word in self._saved.items():
+            if address not in self._volatile and self._owner[address].code not in keep:
+                self._words[address] = self._in_force[address] = word
+
+    def to_factory(self, keep: frozenset[str]) -> None:
+        """Make every writable parameter its factory value, except those whose code is kept."""
+        for parameter in self.profile.parameters:
+            if parameter.access == "r" or is_volatile(parameter) or parameter.code in keep:
+                continue
+            for address in _addresses(parameter):
+                self._words[address] = self._in_force[address] = self._factory[address]
+
+    def _store(self, parameter: Parameter, raw: int) -> None:
+        low, high = type_range(parameter)
+        words = to_words(parameter, min(max(raw, low), high))
+        for address, word in zip(_addresses(parameter), words, strict=True):
+            self._words[address] = self._in_force[address] = word
+
+
+def is_volatile(parameter: Parameter) -> bool:
+    """Whether a parameter lives in memory only: so declared, or an order of the line."""
+    return parameter.storage == "ram" or parameter.access == "w" or parameter.quantity in ORDERS
+
+
+def _addresses(parameter: Parameter) -> range:
+    return range(parameter.address, parameter.address + word_count(parameter))

@@ -1,0 +1,123 @@
+"""The drive's watch over the line: time-out, when it starts, and what the drive does then.
+
+Sources: ATV21 Modbus manual 6.4 (F803, F603); ATV71 Modbus manual, communication fault
+management, and ATV312 communication variables (ttO, SLL); PX-MODBUS manual 4 (15.07).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tui.drive.schema import CommunicationFault, Reaction
+
+from .body import Body, Fallback
+from .motor import Stop
+
+NO_MONITORING = 1 << 14
+"""CMI bit 14 of the ATV31 and ATV312: the line is not watched."""
+
+
+@dataclass(frozen=True, slots=True)
+class Consequence:
+    """What a silent line leads to: a fault with a way to stop, or a fallback without one."""
+
+    trip: Stop | None = None
+    fallback: Fallback | None = None
+
+
+ALTIVAR: Mapping[str, Consequence] = {
+    "no": Consequence(),
+    "yes": Consequence(trip=Stop.FREEWHEEL),
+    "rmp": Consequence(trip=Stop.RAMP),
+    "fst": Consequence(trip=Stop.FAST),
+    "dci": Consequence(trip=Stop.INJECTION),
+    "stt": Consequence(fallback=Fallback.STOP),
+    "lff": Consequence(fallback=Fallback.SPEED),
+    "rls": Consequence(fallback=Fallback.MAINTAIN),
+}
+"""Reactions by their code on the keypad."""
+ALTIVAR_RAW: Mapping[int, str] = {0: "no", 1: "yes", 6: "rmp", 7: "fst"}
+"""Raw values of SLL that the ATV312 manual gives, for a profile without codes."""
+ALTIVAR_21: Mapping[int, Consequence] = {
+    0: Consequence(trip=Stop.FREEWHEEL),
+    1: Consequence(trip=Stop.RAMP),
+    2: Consequence(trip=Stop.INJECTION),
+}
+FREEWHEEL = Consequence(trip=Stop.FREEWHEEL)
+
+
+class Watch:
+    """Counts the silence of the line towards one drive."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._data: CommunicationFault | None = body.profile.data.communication_fault
+        self._spoken = False
+        self._expired = False
+        self._silent = 0.0
+
+    def power_up(self) -> None:
+        """Wait for the line to speak again before watching it."""
+        self._spoken = self._expired = False
+        self._silent = 0.0
+
+    def heard(self) -> None:
+        """A valid request to the drive's own address came."""
+        self._spoken = True
+        self._expired = False
+        self._silent = 0.0
+        self._body.fallback = None
+
+    @property
+    def timeout(self) -> float | None:
+        """Time-out in force, in s; None where the watch is off."""
+        if self._data is None:
+            return None
+        parameter = self._body.registers.named(self._data.timeout)
+        if parameter is None:
+            return None
+        raw = self._body.registers.in_force(parameter)
+        off = 0 if self._data.off is None else self._data.off
+        return None if raw == off else raw * self._body.scale(parameter)
+
+    @property
+    def watching(self) -> bool:
+        """Whether the watch has started and is not switched off."""
+        if self._data is None or self.timeout is None:
+            return False
+        if self._body.traits.access_levels:
+            cmi = self._body.raw("extended_command_word")
+            if cmi & NO_MONITORING:
+                return False
+        return self._spoken and (self._body.was_ordered or not self._data.needs_write)
+
+    def step(self, dt: float) -> Consequence | None:
+        """Let time pass; what has to happen if the time-out has just run out."""
+        if not self.watching or self._expired:
+            return None
+        self._silent += dt
+        if self._silent < (self.timeout or 0.0):
+            return None
+        self._expired = True
+        return self.consequence()
+
+    def consequence(self) -> Consequence:
+        """What the reaction in force leads to; a reaction nobody knows is a freewheel stop."""
+        if self._data is None or not self._data.reaction:
+            return FREEWHEEL
+        raw = self._body.setting(self._data.reaction, -1)
+        if self._body.traits.kind == "altivar21":
+            return ALTIVAR_21.get(raw, FREEWHEEL)
+        reaction = next((r for r in self._data.reactions if r.raw == raw), None)
+        code = _code(reaction) or ALTIVAR_RAW.get(raw, "")
+        return ALTIVAR.get(code, FREEWHEEL)
+
+    @property
+    def fault(self) -> int | None:
+        """Raw code of the fault that a silent line causes, where the profile knows it."""
+        return self._data.fault if self._data else None
+
+
+def _code(reaction: Reaction | None) -> str:
+    return reaction.code.casefold() if reaction else ""
