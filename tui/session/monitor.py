@@ -101,11 +101,22 @@ class Monitor:
 
         return leave
 
-    def start(self, codes: Sequence[str] | None = None, period: float = 0.5) -> None:
-        """Watch these codes, by default the profile's monitoring set."""
+    def start(
+        self,
+        codes: Sequence[str] | None = None,
+        period: float = 0.5,
+        *,
+        extra: Sequence[str] = (),
+    ) -> None:
+        """Watch these codes, by default the profile's monitoring set.
+
+        `extra` are read as seldom as the slow values: histories, inputs, hours. `period` is the
+        wished time of a cycle in seconds.
+        """
         self.stop()
         self.period = period
         fast, slow = self._rates(codes)
+        slow += [code for code in extra if code not in fast and code not in slow]
         self._worker = self.line.spawn(
             lambda: self._watch(fast, slow), f"monitor {self.profile.id} {self.device}"
         )
@@ -118,13 +129,11 @@ class Monitor:
 
     def _rates(self, codes: Sequence[str] | None) -> tuple[list[str], list[str]]:
         """Codes of every cycle and those read less often."""
+        if codes is not None:
+            return list(dict.fromkeys(codes)), []
         values = self.profile.data.monitoring.values
-        slow_ones = {value.parameter for value in values if value.rate == "slow"}
-        wanted = list(codes) if codes is not None else monitoring_codes(self.profile)
-        return (
-            [code for code in wanted if code not in slow_ones],
-            [code for code in wanted if code in slow_ones],
-        )
+        slow = [value.parameter for value in values if value.rate == "slow"]
+        return [c for c in monitoring_codes(self.profile) if c not in slow], slow
 
     async def _watch(self, fast: list[str], slow: list[str]) -> None:
         readings: dict[str, Reading] = {}
