@@ -149,6 +149,7 @@ class Monitor:
                 readings.update(await self.reader.read(due or slow, priority=Priority.POLL))
             except LineError as fault:
                 error = str(fault)
+                self.reader.forget()  # what answers next may be another drive
             else:
                 spent = time.monotonic() - started
                 if due is not fast:
