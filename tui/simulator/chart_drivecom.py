@@ -303,7 +303,8 @@ class DrivecomChart:
     def _target(self) -> float:
         body = self._body
         if body.fallback is Fallback.SPEED:
-            return self._cut(body.setting("LFF", 100) / 10)
+            speed = body.registers.named("LFF")
+            return self._cut(body.engineering(speed) if speed else 0.0)
         if body.fallback is Fallback.MAINTAIN:
             return body.motor.frequency
         return self._cut(self._wanted())
@@ -366,7 +367,7 @@ class DrivecomChart:
         word = self._status()
         body.show_raw("status_word", word)
         body.show_raw("extended_status_word", self._extended_status())
-        line = self._network or (self.network_commands and body.terminal_hz is None)
+        line = self._line_commands
         body.show_code("CCC", 1 << 3 if line else 1)
         body.show_code("CRC", 1 << 3 if line and self.network_reference else 1)
         wanted = self._reference_hz if motor.energised else self._wanted()
@@ -374,6 +375,11 @@ class DrivecomChart:
         if frequency := body.parameter("output_frequency"):
             body.registers.put(frequency, round(motor.frequency / self.hz_per_count(frequency)))
         body.show("speed_reference", wanted * 120 / self.poles)
+
+    @property
+    def _line_commands(self) -> bool:
+        """Whether the line has the command now, and not a run order at the terminals."""
+        return self._network or (self.network_commands and self._body.terminal_hz is None)
 
     def _status(self) -> int:
         body = self._body
@@ -384,7 +390,7 @@ class DrivecomChart:
         marks = (
             (body.traits.power_bit and motor.mains > 0, 4),
             (body.alarms != 0 or motor.motor_thermal >= 100, 7),
-            (body.traits.remote_always or self.network_commands or self.network_reference, 9),
+            (body.traits.remote_always or self._line_commands, 9),
             (reached, 10),
             (motor.energised and not low - 0.05 <= asked <= high + 0.05, 11),
             (motor.frequency < 0, 15),

@@ -121,7 +121,8 @@ class SimulatedDrive:
         for setting in self.profile.data.link.settings:
             parameter = self.profile[setting.parameter]
             fitting = [c.raw for c in setting.choices if _fits(c, timing)]
-            if setting.role in ("baud", "format", "parity") and fitting:
+            first = all(setting.role != known.role for known, _ in self._line_settings)
+            if first and setting.role in ("baud", "format", "parity") and fitting:
                 self.registers.settle(parameter, fitting[0])
                 self._line_settings.append((setting, parameter))
         for code, raw in self.spec.sets.items():
@@ -269,11 +270,11 @@ class SimulatedDrive:
         self._chart.trip(stop)
 
     def _remember_fault(self, raw: int) -> None:
-        """Move the history on: by the fault before where the drive keeps the last one shown."""
+        """Show the fault, and move the history on by it, or by the one before it."""
         faults = self.profile.data.faults
         present = self.registers.named(faults.parameter) if faults.parameter else None
         older = raw
-        if faults.shows_last and present is not None:
+        if self._body.traits.history_before and present is not None:
             older = self.registers.present(present)
         if present is not None:
             self.registers.put(present, raw)
