@@ -5,6 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from .requests import (
+    BROADCAST,
+    LISTEN_ONLY,
+    Diagnose,
+    Read,
+    ReadWrite,
+    Request,
+    WriteMany,
+    WriteOne,
+)
+
 STANDARD_EXCEPTIONS: Mapping[int, str] = {
     1: "the function is not known to the device",
     2: "an address is not known to the device, or not allowed now",
@@ -62,3 +73,101 @@ CAUTIOUS = Limits(
     functions=frozenset({3, 43}), max_read=1, max_write=0, max_read_23=0, max_write_23=0
 )
 """For a device that nobody described: one word by function 3, and identification."""
+
+MAX_READ, MAX_WRITE, MAX_READ_23, MAX_WRITE_23 = 125, 123, 125, 121
+"""The longest that Modbus itself allows, in words."""
+
+
+def refusal(request: Request, limits: Limits, *, read_only: bool = False) -> str:
+    """Why a request must not be sent, as a sentence; empty when it may."""
+    if not 0 <= request.device <= 255:
+        return f"Device {request.device} does not exist; devices are 1 to 255."
+    if read_only and request.changes:
+        return "The line is read-only: nothing is written."
+    text = _out_of_range(request)
+    if text:
+        return text
+    if request.device == BROADCAST:
+        if request.function not in limits.broadcast_functions:
+            return f"Function {request.function} cannot be broadcast to these devices."
+    elif request.function not in limits.functions:
+        return f"Device {request.device} does not know function {request.function}."
+    return _too_long(request, limits)
+
+
+def _out_of_range(request: Request) -> str:
+    """What no Modbus device can be sent."""
+    match request:
+        case Read(address=address, count=count):
+            return _bad_span(address, count, MAX_READ)
+        case WriteOne(address=address, value=value):
+            return _bad_span(address, 1, 1) or _bad_words((value,))
+        case WriteMany(address=address, values=values):
+            return _bad_span(address, len(values), MAX_WRITE) or _bad_words(values)
+        case ReadWrite(address=address, count=count, write_address=target, values=values):
+            return (
+                _bad_span(address, count, MAX_READ_23)
+                or _bad_span(target, len(values), MAX_WRITE_23)
+                or _bad_words(values)
+            )
+        case Diagnose(subfunction=subfunction, data=data):
+            return _bad_words((subfunction, data))
+        case _:
+            return ""
+
+
+def _bad_span(address: int, count: int, most: int) -> str:
+    if not 0 <= address <= 0xFFFF:
+        return f"Register {address} does not exist; registers are 0 to 65535."
+    if not 1 <= count <= most:
+        return f"{count} words cannot be asked for; a request holds 1 to {most}."
+    if address + count > 0x10000:
+        return f"{count} words from register {address} on go past register 65535."
+    return ""
+
+
+def _bad_words(values: tuple[int, ...]) -> str:
+    for value in values:
+        if not 0 <= value <= 0xFFFF:
+            return f"{value} does not fit in a word; words are 0 to 65535."
+    return ""
+
+
+def _too_long(request: Request, limits: Limits) -> str:
+    """What this device cannot be sent although Modbus allows it."""
+    match request:
+        case Read(address=address, count=count):
+            return _bad_block("read", address, count, limits.max_read, limits.read_windows, limits)
+        case WriteMany(address=address, values=values):
+            return _bad_block(
+                "written", address, len(values), limits.max_write, limits.write_windows, limits
+            )
+        case ReadWrite(count=count, values=values):
+            if count > limits.max_read_23 or len(values) > limits.max_write_23:
+                return (
+                    f"Function 23 of device {request.device} reads {limits.max_read_23} and "
+                    f"writes {limits.max_write_23} words at most."
+                )
+        case Diagnose(subfunction=subfunction):
+            if subfunction == LISTEN_ONLY:
+                return "Listen-only mode would silence the device until it is switched off."
+            if subfunction not in limits.subfunctions:
+                return f"Device {request.device} has no sub-function {subfunction} of function 8."
+    return ""
+
+
+def _bad_block(
+    verb: str, address: int, count: int, most: int, windows: tuple[Window, ...], limits: Limits
+) -> str:
+    if count == 1 and most >= 1:
+        return ""
+    if limits.single_words_only:
+        if any(window.holds(address, count) for window in windows):
+            return ""
+        return (
+            f"{count} words from register {address} on cannot be {verb} at once: the device "
+            "takes single words and its own blocks."
+        )
+    if count > most:
+        return f"{count} words cannot be {verb} at once; the device takes {most}."
+    return ""

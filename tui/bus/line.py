@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import time
-from collections.abc import Callable, Coroutine, Sequence
-from typing import Any
+from collections.abc import Callable, Sequence
 
-from .limits import Limits
+from .devices import Devices
+from .engine import Engine
+from .errors import RequestRefused, WrongReply
+from .jobs import Answer, Job
+from .limits import Limits, refusal
 from .link import Link
 from .model import (
     Counters,
@@ -18,7 +23,21 @@ from .model import (
     Reply,
     Timing,
 )
+from .requests import (
+    BROADCAST,
+    Diagnose,
+    Identify,
+    Read,
+    ReadWrite,
+    Request,
+    WriteMany,
+    WriteOne,
+    diagnostic_of,
+    objects_of,
+    words_of,
+)
 from .trace import Frame
+from .worker import Work, Worker
 
 __all__ = [
     "Counters",
@@ -34,24 +53,19 @@ __all__ = [
     "Worker",
 ]
 
-
-class Worker:
-    """A coroutine at work in the line's loop."""
-
-    name: str
-    error: BaseException | None
-
-    def cancel(self) -> None:
-        """Ask the work to end; may be called from any thread."""
-        raise NotImplementedError
-
-    def done(self) -> bool:
-        """Whether the work has ended, by itself, by cancel() or by an error."""
-        raise NotImplementedError
+# frames of the protocol library are traced here; its own log must not reach the terminal
+logging.getLogger("pymodbus").propagate = False
+logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
 class Line:
-    """A line shared by everything that talks to its devices."""
+    """A line shared by everything that talks to its devices.
+
+    All methods may be called from any thread, all coroutines awaited in any loop. Each raises
+    LineClosed, LineLost, LineBusy or RequestRefused when nothing was sent (a lost line also
+    during an exchange), and the ExchangeErrors when something was. To cancel an await does not
+    cancel an exchange in flight; a request that still waits is not sent then.
+    """
 
     def __init__(
         self,
@@ -63,35 +77,54 @@ class Line:
     ) -> None:
         self.link = link
         self.read_only = read_only
+        self.timing = timing or Timing()
+        self._engine = Engine(link, self.timing, clock)
 
     def open(self, *, wait: float | None = None) -> None:
-        raise NotImplementedError
+        """Start the line; it connects, and reconnects, by itself.
+
+        With `wait` the call returns once connected. Else it closes the line and raises PortBusy,
+        PortMissing, PortRefused at once, or LineLost after that many seconds.
+        """
+        self._engine.start(wait)
 
     def close(self) -> None:
-        raise NotImplementedError
+        """Close the line for good; what waits fails with LineClosed. May be called twice."""
+        self._engine.close()
 
     @property
     def state(self) -> LineState:
-        raise NotImplementedError
+        """Whether the line can be used now, and if not, why and when it is tried again."""
+        return self._engine.state
 
     @property
     def counters(self) -> Counters:
-        raise NotImplementedError
+        """What has happened on the line so far."""
+        return self._engine.tally.frozen()
 
     @property
     def trace(self) -> tuple[Frame, ...]:
-        raise NotImplementedError
+        """The last frames, oldest first."""
+        return self._engine.trace.frames()
+
+    @property
+    def _devices(self) -> Devices:
+        return self._engine.devices
 
     def describe(self, device: int, limits: Limits) -> None:
-        raise NotImplementedError
+        """Set what a device may be sent; a device that nobody described gets CAUTIOUS."""
+        self._devices.describe(device, limits)
 
     def device_state(self, device: int) -> DeviceState:
-        raise NotImplementedError
+        """What the line has seen of a device."""
+        return self._devices.state(device)
 
     async def read(
         self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
     ) -> Reply:
-        raise NotImplementedError
+        """Read `count` registers by function 3."""
+        answer = await self._ask(Read(device, address, count), priority)
+        return Reply(words_of(answer.pdu), answer.time)
 
     async def write(
         self,
@@ -102,7 +135,14 @@ class Line:
         priority: Priority = Priority.OPERATOR_WRITE,
         multiple: bool | None = None,
     ) -> float:
-        raise NotImplementedError
+        """Write registers, once; returns when the answer came (line's clock, seconds).
+
+        One word goes by function 6 and more by 16, unless `multiple` says which; a device with
+        only one of them gets that. The answer alone proves little: read back.
+        """
+        limits = self._devices[device].limits
+        request = _write(device, address, values, multiple, limits.functions)
+        return (await self._ask(request, priority)).time
 
     async def read_write(
         self,
@@ -114,7 +154,10 @@ class Line:
         *,
         priority: Priority = Priority.OPERATOR_WRITE,
     ) -> Reply:
-        raise NotImplementedError
+        """Write registers, then read `count` others, by function 23, once."""
+        request = ReadWrite(device, read_address, count, write_address, tuple(values))
+        answer = await self._ask(request, priority)
+        return Reply(words_of(answer.pdu), answer.time)
 
     async def diagnose(
         self,
@@ -124,12 +167,25 @@ class Line:
         *,
         priority: Priority = Priority.OPERATOR_READ,
     ) -> int:
-        raise NotImplementedError
+        """Ask by function 8; returns the data word of the answer."""
+        answer = await self._ask(Diagnose(device, subfunction, data), priority)
+        return diagnostic_of(answer.pdu)
 
     async def identify(
         self, device: int, *, priority: Priority = Priority.OPERATOR_READ
     ) -> Identification:
-        raise NotImplementedError
+        """Ask a device who it is by function 43/14, until nothing more follows."""
+        found: dict[int, bytes] = {}
+        first = 0
+        while True:
+            request = Identify(device, first_object=first)
+            part = objects_of((await self._ask(request, priority)).pdu)
+            found.update(part.objects)
+            if part.next_object is None:
+                return Identification(part.conformity, found)
+            if part.next_object <= first:
+                raise WrongReply(device, request.function, 0, "its identification does not end")
+            first = part.next_object
 
     async def broadcast(
         self,
@@ -139,10 +195,50 @@ class Line:
         limits: Limits,
         priority: Priority = Priority.OPERATOR_WRITE,
     ) -> float:
-        raise NotImplementedError
+        """Write registers of all devices; returns when it was sent (line's clock, seconds).
 
-    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> Worker:
-        raise NotImplementedError
+        Nobody answers; the line is left quiet afterwards, which this waits for.
+        """
+        request = _write(BROADCAST, address, values, None, limits.broadcast_functions)
+        return (await self._ask(request, priority, limits)).time
+
+    def spawn(self, work: Work, name: str) -> Worker:
+        """Run a coroutine in the line's own loop, where no screen can hold it up.
+
+        The line must be open. It is cancelled when the line is closed. Raises LineClosed.
+        """
+        return self._engine.spawn(work, name)
 
     def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
-        raise NotImplementedError
+        """Call `listener` in the line's thread at each new state; returns how to end that."""
+        return self._engine.on_state(listener)
+
+    async def _ask(
+        self, request: Request, priority: Priority, limits: Limits | None = None
+    ) -> Answer:
+        """Check a request, queue it, await its answer."""
+        limits = limits or self._devices[request.device].limits
+        reason = refusal(request, limits, read_only=self.read_only)
+        if reason:
+            raise RequestRefused(reason)
+        job = Job(request, priority, limits)
+        self._engine.submit(job)
+        return await asyncio.wrap_future(job.answer)
+
+
+def _write(
+    device: int,
+    address: int,
+    values: Sequence[int],
+    multiple: bool | None,
+    functions: frozenset[int],
+) -> WriteOne | WriteMany:
+    """The request that writes the values with what the device knows."""
+    if multiple is None:
+        one_word = WriteOne.function in functions or WriteMany.function not in functions
+        multiple = len(values) != 1 or not one_word
+    if multiple:
+        return WriteMany(device, address, tuple(values))
+    if len(values) != 1:
+        raise RequestRefused(f"Function 6 writes one word, not {len(values)}.")
+    return WriteOne(device, address, values[0])

@@ -1,1 +1,234 @@
-"""Requests as frozen values, and what the reply of each must look like."""
+"""Requests as frozen values: their bytes, what their reply must look like, what it holds.
+
+Bytes are made and read by pymodbus' protocol data units; lengths and echoes are checked here
+before anything is read from a reply.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import ClassVar
+
+from pymodbus.pdu.diag_message import DiagnosticBase
+from pymodbus.pdu.mei_message import ReadDeviceInformationRequest
+from pymodbus.pdu.pdu import ModbusPDU
+from pymodbus.pdu.register_message import (
+    ReadHoldingRegistersRequest,
+    ReadHoldingRegistersResponse,
+    ReadWriteMultipleRegistersRequest,
+    WriteMultipleRegistersRequest,
+    WriteSingleRegisterRequest,
+)
+
+from .expectation import IDENTIFY, MEI_IDENTIFICATION, Expectation
+
+DATA_ECHOED = frozenset({0x00, 0x01, 0x03, 0x0A, 0x14})
+"""Sub-functions of 8 whose reply repeats the data; the others answer with a value."""
+HARMLESS_SUBFUNCTIONS = frozenset({0x00, 0x02, *range(0x0B, 0x14)})
+"""Sub-functions of 8 that change nothing in the device."""
+LISTEN_ONLY = 0x04
+BROADCAST = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Request(ABC):
+    """One request to one device; `device` 0 is a broadcast."""
+
+    function: ClassVar[int]
+    device: int
+
+    @abstractmethod
+    def message(self) -> ModbusPDU:
+        """The protocol data unit that carries the request."""
+
+    @abstractmethod
+    def expectation(self) -> Expectation:
+        """What the reply must look like."""
+
+    @property
+    def register(self) -> int:
+        """The first register asked for, 0 for functions without one."""
+        return 0
+
+    @property
+    def changes(self) -> bool:
+        """Whether the request changes anything in the device; such a request is sent once."""
+        return False
+
+    def pdu(self) -> bytes:
+        """Function code and data as they go on the wire."""
+        return bytes([self.function]) + self.message().encode()
+
+
+@dataclass(frozen=True, slots=True)
+class Read(Request):
+    """Function 3: read `count` registers."""
+
+    function: ClassVar[int] = 3
+    address: int
+    count: int
+
+    def message(self) -> ModbusPDU:
+        return ReadHoldingRegistersRequest(address=self.address, count=self.count)
+
+    def expectation(self) -> Expectation:
+        return _words_expected(self.function, self.count)
+
+    @property
+    def register(self) -> int:
+        return self.address
+
+
+@dataclass(frozen=True, slots=True)
+class WriteOne(Request):
+    """Function 6: write one register; the reply repeats the request."""
+
+    function: ClassVar[int] = 6
+    address: int
+    value: int
+
+    def message(self) -> ModbusPDU:
+        return WriteSingleRegisterRequest(address=self.address, registers=[self.value])
+
+    def expectation(self) -> Expectation:
+        pdu = self.pdu()
+        return Expectation(self.function, pdu, len(pdu))
+
+    @property
+    def register(self) -> int:
+        return self.address
+
+    @property
+    def changes(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class WriteMany(Request):
+    """Function 16: write registers; the reply repeats address and count."""
+
+    function: ClassVar[int] = 16
+    address: int
+    values: tuple[int, ...]
+
+    def message(self) -> ModbusPDU:
+        return WriteMultipleRegistersRequest(
+            address=self.address, count=len(self.values), registers=self.values
+        )
+
+    def expectation(self) -> Expectation:
+        return Expectation(self.function, self.pdu()[:5], 5)
+
+    @property
+    def register(self) -> int:
+        return self.address
+
+    @property
+    def changes(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class ReadWrite(Request):
+    """Function 23: write registers, then read `count` others."""
+
+    function: ClassVar[int] = 23
+    address: int
+    count: int
+    write_address: int
+    values: tuple[int, ...]
+
+    def message(self) -> ModbusPDU:
+        return ReadWriteMultipleRegistersRequest(
+            read_address=self.address,
+            read_count=self.count,
+            write_address=self.write_address,
+            write_registers=self.values,
+        )
+
+    def expectation(self) -> Expectation:
+        return _words_expected(self.function, self.count)
+
+    @property
+    def register(self) -> int:
+        return self.address
+
+    @property
+    def changes(self) -> bool:
+        return True
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnose(Request):
+    """Function 8: `subfunction` with one word of data."""
+
+    function: ClassVar[int] = 8
+    subfunction: int
+    data: int
+
+    def message(self) -> ModbusPDU:
+        message = DiagnosticBase(message=self.data)
+        message.sub_function_code = self.subfunction
+        return message
+
+    def expectation(self) -> Expectation:
+        echoed = 5 if self.subfunction in DATA_ECHOED else 3
+        return Expectation(self.function, self.pdu()[:echoed], 5)
+
+    @property
+    def changes(self) -> bool:
+        return self.subfunction not in HARMLESS_SUBFUNCTIONS
+
+
+@dataclass(frozen=True, slots=True)
+class Identify(Request):
+    """Function 43/14: objects of the device from `first_object` on."""
+
+    function: ClassVar[int] = IDENTIFY
+    read_code: int = 1
+    first_object: int = 0
+
+    def message(self) -> ModbusPDU:
+        return ReadDeviceInformationRequest(read_code=self.read_code, object_id=self.first_object)
+
+    def expectation(self) -> Expectation:
+        return Expectation(
+            self.function, bytes([IDENTIFY, MEI_IDENTIFICATION, self.read_code]), None
+        )
+
+
+def _words_expected(function: int, count: int) -> Expectation:
+    return Expectation(function, bytes([function, 2 * count]), 2 + 2 * count)
+
+
+def words_of(pdu: bytes) -> tuple[int, ...]:
+    """Words of a checked reply of function 3 or 23."""
+    response = ReadHoldingRegistersResponse()
+    response.decode(pdu[1:])
+    return tuple(response.registers)
+
+
+def diagnostic_of(pdu: bytes) -> int:
+    """The data word of a checked reply of function 8."""
+    return int.from_bytes(pdu[3:5], "big")
+
+
+@dataclass(frozen=True, slots=True)
+class Objects:
+    """One reply of function 43/14; `next_object` None when nothing follows."""
+
+    conformity: int
+    objects: dict[int, bytes]
+    next_object: int | None
+
+
+def objects_of(pdu: bytes) -> Objects:
+    """Objects of a checked reply of function 43/14."""
+    objects: dict[int, bytes] = {}
+    at = 7
+    for _ in range(pdu[6]):
+        length = pdu[at + 1]
+        objects[pdu[at]] = bytes(pdu[at + 2 : at + 2 + length])
+        at += 2 + length
+    return Objects(pdu[3], objects, pdu[5] if pdu[4] else None)

@@ -1,0 +1,124 @@
+"""Keeps a line connected: opens it, serves it, and opens it again when it is lost."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import socket
+from collections.abc import Callable
+
+from .backoff import pause
+from .dispatcher import Dispatcher
+from .errors import LineError, LineLost
+from .link import Link, RtuTcpLink, SerialLink, TcpLink, label
+from .master import Master, Surroundings
+from .model import LineState, LineStatus
+from .ports import is_pseudo_terminal, open_serial, other_openers
+from .rtu_master import RtuMaster
+from .serial_posix import PosixSerial
+from .serial_thread import ThreadedSerial
+from .tcp_master import TcpMaster
+from .tcp_transport import TcpTransport
+from .transport import Transport
+
+log = logging.getLogger(__name__)
+
+
+def open_port(link: SerialLink) -> Transport:
+    """Open a serial port for Modbus. Raises PortBusy, PortMissing, PortRefused."""
+    port = open_serial(link.path, link.baud, link.format)
+    note = ""
+    if is_pseudo_terminal(link.path):
+        if port.parity != link.format[1]:
+            note = f"A pseudo-terminal has no parity: opened with {port.parity}."
+    elif others := other_openers(link.path):
+        note = f"{others} has the port open too; requests of two programs disturb each other."
+    return PosixSerial(port, note) if os.name == "posix" else ThreadedSerial(port, note)
+
+
+async def connect(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
+    """Connect to a server. Raises LineLost."""
+    try:
+        return await TcpTransport.connect(link.host, link.port, timeout)
+    except TimeoutError:
+        reason = "it does not answer. Check the address and the network."
+    except ConnectionRefusedError:
+        reason = "nothing listens there. Check the port, and that the device is on."
+    except socket.gaierror:
+        reason = "the host is not known. Check its name."
+    except (OSError, UnicodeError) as error:
+        reason = f"{getattr(error, 'strerror', None) or error}."
+    raise LineLost(f"{label(link)} cannot be reached: {reason}")
+
+
+class Connection:
+    """The life of a line in its loop; `changed` hears of every new state."""
+
+    def __init__(
+        self,
+        link: Link,
+        around: Surroundings,
+        dispatcher: Dispatcher,
+        changed: Callable[[LineState, LineError | None], None],
+    ) -> None:
+        self._link = link
+        self._around = around
+        self._dispatcher = dispatcher
+        self._changed = changed
+        self._failures = 0
+        self.refusal: LineError | None = None
+        """Why requests are failed at once; None while they are taken."""
+
+    async def run(self) -> None:
+        """Connect and serve, again and again, until cancelled."""
+        self._say(LineStatus.CONNECTING)
+        while True:
+            try:
+                await self._once()
+            except LineError as error:
+                failure = error
+            except Exception as error:
+                # a fault of this program must not take the line away for good
+                log.exception("the line's loop failed")
+                failure = LineLost(f"The line failed: {error!r}.")
+            self._failures += 1
+            timing = self._around.timing
+            delay = pause(self._failures, timing.reconnect_first, timing.reconnect_longest)
+            self.refusal = failure
+            self._say(LineStatus.LOST, str(failure), failure, delay)
+            self._dispatcher.fail_all(str(failure), LineLost)
+            await asyncio.sleep(delay)
+
+    async def _once(self) -> None:
+        """One connection from opening to loss; always raises."""
+        master = await self._open()
+        try:
+            self.refusal = None
+            self._failures = 0
+            await self._dispatcher.serve(master)
+        finally:
+            master.close()
+
+    async def _open(self) -> Master:
+        link, wake = self._link, self._dispatcher.wake
+        match link:
+            case SerialLink():
+                transport = open_port(link)
+            case TcpLink() | RtuTcpLink():
+                transport = await connect(link, self._around.timing.connect_timeout)
+        self._say(LineStatus.CONNECTED, transport.note)
+        if isinstance(link, TcpLink):
+            return TcpMaster(transport, self._around, wake)
+        return RtuMaster(transport, link, self._around, wake)
+
+    def _say(
+        self,
+        status: LineStatus,
+        reason: str = "",
+        error: LineError | None = None,
+        delay: float | None = None,
+    ) -> None:
+        now = self._around.clock()
+        next_try = None if delay is None else now + delay
+        self._changed(LineState(status, reason, now, next_try), error)

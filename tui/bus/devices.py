@@ -1,0 +1,207 @@
+"""What the line knows of each device: limits, turnaround, silence, replies that may still come."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass, field
+
+from .backoff import pause
+from .expectation import EXCEPTION, Expectation
+from .limits import CAUTIOUS, Limits
+from .model import DeviceState, Priority, Timing
+from .rtu import Piece
+
+RECENT = 16
+"""Turnarounds remembered for each function."""
+MARGIN = 4
+"""The time-out is so many times the worst recent turnaround."""
+LATE_MARGIN = 2.0
+"""Late replies are awaited so many times longer than the worst lateness seen."""
+LONGEST_WAIT = 10.0
+QUIET_LONGEST = 0.3
+"""Longest that the whole line keeps quiet for one late device."""
+FORGET = 0.99
+"""What is left of the worst lateness after each reply in time."""
+CALM = 200
+"""Exchanges without a surplus reply after which a device is trusted again."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outstanding:
+    """A reply that may still come until `expires`; it was due at `due`."""
+
+    expectation: Expectation
+    due: float
+    expires: float
+
+
+@dataclass(slots=True)
+class Device:
+    """The record of one device."""
+
+    limits: Limits = CAUTIOUS
+    answers: bool | None = None
+    ever_answered: bool = False
+    failures: int = 0
+    silent_since: float | None = None
+    next_try: float | None = None
+    turnaround: float | None = None
+    recent: dict[int, deque[float]] = field(default_factory=dict)
+    outstanding: list[Outstanding] = field(default_factory=list)
+    lateness: float = 0.0
+    """The longest that a reply came after its time-out."""
+    settle: float = 0.0
+    """Quiet time after each reply of a device that repeats its replies later."""
+    calm: int = 0
+    last: Expectation | None = None
+    last_time: float = 0.0
+
+
+class Devices:
+    """The records of all devices of one line; changed in the line's loop only.
+
+    `describe` and `state` may be called from any thread: they replace or read single fields.
+    """
+
+    def __init__(self, timing: Timing, *, mistakable: bool) -> None:
+        self._timing = timing
+        self._mistakable = mistakable
+        self._devices: dict[int, Device] = {}
+        self.quiet_until = 0.0
+
+    def __getitem__(self, device: int) -> Device:
+        return self._devices.setdefault(device, Device())
+
+    def describe(self, device: int, limits: Limits) -> None:
+        """Set what a device may be sent."""
+        self[device].limits = limits
+
+    def state(self, device: int) -> DeviceState:
+        """What has been seen of a device."""
+        record = self[device]
+        return DeviceState(
+            record.answers,
+            record.failures,
+            record.silent_since,
+            record.next_try,
+            record.turnaround,
+        )
+
+    def time_out(self, device: int, function: int, priority: Priority) -> float:
+        """Seconds to wait for a reply, from the end of the request to the reply's start."""
+        timing, record = self._timing, self[device]
+        if priority is Priority.BACKGROUND and not record.ever_answered:
+            return min(timing.scan_timeout, timing.first_timeout)
+        recent = record.recent.get(function)
+        if not recent:
+            return timing.first_timeout
+        known = max(timing.min_timeout, MARGIN * max(recent))
+        return min(timing.first_timeout, known * float(2 ** min(record.failures, 8)))
+
+    def backed_off(self, device: int, priority: Priority, now: float) -> float | None:
+        """Seconds until polls of a silent device are sent again, None when they are sent now."""
+        record = self[device]
+        if priority < Priority.POLL or record.next_try is None or now >= record.next_try:
+            return None
+        if priority is Priority.BACKGROUND and not record.ever_answered:
+            return None
+        return record.next_try - now
+
+    def not_before(
+        self, device: int, expectation: Expectation | None, priority: Priority, now: float
+    ) -> float:
+        """When a request may go out at the earliest.
+
+        Held back while an earlier request's reply could be taken for its own, and while the
+        line is left quiet for a late reply. A stop is never held back.
+        """
+        if priority is Priority.STOP:
+            return 0.0
+        expires = [
+            late.expires
+            for late in self._still_outstanding(device, now)
+            if late.expectation == expectation
+        ]
+        return max([self.quiet_until, *expires])
+
+    def doubts(self, device: int, expectation: Expectation, now: float) -> tuple[bool, int]:
+        """Whether a refusal would be surely that of the next request, and how many replies
+        that fit it may come first."""
+        late = self._still_outstanding(device, now)
+        sure = all(each.expectation.function != expectation.function for each in late)
+        # a copy of the very same write proves as much as the answer itself
+        whole = expectation.length == len(expectation.prefix)
+        same = 0 if whole else sum(each.expectation == expectation for each in late)
+        return sure, same
+
+    def _still_outstanding(self, device: int, now: float) -> list[Outstanding]:
+        record = self[device]
+        record.outstanding = [late for late in record.outstanding if late.expires > now]
+        return record.outstanding
+
+    def answered(
+        self, device: int, expectation: Expectation, turnaround: float, now: float
+    ) -> None:
+        """A reply came, or a refusal."""
+        record = self[device]
+        record.answers = record.ever_answered = True
+        record.failures = 0
+        record.silent_since = record.next_try = None
+        recent = record.recent.setdefault(expectation.function, deque(maxlen=RECENT))
+        recent.append(turnaround)
+        record.turnaround = max(recent)
+        record.last, record.last_time = expectation, now
+        record.lateness *= FORGET
+        if record.settle and self._mistakable:
+            record.calm += 1
+            if record.calm > CALM:
+                record.settle = 0.0
+            else:
+                self._expect_late(record, expectation, now, now + record.settle)
+
+    def silent(self, device: int, expectation: Expectation, sent: float, now: float) -> None:
+        """Nothing came in time: leave the device alone for a while, and await a late reply."""
+        record = self[device]
+        record.answers = False
+        record.failures += 1
+        if record.silent_since is None:
+            record.silent_since = now
+        self.may_come(device, expectation, sent, now)
+        rest = pause(record.failures, self._timing.back_off_first, self._timing.back_off_longest)
+        record.next_try = now + rest
+
+    def may_come(self, device: int, expectation: Expectation, sent: float, now: float) -> None:
+        """The reply to a request sent at `sent` has not come, but may yet."""
+        if not self._mistakable:
+            return
+        record = self[device]
+        wait = min(LATE_MARGIN * record.lateness, LONGEST_WAIT)
+        expires = max(sent + self._timing.late_reply, now + wait)
+        self._expect_late(record, expectation, now, expires)
+        if record.lateness:
+            self.quiet_until = now + min(LATE_MARGIN * record.lateness, QUIET_LONGEST)
+
+    @staticmethod
+    def _expect_late(record: Device, expectation: Expectation, due: float, expires: float) -> None:
+        record.outstanding.append(Outstanding(expectation, due, expires))
+
+    def stray(self, piece: Piece, now: float) -> bool:
+        """A whole frame came that was not the awaited one; True if it is a known late reply."""
+        record = self._devices.get(piece.device)
+        if record is None:
+            return False
+        for late in record.outstanding:
+            refused = piece.pdu[0] == late.expectation.function | EXCEPTION
+            if refused or late.expectation.fits(piece.pdu):
+                record.outstanding.remove(late)
+                record.lateness = max(record.lateness, now - late.due)
+                record.answers = record.ever_answered = True
+                return True
+        if record.last is not None and record.last.fits(piece.pdu):
+            # the reply before came twice: from now on wait as long before asking the same again
+            after = min(LATE_MARGIN * (now - record.last_time), self._timing.late_reply)
+            record.settle = max(record.settle, after)
+            record.calm = 0
+            self._expect_late(record, record.last, now, now + record.settle)
+            return True
+        return False

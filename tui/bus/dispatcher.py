@@ -1,0 +1,256 @@
+"""Takes requests from the queue one at a time, sends them, and hands back what became of them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+
+from .devices import Devices
+from .errors import (
+    ChecksumFault,
+    DeviceException,
+    LineClosed,
+    LineError,
+    LineLost,
+    NoAnswer,
+    WrongReply,
+)
+from .jobs import Answer, Job, JobQueue
+from .limits import STANDARD_EXCEPTIONS
+from .master import Clock, Master, Outcome, Sending
+from .model import Priority, Timing
+from .requests import BROADCAST, Read
+from .rtu import Piece
+from .rtu_exchange import Kind
+from .tally import Tally
+
+GATEWAY_EXCEPTIONS = frozenset({10, 11})
+"""Exceptions by which a gateway says that a device behind it did not answer."""
+UNKNOWN_FATE = " Whether it was taken is not known; read the register back before trying again."
+REPEATED_WHEN_SILENT = frozenset({Priority.STOP, Priority.OPERATOR_WRITE, Priority.OPERATOR_READ})
+
+
+class Dispatcher:
+    """Serves one line; lives in its loop."""
+
+    def __init__(
+        self, devices: Devices, tally: Tally, timing: Timing, clock: Clock, *, gateway: bool
+    ) -> None:
+        self._devices = devices
+        self._tally = tally
+        self._timing = timing
+        self._clock = clock
+        self._gateway = gateway
+        self._queue = JobQueue(timing.queue_length)
+        self._wake = asyncio.Event()
+
+    def wake(self) -> None:
+        """Something changed: a request came, a late reply came, or the line was lost."""
+        self._wake.set()
+
+    def submit(self, job: Job) -> None:
+        """Queue a request, or fail it at once when its device is being left alone."""
+        if self._left_alone(job):
+            return
+        try:
+            self._queue.put(job)
+        except LineError as error:
+            job.fail(error)
+        self._wake.set()
+
+    def fail_all(self, reason: str, kind: type[LineError]) -> None:
+        """Fail everything that waits."""
+        for job in self._queue.drain():
+            job.fail(kind(reason))
+
+    def stray(self, piece: Piece, time: float) -> None:
+        """A whole frame came that nobody waited for; it may be what others were held back for."""
+        self._devices.stray(piece, time)
+        self._wake.set()
+
+    async def serve(self, master: Master) -> None:
+        """Send requests until the line is lost. Raises LineLost."""
+        while True:
+            self._wake.clear()
+            pause: float | None = None
+            if master.failure is not None:
+                raise LineLost(str(master.failure))
+            if len(self._queue):
+                # the choice is made after the silence, so that a stop that comes in meanwhile
+                # goes first
+                await master.quiet()
+                now = self._clock()
+                job, ready = self._queue.take(self._not_before, now)
+                if job is not None:
+                    await self._run(master, job)
+                    continue
+                pause = None if ready is None else max(0.0, ready - now)
+            await self._sleep(pause)
+
+    async def _sleep(self, pause: float | None) -> None:
+        try:
+            async with asyncio.timeout(pause):
+                await self._wake.wait()
+        except TimeoutError:
+            return
+
+    def _not_before(self, job: Job) -> float:
+        now = self._clock()
+        if self._devices.backed_off(job.request.device, job.priority, now) is not None:
+            # taken out at once, to be told
+            return 0.0
+        return self._devices.not_before(job.request.device, job.expectation, job.priority, now)
+
+    def _left_alone(self, job: Job) -> bool:
+        """Fail a poll of a silent device that is not asked again yet."""
+        device = job.request.device
+        rest = self._devices.backed_off(device, job.priority, self._clock())
+        if rest is None:
+            return False
+        text = f"Device {device} does not answer."
+        job.fail(NoAnswer(device, job.request.function, job.request.register, text, retry_in=rest))
+        return True
+
+    async def _run(self, master: Master, job: Job) -> None:
+        if self._left_alone(job):
+            return
+        if not job.begun and not job.answer.set_running_or_notify_cancel():
+            return
+        job.begun = True
+        try:
+            outcome = await master.exchange(self._sending(job))
+            if outcome.verdict.kind is Kind.UNSURE:
+                outcome = await self._resolve_echo(master, job, outcome)
+        except LineLost as error:
+            job.fail(LineLost(_with_fate(job, str(error))))
+            raise
+        except asyncio.CancelledError:
+            job.fail(LineClosed(_with_fate(job, "The line was closed during the request.")))
+            raise
+        except BaseException as error:
+            job.fail(LineError(_with_fate(job, f"The request failed: {error!r}.")))
+            raise
+        self._conclude(job, outcome)
+
+    def _sending(self, job: Job) -> Sending:
+        request = job.request
+        if job.expectation is None:
+            return Sending(request.device, request.pdu(), None, 0.0)
+        sure, skip = self._devices.doubts(request.device, job.expectation, self._clock())
+        return Sending(
+            request.device,
+            request.pdu(),
+            job.expectation,
+            self._devices.time_out(request.device, request.function, job.priority),
+            sure,
+            skip,
+        )
+
+    async def _resolve_echo(self, master: Master, job: Job, outcome: Outcome) -> Outcome:
+        """Tell an echo from an answer that repeats its request: see what a read comes back as."""
+        request, verdict = job.request, outcome.verdict
+        if Read.function in job.limits.functions:
+            probe = Read(request.device, request.register, 1)
+            await master.quiet()
+            time_out = self._devices.time_out(request.device, probe.function, job.priority)
+            await master.exchange(
+                Sending(request.device, probe.pdu(), probe.expectation(), time_out)
+            )
+        if master.echo is False:
+            verdict.kind, verdict.pdu = Kind.REPLY, request.pdu()
+        else:
+            verdict.kind = Kind.NOTHING
+            verdict.detail = "only the adapter's echo of it came back"
+        return outcome
+
+    def _conclude(self, job: Job, outcome: Outcome) -> None:
+        """Note what became of a request, and hand it back or send it again."""
+        request, verdict, now = job.request, outcome.verdict, self._clock()
+        if job.expectation is None:
+            self._note_strays(verdict.strays, outcome.end)
+            job.finish(Answer(b"", outcome.sent))
+            return
+        if verdict.kind is Kind.EXCEPTION and self._is_gateways(job, verdict.exception):
+            verdict.kind, verdict.detail = Kind.NOTHING, "the gateway heard nothing of it"
+        if verdict.kind in (Kind.REPLY, Kind.EXCEPTION):
+            self._tally.replies += 1
+            self._devices.answered(request.device, job.expectation, outcome.turnaround, now)
+        unexplained = self._note_strays(verdict.strays, outcome.end)
+        if verdict.kind is Kind.WRONG and verdict.strays and request.device not in unexplained:
+            verdict.kind = Kind.NOTHING
+        match verdict.kind:
+            case Kind.REPLY:
+                job.finish(Answer(verdict.pdu, outcome.end))
+            case Kind.EXCEPTION:
+                self._tally.exceptions += 1
+                job.fail(self._exception(job, verdict.exception))
+            case _:
+                self._failed(job, outcome, now)
+
+    def _failed(self, job: Job, outcome: Outcome, now: float) -> None:
+        request, verdict, expectation = job.request, outcome.verdict, job.expectation
+        assert expectation is not None
+        place = (request.device, request.function, request.register)
+        error: LineError
+        match verdict.kind:
+            case Kind.DAMAGED:
+                self._tally.checksum += 1
+                if not verdict.recognised:
+                    self._devices.may_come(request.device, expectation, outcome.sent, now)
+                error = ChecksumFault(*place, received=verdict.received)
+            case Kind.WRONG:
+                self._tally.wrong += 1
+                self._devices.may_come(request.device, expectation, outcome.sent, now)
+                error = WrongReply(*place, verdict.detail, verdict.received)
+            case _:
+                self._tally.timeouts += 1
+                self._devices.silent(request.device, expectation, outcome.sent, now)
+                error = NoAnswer(*place, self._no_answer(job, verdict.detail))
+        if self._is_repeated(job, verdict.kind):
+            job.repeats += 1
+            self._queue.put_back(job)
+            self._wake.set()
+        else:
+            job.fail(error)
+
+    def _is_repeated(self, job: Job, kind: Kind) -> bool:
+        """Whether a request is sent again: never one that changes anything."""
+        if job.request.changes or job.repeats >= self._timing.retries:
+            return False
+        if kind is Kind.DAMAGED:
+            return job.priority is not Priority.BACKGROUND
+        known = self._devices[job.request.device].ever_answered
+        return kind is Kind.NOTHING and known and job.priority in REPEATED_WHEN_SILENT
+
+    def _note_strays(self, strays: Iterable[Piece], time: float) -> set[int]:
+        """Pass on frames that came beside the reply; returns the devices of unexplained ones."""
+        unexplained = set()
+        for piece in strays:
+            self._tally.stale += 1
+            if not self._devices.stray(piece, time):
+                unexplained.add(piece.device)
+        return unexplained
+
+    def _is_gateways(self, job: Job, code: int) -> bool:
+        meanings = job.limits.exceptions
+        own = code in meanings and meanings is not STANDARD_EXCEPTIONS
+        return self._gateway and code in GATEWAY_EXCEPTIONS and not own
+
+    def _exception(self, job: Job, code: int) -> DeviceException:
+        request = job.request
+        meaning = job.limits.exceptions.get(code) or STANDARD_EXCEPTIONS.get(code, "")
+        return DeviceException(request.device, request.function, request.register, code, meaning)
+
+    def _no_answer(self, job: Job, detail: str) -> str:
+        request = job.request
+        what = f"function {request.function}"
+        if request.register:
+            what += f", register {request.register}"
+        text = f"Device {request.device} did not answer ({what})"
+        return _with_fate(job, f"{text}: {detail}." if detail else f"{text}.")
+
+
+def _with_fate(job: Job, text: str) -> str:
+    """Add to an error of a write that it may have been taken nevertheless."""
+    unknown = job.request.changes and job.request.device != BROADCAST
+    return text + UNKNOWN_FATE if unknown else text

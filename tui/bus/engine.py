@@ -1,0 +1,191 @@
+"""The thread and the loop of a line, and the ways into it from other threads."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections.abc import Callable
+
+from .connection import Connection
+from .devices import Devices
+from .dispatcher import Dispatcher
+from .errors import LineClosed, LineError, LineLost, PortBusy, PortMissing, PortRefused
+from .jobs import Job
+from .link import Link, TcpLink, label
+from .master import Clock, Surroundings
+from .model import LineState, LineStatus, Timing
+from .tally import Tally
+from .trace import Trace
+from .worker import Work, Worker
+
+log = logging.getLogger(__name__)
+
+WORKERS_END = 2.0
+"""Seconds that cancelled workers have to end when the line is closed."""
+HOPELESS = (PortBusy, PortMissing, PortRefused)
+"""Failures that waiting does not mend."""
+
+
+class Engine:
+    """Runs one line. `_lock` guards the phase, so that nothing enters a loop that has ended."""
+
+    def __init__(self, link: Link, timing: Timing, clock: Clock) -> None:
+        self.trace = Trace(timing.trace_length)
+        self.tally = Tally()
+        self.devices = Devices(timing, mistakable=not isinstance(link, TcpLink))
+        self.state = LineState(LineStatus.CLOSED, "", clock())
+        self._link = link
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._news = threading.Condition()
+        self._error: LineError | None = None
+        self._listeners: list[Callable[[LineState], None]] = []
+        self._thread: threading.Thread | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self._accepting = False
+        self._closed = False
+        self._main: asyncio.Task[None] | None = None
+        self._workers: set[asyncio.Task[object]] = set()
+        self._dispatcher = Dispatcher(
+            self.devices, self.tally, timing, clock, gateway=isinstance(link, TcpLink)
+        )
+        around = Surroundings(timing, self.trace, self.tally, clock, self._dispatcher.stray)
+        self._connection = Connection(link, around, self._dispatcher, self._changed)
+
+    def start(self, wait: float | None) -> None:
+        """Start the thread; see Line.open."""
+        with self._lock:
+            if self._closed:
+                raise LineClosed
+            if self._thread is None:
+                self._loop = asyncio.new_event_loop()
+                self._accepting = True
+                self._thread = threading.Thread(
+                    target=self._work, args=(self._loop,), name=label(self._link), daemon=True
+                )
+                self._thread.start()
+        if wait is not None:
+            self._await_connection(wait)
+
+    def _await_connection(self, wait: float) -> None:
+        with self._news:
+            self._news.wait_for(self._is_decided, wait)
+            if self.state.status is LineStatus.CONNECTED:
+                return
+            error = self._error
+        self.close()
+        raise error or LineLost(f"{label(self._link)} was not connected within {wait:g} s.")
+
+    def _is_decided(self) -> bool:
+        connected = self.state.status is LineStatus.CONNECTED
+        return connected or self._closed or isinstance(self._error, HOPELESS)
+
+    def close(self) -> None:
+        """End the loop and its thread; see Line.close."""
+        with self._lock:
+            self._closed = True
+            if self._accepting and self._loop is not None:
+                self._accepting = False
+                self._loop.call_soon_threadsafe(self._stop)
+            thread = self._thread
+        with self._news:
+            self._news.notify_all()
+        if thread is not None and thread is not threading.current_thread():
+            thread.join()
+
+    def _stop(self) -> None:
+        if self._main is not None:
+            self._main.cancel()
+
+    def submit(self, job: Job) -> None:
+        """Hand a job to the loop. Raises LineClosed."""
+        with self._lock:
+            if not self._accepting or self._loop is None:
+                raise LineClosed
+            self._loop.call_soon_threadsafe(self._take, job)
+
+    def _take(self, job: Job) -> None:
+        if self._closed:
+            job.fail(LineClosed())
+        elif self._connection.refusal is not None:
+            job.fail(LineLost(str(self._connection.refusal)))
+        else:
+            self._dispatcher.submit(job)
+
+    def spawn(self, work: Work, name: str) -> Worker:
+        """Start a worker in the loop. Raises LineClosed."""
+        with self._lock:
+            if not self._accepting or self._loop is None:
+                raise LineClosed
+            worker = Worker(work, name, self._loop)
+            self._loop.call_soon_threadsafe(self._begin, worker)
+        return worker
+
+    def _begin(self, worker: Worker) -> None:
+        if self._closed:
+            worker.abandon()
+            return
+        task = worker.start()
+        if task is not None:
+            self._workers.add(task)
+            task.add_done_callback(self._workers.discard)
+
+    def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
+        """Add a listener; returns how to take it away."""
+        with self._news:
+            self._listeners.append(listener)
+
+        def unsubscribe() -> None:
+            with self._news:
+                if listener in self._listeners:
+                    self._listeners.remove(listener)
+
+        return unsubscribe
+
+    def _changed(self, state: LineState, error: LineError | None = None) -> None:
+        with self._news:
+            self.state = state
+            self._error = error
+            listeners = list(self._listeners)
+            self._news.notify_all()
+        for listener in listeners:
+            try:
+                listener(state)
+            except Exception:
+                # a listener's fault is not the line's
+                log.exception("a listener of the line's state failed")
+
+    def _work(self, loop: asyncio.AbstractEventLoop) -> None:
+        """The thread: run the loop until closed, then leave nothing behind."""
+        asyncio.set_event_loop(loop)
+        try:
+            self._main = loop.create_task(self._connection.run())
+            loop.run_until_complete(self._main)
+        except asyncio.CancelledError:
+            pass
+        finally:
+            with self._lock:
+                self._accepting = False
+                self._closed = True
+            loop.run_until_complete(self._end())
+            loop.close()
+            asyncio.set_event_loop(None)
+            self._changed(LineState(LineStatus.CLOSED, "", self._clock()))
+
+    async def _end(self) -> None:
+        """Fail what waits, end the workers."""
+        # what other threads handed over before the line was closed is taken first
+        await asyncio.sleep(0)
+        self._dispatcher.fail_all("The line is closed.", LineClosed)
+        workers = set(self._workers)
+        for task in workers:
+            task.cancel()
+        if workers:
+            await asyncio.wait(workers, timeout=WORKERS_END)
+        rest = asyncio.all_tasks() - {asyncio.current_task()}
+        for task in rest:
+            task.cancel()
+        if rest:
+            await asyncio.wait(rest, timeout=WORKERS_END)
+        await asyncio.get_running_loop().shutdown_asyncgens()

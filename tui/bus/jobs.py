@@ -1,0 +1,103 @@
+"""Requests that wait for the line, and the order in which they go out."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+
+from .errors import LineBusy, LineError
+from .expectation import Expectation
+from .limits import Limits
+from .model import Priority
+from .requests import BROADCAST, Request
+
+
+@dataclass(frozen=True, slots=True)
+class Answer:
+    """A checked reply without device and checksum; `time` when its last byte was there."""
+
+    pdu: bytes
+    time: float
+
+
+@dataclass(eq=False, slots=True)
+class Job:
+    """One request with everything needed to send it and to hand back its answer."""
+
+    request: Request
+    priority: Priority
+    limits: Limits
+    answer: Future[Answer] = field(default_factory=Future)
+    repeats: int = 0
+    """How often it has been sent again."""
+    begun: bool = False
+    """Whether it was taken from the queue once, so that it cannot be withdrawn any more."""
+    expectation: Expectation | None = None
+    order: int = 0
+    """Place among the jobs of its priority; kept when it is sent again."""
+
+    def __post_init__(self) -> None:
+        if self.request.device != BROADCAST:
+            self.expectation = self.request.expectation()
+
+    def fail(self, error: LineError) -> None:
+        """Hand back an error, unless the one who asked has gone."""
+        if self.begun or self.answer.set_running_or_notify_cancel():
+            self.begun = True
+            self.answer.set_exception(error)
+
+    def finish(self, answer: Answer) -> None:
+        """Hand back the answer."""
+        self.answer.set_result(answer)
+
+
+class JobQueue:
+    """Bounded queue: by priority, then first come first served, skipping what must wait yet."""
+
+    def __init__(self, length: int) -> None:
+        self._length = length
+        self._orders = itertools.count()
+        self._jobs: list[Job] = []
+
+    def __len__(self) -> int:
+        return len(self._jobs)
+
+    def put(self, job: Job) -> None:
+        """Queue a job. Raises LineBusy when the queue is full.
+
+        A stop always finds room; polls and background work leave half of it to the operator.
+        """
+        room = self._length if job.priority < Priority.POLL else self._length // 2
+        if job.priority is not Priority.STOP and len(self._jobs) >= room:
+            raise LineBusy(f"{len(self._jobs)} requests wait for the line already; try again.")
+        job.order = next(self._orders)
+        self._jobs.append(job)
+
+    def put_back(self, job: Job) -> None:
+        """Queue a job that is sent again, at its old place."""
+        self._jobs.append(job)
+
+    def take(
+        self, not_before: Callable[[Job], float], now: float
+    ) -> tuple[Job | None, float | None]:
+        """The job that goes out now, or when one may; both None when nothing waits."""
+        earliest: float | None = None
+        self._jobs = [job for job in self._jobs if not self._withdrawn(job)]
+        for job in sorted(self._jobs, key=lambda job: (job.priority, job.order)):
+            ready = not_before(job)
+            if ready <= now:
+                self._jobs.remove(job)
+                return job, None
+            earliest = ready if earliest is None else min(earliest, ready)
+        return None, earliest
+
+    @staticmethod
+    def _withdrawn(job: Job) -> bool:
+        return not job.begun and job.answer.cancelled()
+
+    def drain(self) -> list[Job]:
+        """Take out everything that waits."""
+        jobs, self._jobs = self._jobs, []
+        return jobs

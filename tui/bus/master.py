@@ -1,0 +1,79 @@
+"""What sends a request and waits for its reply, whatever the line is made of."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+from .errors import LineLost
+from .expectation import Expectation
+from .model import Timing
+from .rtu import Piece
+from .rtu_exchange import Verdict
+from .tally import Tally
+from .trace import Trace
+
+Clock = Callable[[], float]
+
+
+@dataclass(frozen=True, slots=True)
+class Sending:
+    """One request on its way: what it is and what counts as its answer.
+
+    `expectation` None is a broadcast. See RtuExchange for `sure` and `skip`.
+    """
+
+    device: int
+    pdu: bytes
+    expectation: Expectation | None
+    time_out: float
+    sure: bool = True
+    skip: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """How a request ended; `sent` when its last byte left, `end` when the last byte came."""
+
+    verdict: Verdict
+    sent: float
+    end: float
+    turnaround: float = 0.0
+
+
+@dataclass(slots=True)
+class Surroundings:
+    """What a master notes its doings in."""
+
+    timing: Timing
+    trace: Trace
+    tally: Tally
+    clock: Clock
+    stray: Callable[[Piece, float], None]
+    """Told of every whole frame that came when none was due."""
+
+
+class Master(Protocol):
+    """One opened line, one request at a time."""
+
+    echo: bool | None
+    """Whether the adapter repeats what is sent, None while not known."""
+    failure: LineLost | None
+    """Why the line cannot be used any more."""
+
+    async def quiet(self) -> None:
+        """Wait until the next request may be sent. Raises LineLost."""
+
+    async def exchange(self, sending: Sending) -> Outcome:
+        """Send a request and await its end. Raises LineLost."""
+
+    def close(self) -> None:
+        """Give the line back."""
+
+
+def settle(future: asyncio.Future[Verdict] | None, verdict: Verdict) -> None:
+    """Give a verdict to whoever waits for it."""
+    if future is not None and not future.done():
+        future.set_result(verdict)

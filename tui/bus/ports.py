@@ -1,0 +1,204 @@
+"""Serial ports of this machine: which there are, who holds one, and opening one for Modbus."""
+
+from __future__ import annotations
+
+import errno
+import os
+import re
+import stat
+import sys
+from contextlib import suppress
+from dataclasses import dataclass
+
+import serial
+from serial.tools import list_ports as system_ports
+
+from .errors import PortBusy, PortMissing, PortRefused
+
+BUSY = frozenset({errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK})
+MISSING = frozenset({errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR})
+DENIED = frozenset({errno.EACCES, errno.EPERM})
+PSEUDO_TERMINALS = range(136, 144)
+"""Major device numbers of the slave sides of pseudo-terminals on Linux."""
+
+
+@dataclass(frozen=True, slots=True)
+class PortInfo:
+    """A serial port that a person may choose."""
+
+    path: str
+    description: str
+    hardware_id: str
+
+
+def list_ports() -> list[PortInfo]:
+    """The serial ports of this machine, in the order of their names."""
+    ports = (
+        PortInfo(
+            port.device,
+            "" if port.description in (None, "n/a") else port.description,
+            "" if port.hwid in (None, "n/a") else port.hwid,
+        )
+        for port in system_ports.comports()
+    )
+    return sorted(ports, key=lambda port: _by_number(port.path))
+
+
+def _by_number(path: str) -> list[tuple[int, str]]:
+    """A key that puts ttyUSB2 before ttyUSB10."""
+    return [
+        (int(part), "") if part.isdecimal() else (-1, part) for part in re.split(r"(\d+)", path)
+    ]
+
+
+def is_pseudo_terminal(path: str) -> bool:
+    """Whether a path is the slave side of a pseudo-terminal, which has no parity."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return False
+    if not stat.S_ISCHR(found.st_mode):
+        return False
+    if sys.platform.startswith("linux"):
+        return os.major(found.st_rdev) in PSEUDO_TERMINALS
+    return re.fullmatch(r"/dev/(ttys\d+|pts/\d+|tty[p-w]\w)", os.path.realpath(path)) is not None
+
+
+def holder(path: str) -> str | None:
+    """Name and process id of the program that holds a port, None where the system does not tell.
+
+    Linux only: the owner of the lock on the port, else another process that has it open.
+    """
+    try:
+        found = os.stat(path)
+        pids = _lock_owners(found) or _openers(os.path.realpath(path))
+    except (OSError, ValueError):
+        return None
+    others = [pid for pid in pids if pid != os.getpid()]
+    names = [f"{_name(pid)} (pid {pid})" for pid in others or pids]
+    return ", ".join(names) or None
+
+
+def _lock_owners(port: os.stat_result) -> list[int]:
+    """Processes with a lock on the port, from /proc/locks."""
+    wanted = f"{os.major(port.st_dev):02x}:{os.minor(port.st_dev):02x}:{port.st_ino}"
+    owners = []
+    with suppress(OSError), open("/proc/locks", encoding="ascii") as locks:
+        for line in locks:
+            fields = line.split()
+            if wanted in fields and "->" not in fields:
+                owners.append(int(fields[fields.index(wanted) - 1]))
+    return [pid for pid in owners if pid > 0]
+
+
+def _openers(path: str) -> list[int]:
+    """Processes that have the port open, as far as the system lets this user see."""
+    with suppress(OSError):
+        processes = [entry for entry in os.scandir("/proc") if entry.name.isdecimal()]
+        return [int(entry.name) for entry in processes if _has_open(entry.path, path)]
+    return []
+
+
+def _has_open(process: str, path: str) -> bool:
+    with suppress(OSError):
+        for descriptor in os.scandir(f"{process}/fd"):
+            with suppress(OSError):
+                if os.readlink(descriptor.path) == path:
+                    return True
+    return False
+
+
+def _name(pid: int) -> str:
+    """What a process is called; of a Python program the name of its script."""
+    try:
+        with open(f"/proc/{pid}/comm", encoding="utf-8", errors="replace") as file:
+            name = file.read().strip()
+        if not name.startswith("python"):
+            return name
+        with open(f"/proc/{pid}/cmdline", encoding="utf-8", errors="replace") as file:
+            arguments = file.read().split("\0")
+    except OSError:
+        return "a program"
+    scripts = [part for part in arguments[1:] if part and not part.startswith("-")]
+    return os.path.basename(scripts[0]) if scripts else name
+
+
+def other_openers(path: str) -> str:
+    """Programs that have the port open beside this one, empty when none is seen."""
+    pids = [pid for pid in _openers(os.path.realpath(path)) if pid != os.getpid()]
+    return ", ".join(f"{_name(pid)} (pid {pid})" for pid in pids)
+
+
+def open_serial(path: str, baud: int, format: str) -> serial.Serial:
+    """Open a port for this program alone, raw, with the format of the line.
+
+    A pseudo-terminal has no parity and is opened without: the returned port says so in its
+    `parity`. Raises PortBusy, PortMissing, PortRefused.
+    """
+    if is_pseudo_terminal(path):
+        # the C library refuses parity here, or drops it without a word
+        return _open(path, baud, f"8N{format[2]}")
+    port = _open(path, baud, format)
+    if not _has_parity(port):
+        port.close()
+        raise PortRefused(path, f"it does not take parity {format[1]}.")
+    return port
+
+
+def _has_parity(port: serial.Serial) -> bool:
+    """Whether a port took the parity it was asked for; a refusal can be silent on POSIX."""
+    if port.parity == serial.PARITY_NONE or sys.platform == "win32":
+        return True
+    import termios
+
+    return bool(termios.tcgetattr(port.fileno())[2] & termios.PARENB)
+
+
+def _open(path: str, baud: int, format_: str) -> serial.Serial:
+    # an inter-byte time-out of 0 makes a read of nothing fail on POSIX instead of looking
+    # like the end of the port
+    posix = os.name == "posix"
+    try:
+        port = serial.Serial(
+            path,
+            baud,
+            bytesize=int(format_[0]),
+            parity=format_[1],
+            stopbits=int(format_[2]),
+            timeout=0,
+            inter_byte_timeout=0 if posix else None,
+            exclusive=True,
+        )
+    except (OSError, ValueError) as error:
+        raise _port_error(path, baud, format_, error) from error
+    except Exception as error:
+        # termios.error is neither an OSError nor there on every system
+        if type(error).__name__ != "error":
+            raise
+        raise _port_error(path, baud, format_, error) from error
+    # USB adapters collect bytes for 16 ms unless told not to; not every driver knows that
+    with suppress(OSError, ValueError, NotImplementedError, AttributeError):
+        port.set_low_latency_mode(True)
+    return port
+
+
+def _port_error(
+    path: str, baud: int, format_: str, error: Exception
+) -> PortBusy | PortMissing | PortRefused:
+    number = getattr(error, "errno", None)
+    text = str(error)
+    if number in BUSY:
+        return PortBusy(path, holder(path))
+    if number in MISSING or (os.name == "nt" and "FileNotFoundError" in text):
+        return PortMissing(path, [port.path for port in list_ports()])
+    if os.name == "nt" and "PermissionError" in text:
+        return PortBusy(path)
+    if number in DENIED:
+        return PortRefused(
+            path,
+            "this user may not use it. Add the user to the group of the port (often dialout) "
+            "and log in again.",
+        )
+    if number is None or number == errno.EINVAL:
+        return PortRefused(path, f"it does not take {baud} baud {format_}.")
+    return PortRefused(path, f"{os.strerror(number)}.")

@@ -1,0 +1,126 @@
+"""Frames of Modbus RTU inside whatever bytes a line delivers: pure functions, no clock."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from pymodbus.framer.rtu import FramerRTU
+
+from .expectation import EXCEPTION, Expectation, exception_code, exception_extents
+
+MIN_FRAME = 4
+MAX_FRAME = 256
+_TABLE = tuple(FramerRTU.crc16_table)
+
+
+def frame(device: int, pdu: bytes) -> bytes:
+    """The frame of a request or reply: device, function and data, checksum."""
+    body = bytes([device]) + pdu
+    return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
+
+
+def is_whole(data: bytes | bytearray) -> bool:
+    """Whether the bytes end with the checksum of the others."""
+    return len(data) >= MIN_FRAME and FramerRTU.check_CRC(
+        bytes(data[:-2]), int.from_bytes(data[-2:], "big")
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Match:
+    """The awaited reply inside received bytes, from `start` to `end`."""
+
+    start: int
+    end: int
+    pdu: bytes
+    exception: int | None = None
+
+
+def find_reply(
+    data: bytes | bytearray,
+    device: int,
+    expectation: Expectation,
+    *,
+    start: int = 0,
+    exceptions: bool = True,
+) -> Match | None:
+    """The first reply from `start` on that is the awaited one, checksum included.
+
+    With `exceptions` a refusal of the awaited function counts as well.
+    """
+    at = data.find(device, start)
+    while at >= 0:
+        for match in _candidates(data, at, expectation, exceptions):
+            if is_whole(data[match.start : match.end]):
+                return match
+        at = data.find(device, at + 1)
+    return None
+
+
+def _candidates(
+    data: bytes | bytearray, at: int, expectation: Expectation, exceptions: bool
+) -> Iterator[Match]:
+    extent = expectation.extent(data, at + 1)
+    if extent and at + extent + 3 <= len(data):
+        yield Match(at, at + extent + 3, bytes(data[at + 1 : at + 1 + extent]))
+    function = expectation.function
+    if not exceptions or data[at + 1 : at + 2] != bytes([function | EXCEPTION]):
+        return
+    for length in exception_extents(function):
+        pdu = bytes(data[at + 1 : at + 1 + length])
+        code = exception_code(function, pdu)
+        if code is not None and at + length + 3 <= len(data):
+            yield Match(at, at + length + 3, pdu, code)
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of received bytes: a whole frame of anybody, or bytes that form none."""
+
+    data: bytes
+    whole: bool
+
+    @property
+    def device(self) -> int:
+        """The device of a whole frame."""
+        return self.data[0]
+
+    @property
+    def pdu(self) -> bytes:
+        """Function and data of a whole frame."""
+        return self.data[1:-2]
+
+
+def pieces(data: bytes | bytearray) -> list[Piece]:
+    """Received bytes taken apart into whole frames and what lies between them."""
+    found: list[Piece] = []
+    loose = at = 0
+    while at < len(data):
+        end = _frame_end(data, at)
+        if end is None:
+            at += 1
+            continue
+        if at > loose:
+            found.append(Piece(bytes(data[loose:at]), whole=False))
+        found.append(Piece(bytes(data[at:end]), whole=True))
+        loose = at = end
+    if len(data) > loose:
+        found.append(Piece(bytes(data[loose:]), whole=False))
+    return found
+
+
+def _frame_end(data: bytes | bytearray, start: int) -> int | None:
+    """End of the shortest frame that begins at `start`: the checksum over all of it is zero."""
+    crc = 0xFFFF
+    for at in range(start, min(len(data), start + MAX_FRAME)):
+        crc = (crc >> 8) ^ _TABLE[(crc ^ data[at]) & 0xFF]
+        if crc == 0 and at - start + 1 >= MIN_FRAME:
+            return at + 1
+    return None
+
+
+def begins_reply(data: bytes, device: int, function: int) -> bool:
+    """Whether a reply of the device to the function seems to begin somewhere in the bytes."""
+    heads = (bytes([device, function]), bytes([device, function | EXCEPTION]))
+    return any(head in data for head in heads)

@@ -1,0 +1,195 @@
+"""One RTU request and the bytes that come back for it: what they are, and when that is sure.
+
+Knows no clock and no port: fed with bytes, told of silence and of the time-out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+from .expectation import Expectation
+from .rtu import Match, Piece, begins_reply, find_reply, pieces
+
+NOISE = 4
+"""Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""
+
+
+class Kind(Enum):
+    """How an exchange ended."""
+
+    REPLY = "reply"
+    EXCEPTION = "exception"
+    DAMAGED = "damaged"
+    WRONG = "wrong"
+    NOTHING = "nothing"
+    UNSURE = "unsure"
+    """One copy of the request came back: its answer, or the adapter's echo."""
+
+
+@dataclass(slots=True)
+class Verdict:
+    """The end of an exchange, with everything that was received."""
+
+    kind: Kind
+    pdu: bytes = b""
+    exception: int = 0
+    detail: str = ""
+    received: bytes = b""
+    strays: list[Piece] = field(default_factory=list)
+    """Whole frames that are neither the reply nor an echo."""
+    resynchronised: bool = False
+    """Whether the reply was found behind or between other bytes."""
+    recognised: bool = False
+    """Of damaged bytes: whether they are surely what is left of the reply."""
+
+
+class RtuExchange:
+    """The awaited reply of one request on a line that may echo, stutter and mix up replies.
+
+    `echo` is whether the adapter repeats what is sent, None while not known; it is learnt on
+    the way. `expectation` None is a broadcast. The first `skip` fitting replies are those of
+    earlier requests. Without `exceptions` a refusal is taken for an earlier request's.
+    """
+
+    def __init__(
+        self,
+        frame: bytes,
+        expectation: Expectation | None,
+        *,
+        echo: bool | None = None,
+        exceptions: bool = True,
+        skip: int = 0,
+    ) -> None:
+        self.frame = frame
+        self.echo = echo
+        self.buffer = bytearray()
+        self._expectation = expectation
+        self._device = frame[0]
+        self._exceptions = exceptions
+        self._skip = skip
+        self._skipped_to = 0
+        # a reply that repeats the request looks like an echo
+        self._mirrored = expectation is not None and expectation.fits(frame[1:-2])
+
+    @property
+    def expected(self) -> bool:
+        """Whether a reply is due at all."""
+        return self._expectation is not None
+
+    def feed(self, data: bytes) -> Verdict | None:
+        """Take received bytes; the verdict once the reply is whole."""
+        self.buffer += data
+        if self._expectation is None:
+            return None
+        while match := self._find(self._expectation):
+            if self._skip and match.exception is None:
+                self._skip -= 1
+                self._skipped_to = match.end
+                continue
+            return self._answered(match)
+        return None
+
+    def _find(self, expectation: Expectation) -> Match | None:
+        start = max(self._after_echo(), self._skipped_to)
+        return find_reply(
+            self.buffer, self._device, expectation, start=start, exceptions=self._exceptions
+        )
+
+    def _after_echo(self) -> int:
+        """Where a reply may begin: behind the echo of the request, if there is one."""
+        if self._mirrored and self.echo is False:
+            return 0
+        copy = self.buffer.find(self.frame)
+        return 0 if copy < 0 else copy + len(self.frame)
+
+    def _answered(self, match: Match) -> Verdict:
+        before = self._after_echo()
+        if not self._mirrored:
+            if before:
+                self.echo = True
+            elif match.start == 0:
+                self.echo = False
+        loose = self._loose(match)
+        return Verdict(
+            Kind.REPLY if match.exception is None else Kind.EXCEPTION,
+            pdu=match.pdu,
+            exception=match.exception or 0,
+            received=bytes(self.buffer),
+            strays=[piece for piece in loose if piece.whole],
+            resynchronised=bool(loose),
+        )
+
+    def _loose(self, match: Match | None = None) -> list[Piece]:
+        """What was received beside the reply and the echo."""
+        rest = bytearray(self.buffer)
+        parts = []
+        if match is not None:
+            parts.append(rest[match.end :])
+            del rest[match.start :]
+        copy = rest.find(self.frame)
+        if copy >= 0:
+            parts.append(rest[:copy])
+            del rest[: copy + len(self.frame)]
+        parts.append(rest)
+        return [piece for part in parts for piece in pieces(part)]
+
+    def silent(self) -> Verdict | None:
+        """The line has been silent for longer than a pause inside a frame; maybe all is clear.
+
+        What is left of the reply ends the exchange; noise, or another device's frame, does not:
+        the reply may follow.
+        """
+        if self._expectation is None:
+            return None
+        loose = self._loose()
+        for piece in loose:
+            if piece.whole or self._begun_echo(piece.data):
+                continue
+            if self._is_remnant(piece.data, self._expectation):
+                return Verdict(
+                    Kind.DAMAGED,
+                    received=bytes(self.buffer),
+                    strays=[stray for stray in loose if stray.whole],
+                    recognised=True,
+                )
+        return None
+
+    def _is_remnant(self, data: bytes, expectation: Expectation) -> bool:
+        """Whether damaged bytes are what came of the reply: by its head, or by its length."""
+        if expectation.length is not None and len(data) == expectation.length + 3:
+            return True
+        return begins_reply(data, self._device, expectation.function) or expectation.prefix in data
+
+    def _begun_echo(self, data: bytes) -> bool:
+        return self.echo is not False and self.frame.startswith(data)
+
+    def expired(self) -> Verdict:
+        """The time is up."""
+        copied = self.frame in self.buffer
+        if not self._mirrored:
+            if copied:
+                self.echo = True
+            elif not self.buffer:
+                self.echo = False
+        elif not self.buffer:
+            self.echo = False
+        loose = self._loose()
+        verdict = Verdict(
+            Kind.NOTHING,
+            received=bytes(self.buffer),
+            strays=[piece for piece in loose if piece.whole],
+        )
+        if self._expectation is None:
+            return verdict
+        own = [piece for piece in verdict.strays if piece.device == self._device]
+        if own:
+            verdict.kind = Kind.WRONG
+            verdict.detail = self._expectation.mismatch(own[0].pdu)
+        elif any(not piece.whole and len(piece.data) >= NOISE for piece in loose):
+            verdict.kind = Kind.DAMAGED
+        elif self._mirrored and copied and self.echo is None:
+            verdict.kind = Kind.UNSURE
+        elif self._mirrored and copied:
+            verdict.detail = "only the adapter's echo of it came back"
+        return verdict

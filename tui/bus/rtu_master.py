@@ -1,0 +1,197 @@
+"""Modbus RTU over a port or a device server: silence, sending, and the bytes that come back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from .errors import LineLost
+from .link import Link, RtuTcpLink, character_time, silence
+from .master import Outcome, Sending, Surroundings, settle
+from .rtu import MAX_FRAME, frame, pieces
+from .rtu_exchange import Kind, RtuExchange, Verdict
+from .transport import Transport
+
+BABBLE = 1.0
+"""Seconds to wait for silence on a line that never falls silent, before sending all the same."""
+IDLE_LIMIT = 4096
+"""Bytes kept of what comes in while nothing is due."""
+
+
+class RtuMaster:
+    """One opened RTU line. `ended` is called once when the line is lost."""
+
+    def __init__(
+        self,
+        transport: Transport,
+        link: Link,
+        around: Surroundings,
+        ended: Callable[[], None],
+    ) -> None:
+        self.echo: bool | None = None
+        self.failure: LineLost | None = None
+        self._transport = transport
+        self._around = around
+        self._ended = ended
+        self._character = character_time(link)
+        self._silence = silence(link)
+        timing = around.timing
+        floor = timing.frame_gap_tcp if isinstance(link, RtuTcpLink) else timing.frame_gap
+        self._gap = max(self._silence, floor)
+        # what was said on the line before it was opened is not known
+        self._last = around.clock()
+        self._hold = 0.0
+        self._exchange: RtuExchange | None = None
+        self._done: asyncio.Future[Verdict] | None = None
+        self._timer: asyncio.TimerHandle | None = None
+        self._sent = 0.0
+        self._idle = bytearray()
+        transport.start(self)
+
+    def close(self) -> None:
+        """Give the port back."""
+        self._stop_timer()
+        self._transport.close()
+
+    def received(self, data: bytes, time: float) -> None:
+        """Bytes came in: part of the awaited reply, or of nothing that is due."""
+        self._last = time
+        self._around.tally.bytes_in += len(data)
+        if self._exchange is None:
+            self._idle += data
+            del self._idle[:-IDLE_LIMIT]
+            self._start_timer(self._gap, self._sort_idle)
+            return
+        verdict = self._exchange.feed(data)
+        if verdict is not None:
+            settle(self._done, verdict)
+        elif self._exchange.expected:
+            # the echo of a long request may come in lumps while it is still being sent
+            self._start_timer(max(time, self._sent) + self._gap - time, self._fell_silent)
+
+    def lost(self, reason: str) -> None:
+        """The port went away: whoever waits is told at once."""
+        self._stop_timer()
+        self.failure = LineLost(f"The line was lost: {reason}.")
+        settle(self._done, Verdict(Kind.NOTHING))
+        self._ended()
+
+    async def quiet(self) -> None:
+        """Wait until the line has been silent long enough for the next request."""
+        clock = self._around.clock
+        give_up = clock() + BABBLE + max(0.0, self._hold - clock())
+        while self.failure is None:
+            now = clock()
+            until = max(self._last + self._silence, self._hold)
+            if now >= until or now >= give_up:
+                break
+            await self._transport.rest(min(until, give_up))
+        if self.failure is not None:
+            raise self.failure
+        self._sort_idle()
+
+    async def exchange(self, sending: Sending) -> Outcome:
+        """Send a request and await its reply, its remains, or the end of its time."""
+        clock, tally = self._around.clock, self._around.tally
+        data = frame(sending.device, sending.pdu)
+        exchange = RtuExchange(
+            data, sending.expectation, echo=self.echo, exceptions=sending.sure, skip=sending.skip
+        )
+        self._done = asyncio.get_running_loop().create_future()
+        self._exchange = exchange
+        begun = clock()
+        self._sent = self._last = begun + len(data) * self._character
+        try:
+            await self._send(data)
+            tally.requests += 1
+            tally.bytes_out += len(data)
+            self._around.trace.add(begun, "out", data)
+            verdict = await self._verdict(exchange, sending)
+        finally:
+            self._exchange = self._done = None
+            self._stop_timer()
+        self.echo = exchange.echo
+        end = clock() if verdict.kind is Kind.NOTHING else self._last
+        tally.busy_seconds += clock() - begun
+        tally.resyncs += verdict.resynchronised
+        self._log(verdict, data, sending.device, end)
+        reply = (len(verdict.pdu) + 3) * self._character
+        return Outcome(verdict, self._sent, end, max(0.0, end - self._sent - reply))
+
+    async def _send(self, data: bytes) -> None:
+        try:
+            await self._transport.send(data)
+        except OSError as error:
+            self._transport.close()
+            if self.failure is None:
+                self.lost(str(error.strerror or error))
+            raise self.failure or LineLost("The line was lost.") from error
+
+    async def _verdict(self, exchange: RtuExchange, sending: Sending) -> Verdict:
+        """Wait for the verdict; while bytes are coming in, a little over the time-out."""
+        assert self._done is not None
+        clock, expectation = self._around.clock, sending.expectation
+        if expectation is None:
+            self._hold = deadline = self._sent + self._around.timing.turnaround_delay
+            latest = deadline
+        else:
+            length = MAX_FRAME if expectation.length is None else expectation.length + 3
+            deadline = self._sent + sending.time_out
+            latest = deadline + length * self._character + self._gap
+        while True:
+            now = clock()
+            until = min(max(deadline, self._last + self._gap), latest)
+            if now >= until:
+                return exchange.expired()
+            await asyncio.wait((self._done,), timeout=until - now)
+            if self.failure is not None:
+                raise self.failure
+            if self._done.done():
+                return self._done.result()
+
+    def _fell_silent(self) -> None:
+        self._timer = None
+        if self._exchange is not None:
+            verdict = self._exchange.silent()
+            if verdict is not None:
+                settle(self._done, verdict)
+
+    def _sort_idle(self) -> None:
+        """Look at what came in while nothing was due."""
+        if not self._idle:
+            return
+        self._stop_timer()
+        data, self._idle = bytes(self._idle), bytearray()
+        for piece in pieces(data):
+            note = f"late or repeated, device {piece.device}" if piece.whole else "noise"
+            self._around.trace.add(self._last, "in", piece.data, note)
+            if piece.whole:
+                self._around.tally.stale += 1
+                self._around.stray(piece, self._last)
+
+    def _log(self, verdict: Verdict, request: bytes, device: int, time: float) -> None:
+        trace = self._around.trace
+        if not verdict.received:
+            return
+        if verdict.pdu and len(verdict.received) == len(verdict.pdu) + 3:
+            trace.add(time, "in", verdict.received)
+            return
+        for piece in pieces(verdict.received):
+            if piece.data == request and piece.pdu != verdict.pdu:
+                note = "echo"
+            elif not piece.whole:
+                note = "damaged" if verdict.kind is Kind.DAMAGED else "noise"
+            elif piece.device != device:
+                note = f"of device {piece.device}"
+            else:
+                note = "" if piece.pdu == verdict.pdu else "not the reply"
+            trace.add(time, "in", piece.data, note)
+
+    def _start_timer(self, delay: float, action: Callable[[], None]) -> None:
+        self._stop_timer()
+        self._timer = asyncio.get_running_loop().call_later(delay, action)
+
+    def _stop_timer(self) -> None:
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None

@@ -1,0 +1,111 @@
+"""A serial port on POSIX: its file descriptor in the line's loop, and pauses exact to 0.1 ms."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import select
+import time
+
+import serial
+
+from .transport import Receiver
+
+LUMP = 4096
+COARSE = 0.0025
+"""The loop wakes to the millisecond only; the last part of a pause is waited on the port."""
+SPIN = 0.00008
+"""The system wakes a sleeper that much late; the very last part is waited in a short loop."""
+SEND_TIMEOUT = 1.0
+
+
+class PosixSerial:
+    """An opened serial port, read and written without blocking."""
+
+    def __init__(self, port: serial.Serial, note: str = "") -> None:
+        self.note = note
+        self._port = port
+        self._fd: int | None = port.fileno()
+        self._receiver: Receiver | None = None
+        os.set_blocking(port.fileno(), False)
+
+    def start(self, receiver: Receiver) -> None:
+        """Begin to receive in the running loop."""
+        self._receiver = receiver
+        if self._fd is not None:
+            asyncio.get_running_loop().add_reader(self._fd, self._take)
+
+    def _take(self) -> None:
+        """Read what is there; the end of the port shows as an error or as nothing to read."""
+        if self._fd is None or self._receiver is None:
+            return
+        try:
+            data = os.read(self._fd, LUMP)
+        except (BlockingIOError, InterruptedError):
+            return
+        except OSError as error:
+            self._end(f"the port went away ({error.strerror or error})")
+            return
+        now = time.monotonic()
+        if data:
+            self._receiver.received(data, now)
+        else:
+            self._end("the port went away")
+
+    def _end(self, reason: str) -> None:
+        receiver = self._receiver
+        self.close()
+        if receiver is not None:
+            receiver.lost(reason)
+
+    async def send(self, data: bytes) -> None:
+        """Write all bytes. Raises OSError when the port is gone or takes nothing."""
+        while data:
+            if self._fd is None:
+                raise OSError("the port is closed")
+            try:
+                data = data[os.write(self._fd, data) :]
+            except (BlockingIOError, InterruptedError):
+                await self._writable()
+
+    async def _writable(self) -> None:
+        if self._fd is None:
+            return
+        loop = asyncio.get_running_loop()
+        ready: asyncio.Future[None] = loop.create_future()
+
+        def wake() -> None:
+            if not ready.done():
+                ready.set_result(None)
+
+        loop.add_writer(self._fd, wake)
+        try:
+            async with asyncio.timeout(SEND_TIMEOUT):
+                await ready
+        except TimeoutError:
+            raise OSError("the port takes no bytes") from None
+        finally:
+            if self._fd is not None:
+                loop.remove_writer(self._fd)
+
+    async def rest(self, until: float) -> None:
+        """Wait until `until`; returns early once bytes have been received."""
+        left = until - time.monotonic()
+        if left > COARSE:
+            await asyncio.sleep(left - COARSE)
+        while self._fd is not None:
+            left = until - time.monotonic()
+            if left <= 0:
+                return
+            if left > SPIN and select.select([self._fd], [], [], left - SPIN)[0]:
+                self._take()
+                return
+
+    def close(self) -> None:
+        """Close the port; a lock on it ends with that."""
+        if self._fd is None:
+            return
+        asyncio.get_running_loop().remove_reader(self._fd)
+        self._fd = None
+        self._receiver = None
+        self._port.close()

@@ -1,0 +1,28 @@
+"""Running counts of a line, and their frozen copy for others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .model import Counters
+
+
+@dataclass(slots=True)
+class Tally:
+    """Counts that the line's thread adds to; fields as in Counters."""
+
+    requests: int = 0
+    replies: int = 0
+    timeouts: int = 0
+    checksum: int = 0
+    wrong: int = 0
+    exceptions: int = 0
+    resyncs: int = 0
+    stale: int = 0
+    bytes_out: int = 0
+    bytes_in: int = 0
+    busy_seconds: float = 0.0
+
+    def frozen(self) -> Counters:
+        """The counts of this moment."""
+        return Counters(**{name: getattr(self, name) for name in Counters.__slots__})

@@ -1,0 +1,152 @@
+"""Modbus TCP: transaction ids, and replies checked down to the byte."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+from pymodbus.framer.socket import FramerSocket
+from pymodbus.pdu import DecodePDU
+
+from .errors import LineLost
+from .expectation import exception_code
+from .master import Outcome, Sending, Surroundings, settle
+from .rtu_exchange import Kind, Verdict
+from .transport import Transport
+
+HEADER = 7
+"""Transaction id, protocol id, length, unit id."""
+MAX_LENGTH = 254
+"""Unit id and the longest function and data."""
+
+
+class TcpMaster:
+    """One Modbus TCP connection. `ended` is called once when it is lost."""
+
+    def __init__(
+        self, transport: Transport, around: Surroundings, ended: Callable[[], None]
+    ) -> None:
+        self.echo: bool | None = False
+        self.failure: LineLost | None = None
+        self._transport = transport
+        self._around = around
+        self._ended = ended
+        self._framer = FramerSocket(DecodePDU(is_server=False))
+        self._buffer = bytearray()
+        self._transaction = 0
+        self._sending: Sending | None = None
+        self._done: asyncio.Future[Verdict] | None = None
+        self._hold = 0.0
+        self._last = 0.0
+        transport.start(self)
+
+    def close(self) -> None:
+        """Drop the connection."""
+        self._transport.close()
+
+    def received(self, data: bytes, time: float) -> None:
+        """Take the bytes apart by their headers; only the awaited transaction is looked at."""
+        self._last = time
+        self._around.tally.bytes_in += len(data)
+        self._buffer += data
+        while len(self._buffer) >= HEADER:
+            length = int.from_bytes(self._buffer[4:6], "big")
+            if self._buffer[2:4] != b"\0\0" or not 2 <= length <= MAX_LENGTH:
+                self._around.trace.add(time, "in", bytes(self._buffer), "no Modbus TCP")
+                self._reset("the other end sent something else than Modbus TCP")
+                return
+            if len(self._buffer) < 6 + length:
+                return
+            unit = bytes(self._buffer[: 6 + length])
+            del self._buffer[: 6 + length]
+            self._take(unit, time)
+
+    def _take(self, unit: bytes, time: float) -> None:
+        sending = self._sending
+        if sending is None or sending.expectation is None or not self._is_ours(unit):
+            self._around.tally.stale += 1
+            self._around.trace.add(time, "in", unit, "late or repeated")
+            return
+        verdict = _verdict(unit, sending)
+        note = "" if verdict.kind in (Kind.REPLY, Kind.EXCEPTION) else "not the reply"
+        self._around.trace.add(time, "in", unit, note)
+        settle(self._done, verdict)
+
+    def _is_ours(self, unit: bytes) -> bool:
+        awaited = self._done is not None and not self._done.done()
+        return awaited and int.from_bytes(unit[:2], "big") == self._transaction
+
+    def _reset(self, reason: str) -> None:
+        """Give up a connection whose bytes cannot be told apart any more."""
+        self._transport.close()
+        self.lost(reason)
+
+    def lost(self, reason: str) -> None:
+        """The connection ended: whoever waits is told at once."""
+        if self.failure is not None:
+            return
+        self.failure = LineLost(f"The line was lost: {reason}.")
+        settle(self._done, Verdict(Kind.NOTHING))
+        self._ended()
+
+    async def quiet(self) -> None:
+        """Wait out the time after a broadcast; Modbus TCP knows no silence."""
+        while self.failure is None and self._hold > self._around.clock():
+            await self._transport.rest(self._hold)
+        if self.failure is not None:
+            raise self.failure
+
+    async def exchange(self, sending: Sending) -> Outcome:
+        """Send a request and await the reply of its transaction."""
+        clock, tally = self._around.clock, self._around.tally
+        self._transaction = self._transaction % 0xFFFF + 1
+        data = self._framer.encode(sending.pdu, sending.device, self._transaction)
+        self._done = asyncio.get_running_loop().create_future()
+        self._sending = sending
+        begun = clock()
+        try:
+            await self._send(data)
+            tally.requests += 1
+            tally.bytes_out += len(data)
+            self._around.trace.add(begun, "out", data)
+            verdict = await self._verdict(sending)
+        finally:
+            self._sending = self._done = None
+        end = clock() if verdict.kind is Kind.NOTHING else self._last
+        tally.busy_seconds += clock() - begun
+        if verdict.kind is Kind.NOTHING and self._buffer:
+            # half a reply, or a length that is wrong: what follows could not be told apart
+            self._reset("a reply broke off")
+        return Outcome(verdict, begun, end, max(0.0, end - begun))
+
+    async def _send(self, data: bytes) -> None:
+        try:
+            await self._transport.send(data)
+        except OSError as error:
+            self.lost(str(error.strerror or error))
+            raise self.failure or LineLost("The line was lost.") from error
+
+    async def _verdict(self, sending: Sending) -> Verdict:
+        assert self._done is not None
+        if sending.expectation is None:
+            self._hold = self._around.clock() + self._around.timing.turnaround_delay
+            return Verdict(Kind.NOTHING)
+        await asyncio.wait((self._done,), timeout=sending.time_out)
+        if self.failure is not None:
+            raise self.failure
+        return self._done.result() if self._done.done() else Verdict(Kind.NOTHING)
+
+
+def _verdict(unit: bytes, sending: Sending) -> Verdict:
+    """What a reply with the right transaction id is."""
+    expectation = sending.expectation
+    assert expectation is not None
+    device, pdu = unit[6], unit[HEADER:]
+    if device != sending.device:
+        return Verdict(Kind.WRONG, detail=f"unit {device} answered", received=unit)
+    if expectation.fits(pdu):
+        return Verdict(Kind.REPLY, pdu=pdu, received=unit)
+    code = exception_code(expectation.function, pdu)
+    if code is not None:
+        return Verdict(Kind.EXCEPTION, pdu=pdu, exception=code, received=unit)
+    return Verdict(Kind.WRONG, detail=expectation.mismatch(pdu), received=unit)
