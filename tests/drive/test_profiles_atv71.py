@@ -430,7 +430,7 @@ def test_faults_as_a_whole(atv71: Profile) -> None:
     assert len(faults.codes) == 75
     assert faults.parameter == "LFT"
     assert faults.shows_last
-    assert [atv71[code].address for code in faults.history] == list(range(7201, 7209))
+    assert [atv71[code].address for code in faults.history] == list(range(7200, 7209))
     assert atv71.names(atv71["LFT"]) == {f.raw: f.name for f in faults.codes}
     assert atv71.fault(105) is None
 
