@@ -1,0 +1,52 @@
+"""Lines that are closed again, and limits wide enough for every function."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from tui.bus.limits import Limits
+from tui.bus.line import Line, Timing
+from tui.bus.link import Link, SerialLink
+
+WIDE = Limits(
+    functions=frozenset({3, 6, 8, 16, 23, 43}),
+    max_read=125,
+    max_write=123,
+    max_read_23=125,
+    max_write_23=121,
+    subfunctions=frozenset({0, 10, 11}),
+    broadcast_functions=frozenset({6, 16}),
+)
+
+# generous: a loaded machine must not turn an answer into silence
+PATIENT = Timing(first_timeout=5.0, min_timeout=5.0, late_reply=6.0)
+BRISK = Timing(first_timeout=0.2, min_timeout=0.2, scan_timeout=0.2, late_reply=0.7, retries=0)
+
+OpenLine = Callable[..., Line]
+
+
+@pytest.fixture
+def open_line() -> Iterator[OpenLine]:
+    """Open a line to a peer; devices 1 to 9 take every function."""
+    lines: list[Line] = []
+
+    def opened(
+        link: Link | str,
+        timing: Timing = PATIENT,
+        *,
+        read_only: bool = False,
+        wait: float | None = 5.0,
+    ) -> Line:
+        link = SerialLink(link) if isinstance(link, str) else link
+        line = Line(link, read_only=read_only, timing=timing)
+        lines.append(line)
+        for device in range(1, 10):
+            line.describe(device, WIDE)
+        line.open(wait=wait)
+        return line
+
+    yield opened
+    for line in lines:
+        line.close()

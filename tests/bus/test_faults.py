@@ -1,0 +1,409 @@
+"""Faults of a serial line: what the plain client makes of each, and what the line makes of it."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Sequence
+
+import pytest
+from pymodbus.pdu.pdu import ModbusPDU
+
+from tui.bus.errors import (
+    ChecksumFault,
+    DeviceException,
+    ExchangeError,
+    NoAnswer,
+    WrongReply,
+)
+from tui.bus.line import Priority, Timing
+from tui.bus.rtu import frame
+
+from .conftest import BRISK, PATIENT, OpenLine
+from .peer import PtyPeer, Script, Step, eventually, honest, reply, silent
+from .plain import outcome, plain_serial
+
+OPERATOR = Priority.OPERATOR_READ
+LATE = 0.35
+"""Later than the time-outs used here, but not later than the line awaits a late reply."""
+
+
+def first_late(request: bytes, count: int) -> Sequence[Step]:
+    """Answer the first request too late, the others at once."""
+    return [LATE, reply(request)] if count == 0 else [reply(request)]
+
+
+async def test_late_reply_shifts_the_plain_client() -> None:
+    def slow(request: bytes, count: int) -> Sequence[Step]:
+        return [LATE if count == 0 else 0.05, reply(request)]
+
+    with PtyPeer(slow) as peer:
+        async with plain_serial(peer.path, timeout=0.2) as client:
+            got = [
+                await outcome(client.read_holding_registers(address, count=1, device_id=1))
+                for address in (10, 20, 30, 40)
+            ]
+    assert got == [None, [10], [20], [30]]
+
+
+async def test_late_reply_never_reaches_another_request(open_line: OpenLine) -> None:
+    with PtyPeer(first_late) as peer:
+        line = open_line(peer.path, BRISK)
+        with pytest.raises(NoAnswer):
+            await line.read(1, 10, priority=OPERATOR)
+        got = [(await line.read(1, address, priority=OPERATOR)).words for address in (20, 30, 40)]
+        assert got == [(20,), (30,), (40,)]
+        assert line.counters.stale == 1
+        assert any("late" in seen.note for seen in line.trace)
+
+
+async def test_request_of_another_shape_need_not_wait_for_a_late_reply(
+    open_line: OpenLine,
+) -> None:
+    timing = Timing(first_timeout=0.1, min_timeout=0.1, late_reply=60.0, retries=0)
+
+    def overtaken(request: bytes, count: int) -> Sequence[Step]:
+        late = reply(b"\x01\x03\x00\x0a\x00\x01\0\0") if count == 1 else b""
+        return [] if count == 0 else [late + reply(request)]
+
+    with PtyPeer(overtaken) as peer:
+        line = open_line(peer.path, timing)
+        with pytest.raises(NoAnswer):
+            await line.read(1, 10, priority=OPERATOR)
+        # the late reply comes before this one's own; then nothing is held back any more
+        assert (await line.read(1, 20, 2, priority=OPERATOR)).words == (20, 21)
+        assert (await line.read(1, 30, priority=OPERATOR)).words == (30,)
+
+
+async def test_cancelled_await_shifts_the_plain_client() -> None:
+    with PtyPeer(first_late) as peer:
+        async with plain_serial(peer.path, timeout=2.0) as client:
+            with pytest.raises(TimeoutError):
+                async with asyncio.timeout(0.1):
+                    await client.read_holding_registers(10, count=1, device_id=1)
+            got = await outcome(client.read_holding_registers(20, count=1, device_id=1))
+    assert got == [10]
+
+
+async def test_cancelled_await_does_not_cancel_the_exchange(open_line: OpenLine) -> None:
+    with PtyPeer(first_late) as peer:
+        line = open_line(peer.path)
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(0.1):
+                await line.read(1, 10)
+        assert (await line.read(1, 20)).words == (20,)
+        assert line.counters.replies == 2
+
+
+async def test_cancelled_request_that_still_waits_is_not_sent(open_line: OpenLine) -> None:
+    with PtyPeer(first_late) as peer:
+        line = open_line(peer.path)
+        flying = asyncio.create_task(line.read(1, 10))
+        await asyncio.to_thread(peer.await_requests, 1)
+        waiting = asyncio.create_task(line.read(1, 20))
+        await asyncio.sleep(0.05)
+        waiting.cancel()
+        assert (await flying).words == (10,)
+        assert (await line.read(1, 30)).words == (30,)
+        assert [request[3] for request in peer.requests] == [10, 30]
+
+
+def instead(pdu: bytes, device: int = 1) -> Script:
+    """Answer with this whatever was asked."""
+    return lambda _request, _count: [frame(device, pdu)]
+
+
+WRONG = {
+    "another function": (3, bytes([4, 2, 0, 9])),
+    "too few words": (3, bytes([3, 0])),
+    "too many words": (3, bytes([3, 4, 0, 9, 0, 9])),
+    "write of another register": (6, bytes([6, 0, 99, 0, 7])),
+    "write of another value": (6, bytes([6, 0, 5, 0, 99])),
+    "write at another address": (16, bytes([16, 0, 99, 0, 2])),
+    "write of fewer words": (16, bytes([16, 0, 5, 0, 1])),
+    "words of another function": (23, bytes([3, 2, 0, 9])),
+}
+
+
+@pytest.mark.parametrize("case", WRONG)
+async def test_plain_client_takes_a_wrong_reply(case: str) -> None:
+    function, pdu = WRONG[case]
+    with PtyPeer(instead(pdu)) as peer:
+        async with plain_serial(peer.path) as client:
+            calls: dict[int, Callable[[], Awaitable[ModbusPDU]]] = {
+                3: lambda: client.read_holding_registers(5, count=1, device_id=1),
+                6: lambda: client.write_register(5, 7, device_id=1),
+                16: lambda: client.write_registers(5, [7, 8], device_id=1),
+                23: lambda: client.readwrite_registers(
+                    read_address=5, read_count=1, write_address=9, values=[7], device_id=1
+                ),
+            }
+            assert await outcome(calls[function]()) is not None
+
+
+@pytest.mark.parametrize("case", WRONG)
+async def test_wrong_reply_is_thrown_away(case: str, open_line: OpenLine) -> None:
+    function, pdu = WRONG[case]
+    with PtyPeer(instead(pdu)) as peer:
+        line = open_line(peer.path, BRISK)
+        calls: dict[int, Callable[[], Awaitable[object]]] = {
+            3: lambda: line.read(1, 5, priority=OPERATOR),
+            6: lambda: line.write(1, 5, [7]),
+            16: lambda: line.write(1, 5, [7, 8]),
+            23: lambda: line.read_write(1, 5, 1, 9, [7]),
+        }
+        with pytest.raises(WrongReply) as caught:
+            await calls[function]()
+        assert "something else than asked" in str(caught.value)
+        assert line.counters.wrong == 1
+
+
+async def test_wrong_reply_before_the_right_one_is_passed_over(open_line: OpenLine) -> None:
+    wrong = frame(1, bytes([3, 4, 0, 9, 0, 9]))
+    with PtyPeer(lambda request, _: [wrong, 0.05, reply(request)]) as peer:
+        line = open_line(peer.path)
+        assert (await line.read(1, 7)).words == (7,)
+
+
+DIRT: dict[str, Callable[[bytes], bytes]] = {
+    "a noise byte": lambda request: b"\x00" + reply(request),
+    "three noise bytes": lambda request: b"\xff\x55\x01" + reply(request),
+    "another drive's reply": lambda request: frame(7, bytes([3, 2, 0, 9])) + reply(request),
+}
+
+
+@pytest.mark.parametrize("case", DIRT)
+async def test_plain_client_loses_a_reply_behind_dirt(case: str) -> None:
+    with PtyPeer(lambda request, _: [DIRT[case](request)]) as peer:
+        async with plain_serial(peer.path) as client:
+            got = await outcome(client.read_holding_registers(5, count=1, device_id=1))
+    assert got != [5]
+
+
+@pytest.mark.parametrize("case", DIRT)
+async def test_reply_is_found_behind_dirt(case: str, open_line: OpenLine) -> None:
+    with PtyPeer(lambda request, _: [DIRT[case](request)]) as peer:
+        line = open_line(peer.path)
+        assert (await line.read(1, 5)).words == (5,)
+        assert line.counters.resyncs == 1
+        assert line.counters.checksum == 0
+
+
+async def test_noise_long_before_the_reply_does_not_end_the_wait(open_line: OpenLine) -> None:
+    with PtyPeer(lambda request, _: [b"\x13\x37\x00\x42\x99", 0.2, reply(request)]) as peer:
+        line = open_line(peer.path)
+        assert (await line.read(1, 5)).words == (5,)
+
+
+async def test_duplicated_replies_shift_nothing(open_line: OpenLine) -> None:
+    with PtyPeer(lambda request, _: [reply(request) * 2]) as peer:
+        line = open_line(peer.path)
+        got = [(await line.read(1, address)).words[0] for address in range(20)]
+    assert got == list(range(20))
+
+
+async def test_unasked_frames_between_requests_shift_nothing(open_line: OpenLine) -> None:
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path)
+        assert (await line.read(1, 5)).words == (5,)
+        peer.send(frame(1, bytes([3, 2, 0, 9])))
+        await asyncio.to_thread(eventually, lambda: line.counters.stale == 1)
+        assert (await line.read(1, 6)).words == (6,)
+
+
+def damaged(request: bytes) -> bytes:
+    """A reply with one bit turned."""
+    whole = bytearray(reply(request))
+    whole[4] ^= 0x10
+    return bytes(whole)
+
+
+def other_id(request: bytes) -> bytes:
+    """A reply whose first byte was damaged."""
+    return b"\x55" + reply(request)[1:]
+
+
+BROKEN: dict[str, Callable[[bytes], bytes]] = {
+    "damaged": damaged,
+    "damaged in its first byte": other_id,
+    "cut short": lambda request: reply(request)[:4],
+    "cut in front": lambda request: reply(request)[1:],
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+async def test_plain_client_waits_out_its_time_for_a_damaged_reply(case: str) -> None:
+    with PtyPeer(lambda request, _: [BROKEN[case](request)]) as peer:
+        async with plain_serial(peer.path, timeout=0.4) as client:
+            begun = time.monotonic()
+            got = await outcome(client.read_holding_registers(5, count=1, device_id=1))
+            assert time.monotonic() - begun >= 0.39
+    assert got is None
+
+
+@pytest.mark.parametrize("case", BROKEN)
+async def test_damaged_reply_is_known_as_soon_as_the_line_is_silent(
+    case: str, open_line: OpenLine
+) -> None:
+    timing = Timing(first_timeout=30.0, min_timeout=30.0, retries=0)
+    with PtyPeer(lambda request, _: [BROKEN[case](request)]) as peer:
+        line = open_line(peer.path, timing)
+        async with asyncio.timeout(15.0):
+            with pytest.raises(ChecksumFault):
+                await line.read(1, 5, priority=OPERATOR)
+        assert line.counters.checksum == 1
+        assert line.counters.timeouts == 0
+
+
+async def test_read_is_repeated_after_a_damaged_reply(open_line: OpenLine) -> None:
+    def once(request: bytes, count: int) -> Sequence[Step]:
+        return [damaged(request)] if count == 0 else [reply(request)]
+
+    with PtyPeer(once) as peer:
+        line = open_line(peer.path)
+        assert (await line.read(1, 5)).words == (5,)
+        assert len(peer.requests) == 2
+
+
+async def test_operator_read_is_repeated_after_silence(open_line: OpenLine) -> None:
+    def second_lost(request: bytes, count: int) -> Sequence[Step]:
+        return [] if count == 1 else [reply(request)]
+
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=0.4)
+    with PtyPeer(second_lost) as peer:
+        line = open_line(peer.path, timing)
+        assert (await line.read(1, 5, priority=OPERATOR)).words == (5,)
+        assert (await line.read(1, 6, priority=OPERATOR)).words == (6,)
+        assert len(peer.requests) == 3
+        # the same read goes out again only when the lost reply cannot come any more
+        assert peer.arrivals[2] - peer.arrivals[1] >= 0.4
+
+
+async def test_plain_client_sends_a_write_four_times() -> None:
+    with PtyPeer(silent) as peer:
+        async with plain_serial(peer.path, timeout=0.1, retries=3) as client:
+            await outcome(client.write_register(5, 7, device_id=1))
+        assert len(peer.requests) == 4
+
+
+@pytest.mark.parametrize("broken", ["lost", "damaged"])
+@pytest.mark.parametrize("values", [[7], [7, 8]])
+async def test_write_is_sent_once(broken: str, values: list[int], open_line: OpenLine) -> None:
+    script = silent if broken == "lost" else lambda request, _: [damaged(request)]
+    with PtyPeer(script) as peer:
+        line = open_line(peer.path, Timing(first_timeout=0.2, retries=5, late_reply=0.3))
+        with pytest.raises(ExchangeError) as caught:
+            await line.write(1, 5, values)
+        await asyncio.sleep(0.6)
+        assert len(peer.requests) == 1
+        if broken == "lost":
+            assert "read the register back" in str(caught.value)
+
+
+async def test_plain_client_keeps_no_silence() -> None:
+    with PtyPeer(honest) as peer:
+        async with plain_serial(peer.path, baud=2400) as client:
+            for _ in range(10):
+                await client.read_holding_registers(5, count=1, device_id=1)
+        assert min(_pauses(peer)) < 0.016
+
+
+async def test_silence_is_kept(open_line: OpenLine) -> None:
+    from tui.bus.link import SerialLink, silence
+
+    with PtyPeer(honest) as peer:
+        link = SerialLink(peer.path, 2400)
+        line = open_line(link)
+        await asyncio.gather(*(line.read(1, address) for address in range(20)))
+        assert silence(link) == pytest.approx(0.016, rel=0.01)
+        assert min(_pauses(peer)) >= silence(link)
+
+
+def _pauses(peer: PtyPeer) -> list[float]:
+    """Seconds between each sending of the peer and the request that came next."""
+    following = peer.arrivals[1:]
+    return [came - left for left, came in zip(peer.departures, following, strict=False)]
+
+
+async def test_plain_client_runs_broadcasts_into_each_other() -> None:
+    with PtyPeer(honest) as peer:
+        async with plain_serial(peer.path) as client:
+            for value in (1, 2):
+                await client.write_register(5, value, device_id=0, no_response_expected=True)
+            await asyncio.to_thread(peer.await_requests, 2)
+        assert peer.arrivals[1] - peer.arrivals[0] < 0.1
+
+
+async def test_broadcasts_are_kept_apart(open_line: OpenLine) -> None:
+    from .conftest import WIDE
+
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path)
+        await asyncio.gather(*(line.broadcast(5, [value], limits=WIDE) for value in (1, 2)))
+        assert (await line.read(1, 5)).words == (5,)
+        assert [len(burst) for burst in peer.bursts] == [8, 8, 8]
+        assert peer.arrivals[1] - peer.arrivals[0] >= PATIENT.turnaround_delay
+        assert peer.arrivals[2] - peer.arrivals[1] >= PATIENT.turnaround_delay
+        assert line.counters.timeouts == 0
+
+
+async def test_exception_is_raised_with_its_meaning(open_line: OpenLine) -> None:
+    with PtyPeer(instead(bytes([0x83, 2]))) as peer:
+        line = open_line(peer.path)
+        with pytest.raises(
+            DeviceException, match="refused function 3, register 5 with exception 2"
+        ):
+            await line.read(1, 5)
+        assert line.counters.exceptions == 1
+        assert line.device_state(1).answers
+
+
+async def test_every_function_is_answered(open_line: OpenLine) -> None:
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path)
+        assert (await line.read(1, 5, 3)).words == (5, 6, 7)
+        await line.write(1, 5, [7])
+        await line.write(1, 5, [7, 8, 9])
+        await line.write(1, 5, [7], multiple=True)
+        assert (await line.read_write(1, 5, 2, 9, [1, 2, 3])).words == (5, 6)
+        assert await line.diagnose(1, 0, 0x1234) == 0x1234
+        found = await line.identify(1)
+        assert found.objects == {0: b"none"}
+        assert [request[1] for request in peer.requests] == [3, 6, 16, 16, 23, 8, 43]
+
+
+async def test_diagnostic_echo_is_checked(open_line: OpenLine) -> None:
+    with PtyPeer(instead(bytes([8, 0, 0, 0, 1]))) as peer:
+        line = open_line(peer.path, BRISK)
+        with pytest.raises(WrongReply):
+            await line.diagnose(1, 0, 0x1234)
+
+
+@pytest.mark.parametrize("pdu", [bytes([0xAB, 1]), bytes([0xAB, 14, 1])])
+async def test_both_refusals_of_identification(pdu: bytes, open_line: OpenLine) -> None:
+    with PtyPeer(instead(pdu)) as peer:
+        line = open_line(peer.path)
+        with pytest.raises(DeviceException) as caught:
+            await line.identify(1)
+        assert caught.value.code == 1
+
+
+async def test_identification_follows_on(open_line: OpenLine) -> None:
+    parts = [
+        bytes([43, 14, 1, 2, 0xFF, 1, 1, 0, 3]) + b"one",
+        bytes([43, 14, 1, 2, 0, 0, 2, 1, 3]) + b"two" + bytes([6, 2]) + b"xy",
+    ]
+    with PtyPeer(lambda _, count: [frame(1, parts[count])]) as peer:
+        line = open_line(peer.path)
+        found = await line.identify(1)
+        assert found.conformity == 2
+        assert found.objects == {0: b"one", 1: b"two", 6: b"xy"}
+        assert [request[4] for request in peer.requests] == [0, 1]
+
+
+async def test_identification_without_end_is_refused(open_line: OpenLine) -> None:
+    with PtyPeer(instead(bytes([43, 14, 1, 2, 0xFF, 0, 1, 0, 1, 65]))) as peer:
+        line = open_line(peer.path)
+        with pytest.raises(WrongReply, match="does not end"):
+            await line.identify(1)
+        assert len(peer.requests) == 1
