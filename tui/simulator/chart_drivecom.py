@@ -384,7 +384,8 @@ class DrivecomChart:
     def _status(self) -> int:
         body = self._body
         motor = body.motor
-        reached = motor.energised and abs(motor.frequency - self._reference_hz) < REACHED_HZ
+        going = motor.energised and self._powered()
+        reached = going and abs(motor.frequency - self._reference_hz) < REACHED_HZ
         low, high = self._limits()
         asked = abs(self._wanted())
         marks = (
@@ -392,7 +393,7 @@ class DrivecomChart:
             (body.alarms != 0 or motor.motor_thermal >= 100, 7),
             (body.traits.remote_always or self._line_commands, 9),
             (reached, 10),
-            (motor.energised and not low - 0.05 <= asked <= high + 0.05, 11),
+            (going and not low - 0.05 <= asked <= high + 0.05, 11),
             (motor.frequency < 0, 15),
         )
         upper = sum(1 << bit for given, bit in marks if given)

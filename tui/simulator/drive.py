@@ -175,6 +175,8 @@ class SimulatedDrive:
             self._memory.power_up()
             self._watch.power_up()
             self._chart.power_up()
+            if body.fault is not None:
+                self._chart.trip(Stop.FREEWHEEL)
             body.terminal_hz = None
             body.motor = replace(body.motor, mains=self._mains())
             if self.spec.run_hz and body.fault is None:
