@@ -1,0 +1,82 @@
+"""From errors to exit statuses and one or two lines for a person."""
+
+from __future__ import annotations
+
+import functools
+import logging
+import os
+import sys
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+import click
+
+DONE, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE = 0, 2, 3, 4, 5
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class Failure(click.ClickException):
+    """An error with its exit status, printed as plain lines on standard error."""
+
+    def __init__(self, message: str, status: int) -> None:
+        super().__init__(message)
+        self.status = status
+
+    @property
+    def exit_code(self) -> int:  # type: ignore[override]
+        """The status with which the process ends."""
+        return self.status
+
+    def show(self, file: object = None) -> None:
+        """Print the message on standard error."""
+        click.echo(f"drivepanel: {self.message}", err=True)
+
+
+def status_of(error: Exception) -> int | None:
+    """The exit status of a known error, or None for one that nobody foresaw."""
+    from tui.bus.errors import DeviceException, LineError, LinkSyntaxError, RequestRefused
+    from tui.drive.errors import DriveError, ProfileError, UnknownParameter, UnknownProfile
+    from tui.simulator.errors import SimulatorError
+
+    table: tuple[tuple[type[Exception], int], ...] = (
+        (LinkSyntaxError, USAGE),
+        (UnknownProfile, USAGE),
+        (UnknownParameter, USAGE),
+        (ProfileError, USAGE),
+        (SimulatorError, USAGE),
+        (RequestRefused, REFUSED_HERE),
+        (DriveError, REFUSED_HERE),
+        (DeviceException, DRIVE_REFUSED),
+        (LineError, LINE_TROUBLE),
+    )
+    return next((status for kind, status in table if isinstance(error, kind)), None)
+
+
+def told(command: Callable[P, R]) -> Callable[P, R]:
+    """Turn what a command raises into a message and an exit status; never a traceback."""
+
+    @functools.wraps(command)
+    def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
+        try:
+            return command(*args, **kwargs)
+        except (click.ClickException, click.exceptions.Exit, click.Abort):
+            raise
+        except BrokenPipeError:
+            # the reader of our output is gone: nothing is left to be said to it
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            raise click.exceptions.Exit(DONE) from None
+        except Exception as error:
+            status = status_of(error)
+            if status is None:
+                logging.getLogger("drivepanel").exception("unforeseen error")
+                from .logs import log_file
+
+                raise Failure(
+                    f"{type(error).__name__}: {error}\nThe details are in {log_file()}.", 1
+                ) from error
+            logging.getLogger("drivepanel").info("%s: %s", type(error).__name__, error)
+            raise Failure(str(error), status) from error
+
+    return wrapped

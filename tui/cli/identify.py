@@ -1,0 +1,57 @@
+"""`drivepanel identify`: who answers at an address."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from .errors import told
+from .options import json_option, line_argument, on_line
+
+if TYPE_CHECKING:
+    from tui.session.identify import DriveIdentity
+    from tui.session.lines import OpenLine
+
+
+@click.command()
+@line_argument
+@click.option(
+    "-d",
+    "--device",
+    type=click.IntRange(1, 247),
+    default=1,
+    show_default=True,
+    metavar="ADDRESS",
+    help="Slave address of the drive.",
+)
+@json_option
+@told
+def identify(line_text: str, device: int, as_json: bool) -> None:
+    """Ask a drive who it is (function 43)."""
+    from tui.session.identify import identify as ask
+
+    from .output import print_json
+
+    async def work(opened: OpenLine) -> DriveIdentity:
+        return await ask(opened.line, device)
+
+    found = on_line(line_text, work)
+    if as_json:
+        keys = ("device", "vendor", "reference", "version", "name", "profile")
+        print_json({key: getattr(found, key) for key in keys})
+        return
+    click.echo(f"Device     {found.device}")
+    for title, text in (
+        ("Vendor", found.vendor),
+        ("Reference", found.reference),
+        ("Version", found.version_text),
+        ("Name", found.name),
+        ("Profile", found.profile or _choices(found)),
+    ):
+        click.echo(f"{title:<10} {text or '-----'}")
+
+
+def _choices(found: DriveIdentity) -> str:
+    fits = ", ".join(found.candidates)
+    return f"not known; it may be {fits}" if fits else "not known; name one with -p"

@@ -1,0 +1,40 @@
+"""The log file in the state folder."""
+
+from __future__ import annotations
+
+import logging
+import os
+from logging.handlers import RotatingFileHandler
+from pathlib import Path
+
+LEVELS = (logging.INFO, logging.DEBUG)
+
+
+def state_folder() -> Path:
+    """The folder for what the panel keeps; `DRIVEPANEL_STATE` names another."""
+    if configured := os.environ.get("DRIVEPANEL_STATE"):
+        return Path(configured)
+    from platformdirs import user_state_path
+
+    return user_state_path("drivepanel", appauthor=False)
+
+
+def log_file() -> Path:
+    """Where the log is."""
+    return state_folder() / "drivepanel.log"
+
+
+def start_logging(verbose: int) -> None:
+    """Log to the file; with more `-v` in more detail. Without a writable folder, not at all."""
+    logger = logging.getLogger("drivepanel")
+    logger.setLevel(LEVELS[min(verbose, len(LEVELS) - 1)])
+    logger.propagate = False
+    try:
+        log_file().parent.mkdir(parents=True, exist_ok=True)
+        handler: logging.Handler = RotatingFileHandler(
+            log_file(), maxBytes=1_000_000, backupCount=3, encoding="utf-8", delay=True
+        )
+    except OSError:
+        handler = logging.NullHandler()
+    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+    logger.handlers = [handler]

@@ -1,0 +1,113 @@
+"""Arguments and options that several commands share, and the session behind them."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+if TYPE_CHECKING:
+    from tui.session.drive_session import DriveSession
+    from tui.session.identify import DriveIdentity
+    from tui.session.lines import OpenLine
+
+T = TypeVar("T")
+Command = Callable[..., Any]
+
+CONNECT_WITHIN = 5.0
+"""Seconds in which a headless command wants its line connected."""
+
+line_argument = click.argument("line_text", metavar="LINE")
+json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
+
+
+def drive_options(command: Command) -> Command:
+    """Which drive on the line, and by which profile."""
+    for option in (
+        click.option(
+            "--rated-current",
+            "rated_current",
+            type=float,
+            metavar="A",
+            help="Rated current of the drive in A, for families that give currents in %.",
+        ),
+        click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drive."),
+        click.option(
+            "-d",
+            "--device",
+            type=click.IntRange(1, 247),
+            default=1,
+            show_default=True,
+            metavar="ADDRESS",
+            help="Slave address of the drive.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
+@dataclass(frozen=True, slots=True)
+class Target:
+    """What the shared options name."""
+
+    line_text: str
+    device: int
+    profile_id: str | None
+    rated_current: float | None = None
+
+
+def on_line(line_text: str, work: Callable[[OpenLine], Coroutine[Any, Any, T]]) -> T:
+    """Open a line, do the work, close the line whatever happens."""
+    from tui.session.lines import open_line
+
+    opened = open_line(line_text, wait=CONNECT_WITHIN)
+    try:
+        return asyncio.run(work(opened))
+    finally:
+        opened.close()
+
+
+async def connect(opened: OpenLine, target: Target) -> DriveSession:
+    """The wanted drive with its profile, identified where none was named.
+
+    Raises UnidentifiedDrive with what to type where the drive does not say who it is.
+    """
+    from tui.drive import library
+    from tui.session.drive_session import DriveSession
+    from tui.session.identify import identify
+
+    identity: DriveIdentity | None = None
+    profile_id = target.profile_id
+    if profile_id is None:
+        identity = await identify(opened.line, target.device)
+        profile_id = identity.profile
+        if profile_id is None:
+            raise unidentified(identity)
+    session = DriveSession(opened.line, target.device, library.load(profile_id), identity)
+    _rate(session, target.rated_current)
+    return session
+
+
+def _rate(session: DriveSession, rated_current: float | None) -> None:
+    current = session.profile.quantity("motor_current")
+    if rated_current is None or current is None:
+        return
+    from decimal import Decimal
+
+    from tui.session.reader import Rating
+
+    session.rate(current.code, Rating(Decimal(str(rated_current)), "A"))
+
+
+def unidentified(identity: DriveIdentity) -> click.UsageError:
+    """The error for a drive that no profile was named for and none fits."""
+    from tui.drive import library
+
+    who = f"as {identity.reference!r}" if identity.reference else "but does not say who it is"
+    fits = identity.candidates or tuple(listing.id for listing in library.listings())
+    return click.UsageError(
+        f"Device {identity.device} answers {who}; name its profile with -p: {', '.join(fits)}."
+    )

@@ -1,0 +1,32 @@
+"""`drivepanel ports`: the serial ports of this machine."""
+
+from __future__ import annotations
+
+import click
+
+from .errors import told
+from .options import json_option
+
+
+@click.command()
+@json_option
+@told
+def ports(as_json: bool) -> None:
+    """List the serial ports of this machine and who holds them."""
+    from tui.bus.ports import holder, list_ports
+
+    from .output import print_json
+
+    found = [(port, holder(port.path)) for port in list_ports()]
+    if as_json:
+        print_json(
+            [{"path": p.path, "description": p.description, "holder": by} for p, by in found]
+        )
+        return
+    if not found:
+        click.echo(
+            "No serial port found. Plug in the adapter, or use tcp:HOST or rtu-tcp:HOST:PORT."
+        )
+    for port, by in found:
+        used = f"  in use by {by}" if by else ""
+        click.echo(f"{port.path:<20} {port.description}{used}")

@@ -1,0 +1,101 @@
+"""`drivepanel profiles`: which drives the panel knows."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .errors import told
+from .options import json_option
+
+if TYPE_CHECKING:
+    from tui.drive.profile import Profile
+
+
+@click.command()
+@click.argument("profile_id", required=False, metavar="[ID]")
+@click.option(
+    "--check",
+    "file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Check a profile file of your own.",
+)
+@json_option
+@told
+def profiles(profile_id: str | None, file: Path | None, as_json: bool) -> None:
+    """List the profiles, show one, or check a file."""
+    from tui.drive import library
+
+    if file is not None:
+        checked = library.load_file(file)
+        click.echo(f"{file}: {checked.name}, {len(checked.parameters)} parameters, no fault found.")
+    elif profile_id is not None:
+        _show(library.load(profile_id), as_json)
+    else:
+        _list(as_json)
+
+
+def _list(as_json: bool) -> None:
+    from tui.drive import library
+
+    from .output import print_json
+
+    found = library.listings()
+    if as_json:
+        keys = ("id", "name", "vendor", "parameters")
+        print_json([{key: getattr(listing, key) for key in keys} for listing in found])
+        return
+    for listing in found:
+        own = "  (your own)" if listing.own else ""
+        click.echo(
+            f"{listing.id:<12} {listing.vendor:<20} {listing.name:<22}"
+            f" {listing.parameters:>4} parameters{own}"
+        )
+
+
+def _show(profile: Profile, as_json: bool) -> None:
+    from .output import print_json
+
+    if as_json:
+        import msgspec
+
+        print_json(msgspec.to_builtins(profile.data))
+        return
+    from rich.console import Console
+    from rich.table import Table
+
+    from tui.drive.profile import is_verified, notations
+    from tui.drive.values import raw_range
+
+    link = profile.data.link
+    console = Console(soft_wrap=True)
+    console.print(f"{profile.vendor} {profile.name}, factory line {link.baud} {link.format}")
+    for function in profile.data.functions:
+        past = "no answer" if function.past_limit == "silence" else "an exception"
+        limits = [
+            f"{words} words {what}"
+            for what, words in (("read", function.max_read), ("written", function.max_write))
+            if words
+        ]
+        most = f", at most {' and '.join(limits)}, past that {past}" if limits else ""
+        console.print(f"  function {function.code:>2}  {function.name}{most}", highlight=False)
+    table = Table(box=None, pad_edge=False, header_style="dim")
+    for title in ("Code", "Name", "Number", "Wire address", "Unit", "Raw range", "Access", "Group"):
+        table.add_column(title)
+    for parameter in profile.parameters:
+        code, number, wire = notations(parameter)
+        low, high = raw_range(parameter)
+        table.add_row(
+            code + ("" if is_verified(parameter) else " ?"),
+            parameter.name,
+            number,
+            wire,
+            parameter.unit,
+            f"{low}..{high}",
+            parameter.access,
+            parameter.group,
+        )
+    console.print(table)

@@ -1,0 +1,55 @@
+"""`drivepanel read`: values of some parameters, once."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from .errors import DRIVE_REFUSED, told
+from .options import Target, connect, drive_options, json_option, line_argument, on_line
+
+if TYPE_CHECKING:
+    from tui.session.drive_session import DriveSession
+    from tui.session.lines import OpenLine
+    from tui.session.readings import Reading
+
+
+@click.command()
+@line_argument
+@click.argument("codes", nargs=-1, required=True, metavar="CODE...")
+@drive_options
+@json_option
+@told
+def read(
+    line_text: str,
+    codes: tuple[str, ...],
+    device: int,
+    profile_id: str | None,
+    rated_current: float | None,
+    as_json: bool,
+) -> None:
+    """Read parameters of a drive.
+
+    A CODE is the drive's own (ACC, 1.05, F875), the manual's number (W9001, 16#FD00) or a wire
+    address (9001), in any case.
+    """
+    from .output import print_json, print_readings, readings_json
+
+    target = Target(line_text, device, profile_id, rated_current)
+
+    async def work(opened: OpenLine) -> tuple[DriveSession, dict[str, Reading]]:
+        session = await connect(opened, target)
+        wanted = [session.profile.find(code).code for code in codes]
+        return session, await session.read(wanted)
+
+    session, readings = on_line(line_text, work)
+    if as_json:
+        print_json(readings_json(line_text, session, readings))
+    else:
+        print_readings(session, readings)
+    refused = [reading for reading in readings.values() if reading.raw is None]
+    for reading in refused:
+        click.echo(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
+    if refused:
+        raise click.exceptions.Exit(DRIVE_REFUSED)

@@ -1,0 +1,197 @@
+"""`drivepanel simulate`: simulated drives for anybody's Modbus program."""
+
+from __future__ import annotations
+
+import signal
+import threading
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import click
+
+from .errors import told
+
+if TYPE_CHECKING:
+    from tui.simulator import DriveSpec, FaultRates, Simulation
+
+FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", "foreign")
+
+
+@click.command()
+@click.argument("drives", nargs=-1, required=True, metavar="PROFILE[@ADDRESS]...")
+@click.option("--pty", "pty", metavar="PATH", help="A pseudo-terminal, with a link at PATH.")
+@click.option("--serial", "serial", metavar="PATH", help="A serial port.")
+@click.option("--tcp", metavar="HOST:PORT", help="Modbus TCP.")
+@click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="RTU over TCP.")
+@click.option("--baud", type=click.IntRange(min=300), default=19200, show_default=True)
+@click.option("--format", "form", default="8E1", show_default=True, metavar="8E1|8N2|...")
+@click.option("--real-time", is_flag=True, help="Keep the time of the line's characters.")
+@click.option(
+    "--set",
+    "sets",
+    multiple=True,
+    metavar="[ADDRESS:]CODE=RAW",
+    help="A raw value in force from power-up; a monitored word stays at it.",
+)
+@click.option(
+    "--protect",
+    "protects",
+    multiple=True,
+    metavar="[ADDRESS:]CODE,...",
+    help="Parameters that the line cannot see.",
+)
+@click.option(
+    "--line-fault",
+    "faults",
+    multiple=True,
+    metavar="KIND=RATE",
+    help=f"Share of replies with a fault: {', '.join(FAULT_KINDS)}.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Seed of the line faults.")
+@click.option(
+    "--run",
+    "run_hz",
+    type=float,
+    default=0.0,
+    metavar="HZ",
+    help="Motors run at this frequency, as if ordered at the terminals.",
+)
+@told
+def simulate(
+    drives: tuple[str, ...],
+    pty: str | None,
+    serial: str | None,
+    tcp: str | None,
+    rtu_tcp: str | None,
+    baud: int,
+    form: str,
+    real_time: bool,
+    sets: tuple[str, ...],
+    protects: tuple[str, ...],
+    faults: tuple[str, ...],
+    seed: int,
+    run_hz: float,
+) -> None:
+    """Serve simulated drives until Ctrl-C or SIGTERM."""
+    from tui.simulator import LineTiming, Simulation, parse_drives
+
+    if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
+        raise click.UsageError("Say where: one of --pty, --serial, --tcp, --rtu-tcp.")
+    specs = [
+        replace(spec, run_hz=run_hz, wander=bool(run_hz))
+        for spec in _configured(parse_drives(",".join(drives)), sets, protects)
+    ]
+    simulation = Simulation(
+        specs,
+        timing=LineTiming(baud, form.upper(), real_time),
+        faults=_rates(faults),
+        seed=seed,
+    )
+    stop = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: stop.set())
+    with simulation:
+        where = _serve(simulation, pty, serial, tcp, rtu_tcp)
+        names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
+        click.echo(f"Ready: {names} on {where}. Ctrl-C ends it.")
+        stop.wait()
+
+
+def _serve(
+    simulation: Simulation,
+    pty: str | None,
+    serial: str | None,
+    tcp: str | None,
+    rtu_tcp: str | None,
+) -> str:
+    """Start serving; the place as a LINE."""
+    if pty is not None:
+        simulation.serve_pty(pty)
+        return f"serial:{pty}"
+    if serial is not None:
+        from tui.bus.ports import open_serial
+
+        timing = simulation.timing
+        simulation.serve_stream(open_serial(serial, timing.baud, timing.format))
+        return f"serial:{serial},{timing.baud},{timing.format}"
+    serve: Callable[[str, int], tuple[str, int]]
+    scheme, place, serve = (
+        ("tcp", tcp, simulation.serve_tcp)
+        if tcp is not None
+        else ("rtu-tcp", rtu_tcp or "", simulation.serve_rtu_tcp)
+    )
+    host, port = serve(*_host_port(place))
+    return f"{scheme}:[{host}]:{port}" if ":" in host else f"{scheme}:{host}:{port}"
+
+
+def _host_port(text: str) -> tuple[str, int]:
+    """Host and port; loopback where only a port is given, any free port for 0."""
+    host, _, port = text.rpartition(":")
+    if not port.isdecimal() or int(port) > 65535:
+        raise click.UsageError(f"{text!r}: write HOST:PORT, for example 127.0.0.1:5020.")
+    return host.strip("[]") or "127.0.0.1", int(port)
+
+
+def _addressed(text: str) -> tuple[int | None, str]:
+    address, colon, rest = text.partition(":")
+    if colon and address.isdecimal():
+        return int(address), rest
+    return None, text
+
+
+def _configured(
+    specs: list[DriveSpec], sets: tuple[str, ...], protects: tuple[str, ...]
+) -> list[DriveSpec]:
+    """The drives with their set and protected words; without an address, of every drive."""
+    values: dict[int, dict[str, int]] = {spec.address: {} for spec in specs}
+    hidden: dict[int, set[str]] = {spec.address: set() for spec in specs}
+    for text in sets:
+        address, assignment = _addressed(text)
+        code, _, raw = assignment.partition("=")
+        for one in _addresses(values, address, text):
+            values[one][code] = _raw(raw, text)
+    for text in protects:
+        address, codes = _addressed(text)
+        for one in _addresses(hidden, address, text):
+            hidden[one].update(codes.split(","))
+    return [
+        replace(spec, sets=values[spec.address], protects=frozenset(hidden[spec.address]))
+        for spec in specs
+    ]
+
+
+def _addresses(
+    known: dict[int, object] | dict[int, dict[str, int]] | dict[int, set[str]],
+    address: int | None,
+    text: str,
+) -> list[int]:
+    if address is not None and address not in known:
+        raise click.UsageError(f"{text!r}: no simulated drive has address {address}.")
+    return list(known) if address is None else [address]
+
+
+def _raw(text: str, whole: str) -> int:
+    digits = text.strip().lower().replace("16#", "0x")
+    try:
+        raw = int(digits, 0)
+    except ValueError:
+        raise click.UsageError(f"{whole!r}: write CODE=RAW, for example ACC=30.") from None
+    if not -0x8000 <= raw <= 0xFFFF:
+        raise click.UsageError(f"{whole!r}: {raw} does not fit a word of 16 bits.")
+    return raw
+
+
+def _rates(faults: tuple[str, ...]) -> FaultRates:
+    from tui.simulator import FaultRates
+
+    rates: dict[str, float] = {}
+    for text in faults:
+        kind, _, rate = text.partition("=")
+        if kind not in FAULT_KINDS:
+            raise click.UsageError(f"{text!r}: a line fault is one of {', '.join(FAULT_KINDS)}.")
+        try:
+            rates[kind] = float(rate)
+        except ValueError:
+            raise click.UsageError(f"{text!r}: write KIND=RATE, for example late=0.15.") from None
+    return replace(FaultRates(), **rates)  # type: ignore[arg-type]
