@@ -1,0 +1,235 @@
+"""The line served for real: terminal, TCP, an opened port; plugs pulled; real time kept."""
+
+from __future__ import annotations
+
+import os
+import queue
+import socket
+import statistics
+import threading
+import time
+import tty
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import pytest
+
+from tui.simulator import DriveSpec, LineTiming, Simulation, SimulatorError
+from tui.simulator.frames import seal
+
+from .small import PROFILES
+from .test_manual_frames import read
+
+REQUEST = seal(bytes.fromhex("020323290001"))
+REPLY = seal(bytes.fromhex("020302001E"))
+MBAP_REQUEST = bytes.fromhex("000100000006020323290001")
+MBAP_REPLY = bytes.fromhex("000100000005020302001e")
+
+
+def simulation(timing: LineTiming | None = None) -> Simulation:
+    specs = [DriveSpec("atv71", 2), DriveSpec("atv21", 3, run_hz=20.0)]
+    return Simulation(specs, timing=timing, profiles=PROFILES)
+
+
+@contextmanager
+def terminal(path: str) -> Iterator[int]:
+    port = os.open(path, os.O_RDWR | os.O_NOCTTY)
+    try:
+        tty.setraw(port)
+        yield port
+    finally:
+        os.close(port)
+
+
+def exchange(port: int) -> bytes:
+    os.write(port, REQUEST)
+    return read(port, len(REPLY))
+
+
+def test_a_terminal_serves_the_line() -> None:
+    with simulation() as running, terminal(running.serve_pty()) as port:
+        assert exchange(port) == REPLY
+        assert exchange(port) == REPLY
+
+
+def test_a_terminal_can_be_had_under_a_name(tmp_path: Path) -> None:
+    link = tmp_path / "line"
+    with simulation() as running:
+        assert running.serve_pty(str(link)) == str(link)
+        with terminal(str(link)) as port:
+            assert exchange(port) == REPLY
+    assert not link.is_symlink()
+
+
+def test_a_name_that_is_a_file_is_left_alone(tmp_path: Path) -> None:
+    taken = tmp_path / "file"
+    taken.write_text("mine")
+    with simulation() as running, pytest.raises(SimulatorError, match="is no link"):
+        running.serve_pty(str(taken))
+    assert taken.read_text() == "mine"
+
+
+def test_a_terminal_is_gone_without_its_plug_and_back_with_it(tmp_path: Path) -> None:
+    link = str(tmp_path / "line")
+    with simulation() as running:
+        running.serve_pty(link)
+        with terminal(link) as port:
+            assert exchange(port) == REPLY
+            running.unplug()
+            assert not os.path.lexists(link)
+            with pytest.raises(OSError, match="Input/output error"):
+                os.write(port, REQUEST)
+        running.replug()
+        with terminal(link) as port:
+            assert exchange(port) == REPLY
+
+
+def receive(connection: socket.socket, size: int) -> bytes:
+    data = b""
+    while len(data) < size and (part := connection.recv(size - len(data))):
+        data += part
+    return data
+
+
+def test_modbus_tcp_serves_several_clients() -> None:
+    with simulation() as running:
+        place = running.serve_tcp()
+        with (
+            socket.create_connection(place, timeout=5) as one,
+            socket.create_connection(place, timeout=5) as other,
+        ):
+            for client in (one, other, one):
+                client.sendall(MBAP_REQUEST)
+                assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
+
+
+def test_the_lines_bytes_over_tcp() -> None:
+    with (
+        simulation() as running,
+        socket.create_connection(running.serve_rtu_tcp(), timeout=5) as client,
+    ):
+        client.sendall(REQUEST)
+        assert receive(client, len(REPLY)) == REPLY
+
+
+def test_tcp_connections_break_with_the_plug_and_the_port_comes_back() -> None:
+    with simulation() as running:
+        place = running.serve_tcp()
+        with socket.create_connection(place, timeout=5) as client:
+            client.sendall(MBAP_REQUEST)
+            assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
+            running.unplug()
+            assert client.recv(1) == b""
+        with pytest.raises(ConnectionRefusedError):
+            socket.create_connection(place, timeout=1).close()
+        running.replug()
+        with socket.create_connection(place, timeout=5) as client:
+            client.sendall(MBAP_REQUEST)
+            assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
+
+
+def test_a_port_that_is_taken_is_told() -> None:
+    with simulation() as running:
+        place = running.serve_tcp()
+        with pytest.raises(SimulatorError, match="Nothing can be served"):
+            running.serve_tcp(*place)
+
+
+def test_a_client_that_sends_nonsense_is_dropped_and_others_are_served() -> None:
+    with simulation() as running:
+        place = running.serve_tcp()
+        with socket.create_connection(place, timeout=5) as client:
+            client.sendall(b"GET / HTTP/1.1\r\n\r\n")
+            assert client.recv(100) == b""
+        with socket.create_connection(place, timeout=5) as client:
+            client.sendall(MBAP_REQUEST)
+            assert receive(client, len(MBAP_REPLY)) == MBAP_REPLY
+
+
+class Port:
+    """An opened port: what is put in is read, what is written comes out."""
+
+    def __init__(self) -> None:
+        self.inward: queue.Queue[bytes] = queue.Queue()
+        self.outward: queue.Queue[bytes] = queue.Queue()
+        self.closed = threading.Event()
+
+    def read(self, size: int, /) -> bytes:
+        try:
+            return self.inward.get(timeout=0.01)[:size]
+        except queue.Empty:
+            return b""
+
+    def write(self, data: bytes, /) -> int:
+        self.outward.put(data)
+        return len(data)
+
+    def close(self) -> None:
+        self.closed.set()
+
+
+def test_an_opened_port_is_served_and_closed_at_the_end() -> None:
+    port = Port()
+    with simulation() as running:
+        running.serve_stream(port)
+        port.inward.put(REQUEST[:4])
+        port.inward.put(REQUEST[4:])
+        assert port.outward.get(timeout=5) == REPLY
+    assert port.closed.is_set()
+
+
+def test_several_ways_reach_the_same_drives() -> None:
+    with simulation() as running:
+        place = running.serve_tcp()
+        with (
+            terminal(running.serve_pty()) as port,
+            socket.create_connection(place, timeout=5) as client,
+        ):
+            client.sendall(bytes.fromhex("00010000000602062329001F"))
+            receive(client, 12)
+            os.write(port, REQUEST)
+            assert read(port, len(REPLY)) == seal(bytes.fromhex("020302001F"))
+
+
+def test_the_drives_time_passes_while_nobody_asks() -> None:
+    with simulation() as running:
+        end = time.monotonic() + 10
+        while running.drive(3).motor.frequency < 2 and time.monotonic() < end:
+            time.sleep(0.02)
+        assert running.drive(3).motor.frequency >= 2
+
+
+def test_start_and_stop_can_be_repeated() -> None:
+    running = simulation()
+    for _ in range(2):
+        running.start()
+        running.start()
+        with terminal(running.serve_pty()) as port:
+            assert exchange(port) == REPLY
+        running.stop()
+        running.stop()
+
+
+def test_real_time_takes_about_the_time_of_the_line() -> None:
+    """The middle of several exchanges, in bounds that a busy machine keeps too."""
+    timing = LineTiming(9600, "8E1", real_time=True)
+    characters = len(REQUEST) + len(REPLY)
+    theory = characters * timing.character + max(0.005, timing.silence)
+    with simulation(timing) as running, terminal(running.serve_pty()) as port:
+        taken = []
+        for _ in range(9):
+            start = time.monotonic()
+            assert exchange(port) == REPLY
+            taken.append(time.monotonic() - start)
+            time.sleep(2 * timing.silence)
+    assert min(taken) >= 0.99 * theory
+    assert statistics.median(taken) < 3 * theory
+
+
+def test_without_real_time_an_exchange_is_quicker_than_the_line() -> None:
+    timing = LineTiming(300, "8E1")
+    with simulation(timing) as running, terminal(running.serve_pty()) as port:
+        start = time.monotonic()
+        assert exchange(port) == REPLY
+        assert time.monotonic() - start < (len(REQUEST) + len(REPLY)) * timing.character
