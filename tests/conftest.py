@@ -1,0 +1,47 @@
+"""What every test starts from: folders of its own, one locale, no peers unless they are there."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from hypothesis import settings
+
+settings.register_profile("drivepanel", deadline=None)
+settings.load_profile("drivepanel")
+
+
+@pytest.fixture(autouse=True)
+def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Configuration and state folders that belong to the test."""
+    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path / "config"))
+    monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "state"))
+    monkeypatch.setenv("LC_ALL", "C.UTF-8")
+    monkeypatch.setenv("TZ", "UTC")
+    return tmp_path
+
+
+@pytest.fixture
+def peer() -> Callable[[str, str], str]:
+    """Finds a program that the project did not write.
+
+    Skips with a plain reason where it is missing; fails where `DRIVEPANEL_PEERS` is `required`.
+    """
+
+    def find(program: str, package: str) -> str:
+        if found := shutil.which(program):
+            return found
+        need_peer(f"{program} is not here; it comes with the package {package}.")
+        raise AssertionError  # need_peer never returns
+
+    return find
+
+
+def need_peer(reason: str) -> None:
+    """Skip the test for want of a peer, or fail where peers are required."""
+    if os.environ.get("DRIVEPANEL_PEERS") == "required":
+        pytest.fail(reason)
+    pytest.skip(reason)
