@@ -7,9 +7,9 @@ import struct
 import pytest
 
 from tui.simulator import DriveSpec, LineTiming, SimulatedDrive, SimulatorError
-from tui.simulator.drive import in_group
 from tui.simulator.frames import seal
 from tui.simulator.line import SimulatedLine
+from tui.simulator.station import in_group
 
 from .small import PROFILES
 

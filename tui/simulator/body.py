@@ -86,9 +86,13 @@ class Body:
         return default if found is None else self.registers.in_force(found)
 
     def show(self, quantity: Quantity, engineering: float) -> None:
-        """Put an engineering value into the word of a quantity, if the family has one."""
+        """Put an engineering value into the word of a quantity, if the family has one.
+
+        A word without a sign shows the size.
+        """
         if found := self.parameter(quantity):
-            self.registers.put(found, round(engineering / self.scale(found)))
+            value = engineering if found.type.startswith("int") else abs(engineering)
+            self.registers.put(found, round(value / self.scale(found)))
 
     def show_raw(self, quantity: Quantity, raw: int) -> None:
         """Put a raw value into the word of a quantity, if the family has one."""

@@ -12,7 +12,10 @@ from enum import Enum
 
 from tui.drive.schema import Parameter
 
+from .altivar_words import show_altivar_words
 from .body import Body, Fallback
+from .drivecom_reference import DrivecomReference
+from .drivecom_status import Appearance, extended_status_word, status_word
 from .io_profile import IoCommand, io_status, read_io_command
 from .motor import Order, Stop
 from .rules import MODBUS_COMMAND, MODBUS_REFERENCE
@@ -56,13 +59,13 @@ TRANSITIONS: Mapping[tuple[State, Command], State] = {
 }
 """Transitions that are made at once; Disable operation (16#0007) may wait for a ramp."""
 
-FAULT_RESET, HALT, REVERSE, STOP_STT, INJECTION, FAST = (1 << b for b in (7, 8, 11, 12, 13, 14))
-CMI_FAST, CMI_INJECTION, CMI_REVERSE, CMI_HIGH_RESOLUTION = (1 << b for b in (10, 11, 12, 9))
-CMI_LOCKED = 1 << 15
+FAULT_RESET, HALT, STOP_STT, INJECTION, FAST = (1 << bit for bit in (7, 8, 12, 13, 14))
+CMI_SECOND_RAMP, CMI_FAST, CMI_INJECTION, CMI_LOCKED = (1 << bit for bit in (4, 10, 11, 15))
 STT = {0: Stop.RAMP, 1: Stop.FAST, 2: Stop.FREEWHEEL, 3: Stop.INJECTION}
 IO_PROFILE, SEPARATE = 3, 2
 REACHED_HZ = 0.1
-FULL_COUNT = 32767
+LINE, TERMINALS = 1 << 3, 1 << 0
+"""Channels in force, as CCC and CRC show them."""
 QSTD_LEAVES = 2
 COMMAND_BITS = 160
 """Assignment of an input to bit 0 of the command word (RSF and others); bit 1 is one more."""
@@ -86,7 +89,8 @@ class DrivecomChart:
         self._stop = Stop.RAMP
         self._last_command = 0
         self._io = IoCommand()
-        self._reference_hz = 0.0
+        self._target_hz = 0.0
+        self._reference = DrivecomReference(body)
 
     # Orders from outside
 
@@ -220,8 +224,8 @@ class DrivecomChart:
             return base
         if stop is Stop.INJECTION:
             return replace(base, injection=True)
-        self._reference_hz = 0.0 if stop else self._target()
-        return replace(base, energised=True, target=self._reference_hz)
+        self._target_hz = 0.0 if stop else self._reference.target(self._wanted())
+        return replace(base, energised=True, target=self._target_hz)
 
     def _settle(self) -> None:
         """Transitions that the drive makes by itself once the motor stands."""
@@ -292,132 +296,56 @@ class DrivecomChart:
         return STT.get(self._body.setting("STT", 0), Stop.RAMP)
 
     def _second_ramp(self) -> bool:
-        return bool(self._cmi & 1 << 4) and self._body.traits.access_levels
+        return bool(self._cmi & CMI_SECOND_RAMP) and self._body.traits.access_levels
 
     @property
     def _cmi(self) -> int:
         return self._body.raw("extended_command_word") & 0xFFFF
 
-    # Reference
-
-    def _target(self) -> float:
-        body = self._body
-        if body.fallback is Fallback.SPEED:
-            speed = body.registers.named("LFF")
-            return self._cut(body.engineering(speed) if speed else 0.0)
-        if body.fallback is Fallback.MAINTAIN:
-            return body.motor.frequency
-        return self._cut(self._wanted())
-
     def _wanted(self) -> float:
         """The signed reference in Hz before LSP and HSP."""
-        body = self._body
-        line = self._line_reference() if self._network and self.network_reference else None
-        if line is None:
-            line = body.terminal_hz or 0.0
         if not self._network:
-            return line
-        reverse = bool(self._last_command & REVERSE)
-        if self._io_profile():
-            reverse = self._io.reverse
-        elif not body.traits.access_levels and self._cmi & CMI_REVERSE:
-            reverse = not reverse
-        return -line if reverse else line
-
-    def _line_reference(self) -> float | None:
-        """The later written of frequency and speed reference, in Hz; None if none was."""
-        body = self._body
-        frequency, speed = body.parameter("command_frequency"), body.parameter("command_speed")
-        at, speed_at = body.ordered_at(frequency), body.ordered_at(speed)
-        if not at and not speed_at:
-            return None
-        if speed is not None and speed_at > at:
-            return body.engineering(speed) * self.poles / 120
-        assert frequency is not None
-        return body.registers.in_force(frequency) * self.hz_per_count(frequency)
-
-    @property
-    def poles(self) -> int:
-        """Poles of the motor."""
-        return round(self._body.value("motor_poles", self._body.rating.poles)) or 4
-
-    def hz_per_count(self, parameter: Parameter) -> float:
-        """What one count of a frequency word is worth, with CMI bit 9 in mind."""
-        if not self._cmi & CMI_HIGH_RESOLUTION:
-            return self._body.scale(parameter)
-        fixed = self._body.traits.max_hz_high_resolution
-        return (fixed or self._body.value("max_frequency", 60.0)) / FULL_COUNT
-
-    def _cut(self, hz: float) -> float:
-        low, high = self._limits()
-        size = min(max(abs(hz), low), high)
-        return -size if hz < 0 else size
-
-    def _limits(self) -> tuple[float, float]:
-        body = self._body
-        high = min(body.value("high_speed", 1e9), body.value("max_frequency", 1e9))
-        return min(body.value("low_speed", 0.0), high), high
+            return self._reference.by_terminals()
+        io = self._io if self._io_profile() else None
+        return self._reference.by_line(self._last_command, io, channel=self.network_reference)
 
     # What the line is shown
 
     def show(self) -> None:
-        """Put the status words of the present state into their registers."""
+        """Put the words of the present state into their registers."""
         body = self._body
         motor = body.motor
-        word = self._status()
-        body.show_raw("status_word", word)
-        body.show_raw("extended_status_word", self._extended_status())
-        line = self._line_commands
-        body.show_code("CCC", 1 << 3 if line else 1)
-        body.show_code("CRC", 1 << 3 if line and self.network_reference else 1)
-        wanted = self._reference_hz if motor.energised else self._wanted()
-        body.show("frequency_reference", wanted)
+        seen = self._appearance()
+        body.show_raw("status_word", status_word(body, seen))
+        body.show_raw("extended_status_word", extended_status_word(body, seen))
+        body.show_code("CCC", LINE if seen.line_commands else TERMINALS)
+        by_line = seen.line_commands and self.network_reference
+        body.show_code("CRC", LINE if by_line else TERMINALS)
+        shown = self._target_hz if motor.energised else seen.wanted
+        body.show("frequency_reference", shown)
+        body.show("speed_reference", shown * 120 / self._reference.poles)
         if frequency := body.parameter("output_frequency"):
-            body.registers.put(frequency, round(motor.frequency / self.hz_per_count(frequency)))
-        body.show("speed_reference", wanted * 120 / self.poles)
+            count = self._reference.hz_per_count(frequency)
+            body.registers.put(frequency, round(motor.frequency / count))
+        disabled = self.state is State.DISABLED and not self._io_profile()
+        show_altivar_words(body, seen.stop, disabled=disabled, reached=seen.reached)
 
-    @property
-    def _line_commands(self) -> bool:
-        """Whether the line has the command now, and not a run order at the terminals."""
-        return self._network or (self.network_commands and self._body.terminal_hz is None)
-
-    def _status(self) -> int:
+    def _appearance(self) -> Appearance:
         body = self._body
         motor = body.motor
         going = motor.energised and self._powered()
-        reached = going and abs(motor.frequency - self._reference_hz) < REACHED_HZ
-        low, high = self._limits()
-        asked = abs(self._wanted())
-        marks = (
-            (body.traits.power_bit and motor.mains > 0, 4),
-            (body.alarms != 0 or motor.motor_thermal >= 100, 7),
-            (body.traits.remote_always or self._line_commands, 9),
-            (reached, 10),
-            (going and not low - 0.05 <= asked <= high + 0.05, 11),
-            (motor.frequency < 0, 15),
-        )
-        upper = sum(1 << bit for given, bit in marks if given)
+        wanted = self._wanted()
+        bits = self.state.value
         if self._io_profile():
-            return upper | io_status(fault=body.fault is not None, running=body.turning)
-        return upper | self.state.value
-
-    def _extended_status(self) -> int:
-        body = self._body
-        motor = body.motor
-        change = abs(motor.frequency) * motor.acceleration * (1 if motor.frequency >= 0 else -1)
-        fault = body.fault
-        marks = (
-            (body.saving > 0, 0),
-            (not self._cmi & CMI_LOCKED, 1),
-            (fault is not None and not fault.persists, 2),
-            (motor.frequency != 0 if body.traits.running_bit else True, 4),
-            (motor.braking, 5),
-            (motor.acceleration != 0, 6),
-            (motor.motor_thermal >= 100, 7),
-            (change > 0, 9),
-            (change < 0, 10),
-            (self._stopping() is Stop.FAST and motor.frequency != 0, 12),
-            (self._network, 14),
-            (self._wanted() < 0, 15),
+            bits = io_status(fault=body.fault is not None, running=body.turning)
+        return Appearance(
+            state_bits=bits,
+            network=self._network,
+            line_commands=self._network or (self.network_commands and body.terminal_hz is None),
+            going=going,
+            reached=going and abs(motor.frequency - self._target_hz) < REACHED_HZ,
+            wanted=wanted,
+            outside=self._reference.outside(wanted),
+            stop=self._stopping(),
+            locked=bool(self._cmi & CMI_LOCKED),
         )
-        return sum(1 << bit for given, bit in marks if given)

@@ -12,7 +12,7 @@ from random import Random
 from typing import Protocol
 
 from tui.drive.profile import Profile
-from tui.drive.schema import Function, LinkSetting, Parameter
+from tui.drive.schema import Function, Parameter
 from tui.drive.values import type_range
 
 from .access import DriveWords
@@ -22,18 +22,20 @@ from .chart_altivar21 import EMERGENCY_FAULT, Altivar21Chart
 from .chart_drivecom import DrivecomChart
 from .chart_leroy import LeroySomerChart
 from .errors import SimulatorError
+from .fault_history import FaultHistory, fault_raw
 from .first_values import first_values
 from .functions import Server, identity_of
 from .load import Load, Wanderer
 from .memory import Memory
+from .models import model_words
 from .monitoring import show_motor
 from .motor import MotorState, Order, Stop, rating_of, step
 from .registers import Registers
 from .rules import Kind, traits_of
 from .spec import DriveSpec, LineTiming
+from .station import Station
 from .watch import Consequence, Watch
 
-DELAY_UNIT = 0.001
 REFERENCES = frozenset({"command_word", "command_frequency", "command_speed"})
 """Orders that start the watch where it needs one."""
 
@@ -81,7 +83,8 @@ class SimulatedDrive:
         identity = identity_of(identification, spec.name, spec.identity)
         rating = rating_of(identity.get(1, b"").decode("ascii", "replace"))
         initial = first_values(profile, rating, traits.first_values)
-        self.registers = Registers(profile, initial)
+        self.registers = Registers(profile, initial, first_values(profile, rating, {}))
+        self.station = Station(profile, self.registers, spec.address)
         random = Random(f"{seed}/{spec.address}")
         hours = 900.0 + random.randrange(2000)
         self._body = Body(
@@ -93,6 +96,7 @@ class SimulatedDrive:
         )
         self._chart = CHARTS[traits.kind](self._body)
         self._watch = Watch(self._body)
+        self._history = FaultHistory(self._body)
         self._memory = Memory(self._body)
         self._load = Load(random)
         self._wanderer = Wanderer(random)
@@ -117,25 +121,13 @@ class SimulatedDrive:
                 self._cards[server.parameter.casefold()] = (words, own)
 
     def _set_up(self, timing: LineTiming) -> None:
-        self._line_settings: list[tuple[LinkSetting, Parameter]] = []
-        for setting in self.profile.data.link.settings:
-            parameter = self.profile[setting.parameter]
-            fitting = [c.raw for c in setting.choices if _fits(c, timing)]
-            first = all(setting.role != known.role for known, _ in self._line_settings)
-            if first and setting.role in ("baud", "format", "parity") and fitting:
-                self.registers.settle(parameter, fitting[0])
-                self._line_settings.append((setting, parameter))
+        self.station.settle(timing)
         for code, raw in self.spec.sets.items():
             self.set(code, raw)
-        if address := self._address_parameter():
-            self.registers.settle(address, self.spec.address)
+        self.station.settle_address()
+        for code, raw in model_words(self.profile, self.server.identity).items():
+            self.registers.put(self.profile[code], raw)
         self.registers.protect(self.profile.find(code) for code in self.spec.protects)
-
-    def _address_parameter(self) -> Parameter | None:
-        for setting in self.profile.data.link.settings:
-            if setting.role == "address":
-                return self.profile[setting.parameter]
-        return self.profile.quantity("line_address")
 
     def set(self, code: str, raw: int) -> None:
         """Put a raw value in force, as if it had always been there; a monitored one stays.
@@ -232,20 +224,8 @@ class SimulatedDrive:
         SimulatorError for a code that the profile does not know.
         """
         with self._lock:
-            self._trip(self._fault_raw(fault), Stop.FREEWHEEL, persists)
+            self._trip(fault_raw(self.profile, fault), Stop.FREEWHEEL, persists)
             self._refresh()
-
-    def _fault_raw(self, fault: str | int) -> int:
-        if isinstance(fault, int):
-            return fault
-        wanted = fault.strip()
-        for known in self.profile.data.faults.codes:
-            if known.code.casefold() == wanted.casefold():
-                return known.raw
-        if wanted.isdecimal():
-            return int(wanted)
-        codes = ", ".join(f.code for f in self.profile.data.faults.codes[:8]) or "none"
-        raise SimulatorError(f"{self.profile.name} has no fault {fault!r}. Known: {codes} ...")
 
     def clear_cause(self) -> None:
         """Take a fault's cause away, so that a reset helps."""
@@ -264,28 +244,10 @@ class SimulatedDrive:
         body = self._body
         if body.fault is not None:
             return
-        known = self.profile.fault(raw)
-        self._remember_fault(raw)
-        body.fault = ActiveFault(raw, known.code if known else str(raw), persists)
+        self._history.enter(raw, persists=persists)
         body.terminal_hz = None
         self._wanderer.begin(None)
         self._chart.trip(stop)
-
-    def _remember_fault(self, raw: int) -> None:
-        """Show the fault, and move the history on by it, or by the one before it."""
-        faults = self.profile.data.faults
-        present = self.registers.named(faults.parameter) if faults.parameter else None
-        older = raw
-        if self._body.traits.history_before and present is not None:
-            older = self.registers.present(present)
-        if present is not None:
-            self.registers.put(present, raw)
-        if older == faults.none:
-            return
-        places = [self.profile[code] for code in faults.history]
-        kept = [older, *(self.registers.present(p) for p in places)]
-        for place, value in zip(places, kept, strict=False):
-            self.registers.put(place, value)
 
     # Time
 
@@ -326,10 +288,7 @@ class SimulatedDrive:
         self._show()
 
     def _show(self) -> None:
-        faults = self.profile.data.faults
-        if faults.parameter and not faults.shows_last:
-            fault = self._body.fault
-            self._body.show_code(faults.parameter, fault.raw if fault else faults.none)
+        self._history.show()
         self._chart.show()
         frozen = self._body.traits.kind == "altivar21" and self._body.fault is not None
         if not frozen:
@@ -340,26 +299,16 @@ class SimulatedDrive:
     @property
     def address(self) -> int:
         """The address the drive answers at now."""
-        parameter = self._address_parameter()
-        return self.registers.in_force(parameter) if parameter else self.spec.address
+        return self.station.address
 
     @property
     def turnaround(self) -> float:
         """Time from the end of a request to the start of the reply, in s."""
-        for setting in self.profile.data.link.settings:
-            if setting.role == "delay":
-                delay = self.registers.in_force(self.profile[setting.parameter])
-                return max(delay * DELAY_UNIT, 0.0015)
-        return float(self.profile.data.link.turnaround_ms) / 1000
+        return self.station.turnaround
 
     def hears(self, timing: LineTiming) -> bool:
-        """Whether the drive's baud and format in force are those of the line."""
-        for setting, parameter in self._line_settings:
-            raw = self.registers.in_force(parameter)
-            choice = next((c for c in setting.choices if c.raw == raw), None)
-            if choice is not None and not _fits(choice, timing):
-                return False
-        return True
+        """Whether the drive understands what is on the line."""
+        return self.station.hears(timing)
 
     def answers_at(self, address: int) -> bool:
         """Whether one of the drive's servers has this address and replies there."""
@@ -368,8 +317,7 @@ class SimulatedDrive:
     def _server_at(self, address: int) -> Server | None:
         if address == 0:
             return None
-        addresses = self.profile.data.addresses
-        if address == self.address and not (addresses.zero_digit_is_group and "0" in str(address)):
+        if address == self.address and not self.station.is_group:
             return self.server
         for code, (_, server) in self._cards.items():
             if self._body.setting(code, 0) == address:
@@ -378,12 +326,7 @@ class SimulatedDrive:
 
     def is_called(self, address: int) -> bool:
         """Whether a broadcast or group address means this drive too."""
-        addresses = self.profile.data.addresses
-        if not self._powered or not self.address:
-            return False
-        if address == addresses.broadcast:
-            return True
-        return addresses.zero_digit_is_group and in_group(self.address, address)
+        return self._powered and self.station.is_called(address)
 
     def answer(self, address: int, pdu: bytes) -> bytes | None:
         """The reply of the server at an address; None where it stays silent."""
@@ -427,20 +370,6 @@ class SimulatedDrive:
         self._memory.written(parameter)
         self._chart.written(parameter)
         self._refresh()
-
-
-def in_group(own: int, called: int) -> bool:
-    """Whether a group address calls an address: each zero digit stands for any digit but 0."""
-    mine, theirs = str(own), str(called)
-    if called == 0 or "0" not in theirs or "0" in mine or len(mine) != len(theirs):
-        return False
-    return all(t in ("0", m) for m, t in zip(mine, theirs, strict=True))
-
-
-def _fits(choice: object, timing: LineTiming) -> bool:
-    """Whether a choice of a link setting agrees with the line, as far as it says anything."""
-    wanted = {"baud": timing.baud, "format": timing.format, "parity": timing.format[1]}
-    return all(getattr(choice, k, None) in (None, v) for k, v in wanted.items())
 
 
 def _typed(parameter: Parameter, raw: int) -> int:

@@ -12,6 +12,8 @@ from .body import Body
 
 CMI_FACTORY, CMI_SAVE, CMI_RESTORE = 1 << 0, 1 << 1, 1 << 2
 SAVE_TIME = 0.5
+LEVEL_3 = 2
+CHANNELS = ("FR1", "CD1", "CHCF", "TCC")
 LINE_ROLES = frozenset({"address", "baud", "format", "parity", "protocol", "timeout", "delay"})
 
 
@@ -21,10 +23,12 @@ class Memory:
     def __init__(self, body: Body) -> None:
         self._body = body
         self._last = 0
+        self._level = 0
 
     def power_up(self) -> None:
         """No command is pending."""
         self._last = 0
+        self._level = self._body.setting("LAC", 0)
 
     def written(self, parameter: Parameter) -> None:
         """Follow a word that the line wrote."""
@@ -33,6 +37,17 @@ class Memory:
         elif parameter.quantity == "save_settings" and self._body.registers.present(parameter):
             self._save()
             self._body.registers.put(parameter, 0)
+        elif self._body.traits.access_levels and parameter.code.casefold() == "lac":
+            self._access_level(parameter)
+
+    def _access_level(self, parameter: Parameter) -> None:
+        """Reaching level L3 makes the channels their factory values (ATV31/312)."""
+        level = self._body.registers.present(parameter)
+        if level == LEVEL_3 and self._level != LEVEL_3:
+            for code in CHANNELS:
+                if channel := self._body.registers.named(code):
+                    self._body.registers.make_factory(channel)
+        self._level = level
 
     def _extended(self, parameter: Parameter) -> None:
         word = self._body.registers.present(parameter) & 0xFFFF

@@ -28,7 +28,9 @@ class Registers:
     command where it keeps a working copy, and never where it is kept in memory only.
     """
 
-    def __init__(self, profile: Profile, initial: Mapping[str, int]) -> None:
+    def __init__(
+        self, profile: Profile, initial: Mapping[str, int], factory: Mapping[str, int]
+    ) -> None:
         self.profile = profile
         self._words: dict[int, int] = {}
         self._in_force: dict[int, int] = {}
@@ -40,7 +42,11 @@ class Registers:
             for offset in range(word_count(parameter)):
                 self._owner.setdefault(parameter.address + offset, parameter)
             self._store(parameter, initial[parameter.code])
-        self._factory = dict(self._words)
+        self._factory = {
+            parameter.address + offset: word
+            for parameter in profile.parameters
+            for offset, word in enumerate(to_words(parameter, factory[parameter.code]))
+        }
         self._own = {address for address, p in self._owner.items() if p.access == "r"}
         self._volatile = {address for address, p in self._owner.items() if is_volatile(p)}
         self._saved = {a: word for a, word in self._words.items() if a not in self._own}
@@ -121,8 +127,12 @@ class Registers:
         for parameter in self.profile.parameters:
             if parameter.access == "r" or is_volatile(parameter) or parameter.code in keep:
                 continue
-            for address in _addresses(parameter):
-                self._words[address] = self._in_force[address] = self._factory[address]
+            self.make_factory(parameter)
+
+    def make_factory(self, parameter: Parameter) -> None:
+        """Make one parameter its factory value."""
+        for address in _addresses(parameter):
+            self._words[address] = self._in_force[address] = self._factory[address]
 
     def _store(self, parameter: Parameter, raw: int) -> None:
         low, high = type_range(parameter)

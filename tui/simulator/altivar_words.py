@@ -1,0 +1,92 @@
+"""Words of the Altivar 31, 312 and 71 beside the status word: keypad state, records of faults.
+
+Source: ATV71 communication parameters list (HMIS, LRS1, LRS8, CNFS, DP0 and its record);
+ATV312 communication variables (EP1 to EP4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from .body import Body
+from .motor import Stop
+
+RECORDED: Mapping[str, str] = {
+    "EP": "ETA",
+    "IP": "ETI",
+    "CMP": "CMD",
+    "ULP": "ULN",
+    "LCP": "LCR",
+    "RFP": "RFR",
+    "THP": "THR",
+    "RTP": "RTH",
+}
+"""Beginnings of the codes of a fault's record, and the word that each keeps; 0 is the last."""
+RECORDS = 9
+
+(INJECTING, READY, FREEWHEEL, RUNNING, ACCELERATING, DECELERATING, FAST_STOP, FAULT) = (
+    1,
+    2,
+    3,
+    4,
+    5,
+    6,
+    8,
+    23,
+)
+
+
+class FaultRecords:
+    """What the drive did when its last faults came, the last first."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._records: list[dict[str, int]] = []
+
+    def take(self) -> None:
+        """Keep the words of this moment as the record of a fault."""
+        registers = self._body.registers
+        record = {
+            start: registers.present(parameter)
+            for start, code in RECORDED.items()
+            if (parameter := registers.named(code))
+        }
+        self._records = [record, *self._records][:RECORDS]
+        for number, kept in enumerate(self._records):
+            for start, raw in kept.items():
+                self._body.show_code(f"{start}{number}", raw)
+
+
+def keypad_state(body: Body, stop: Stop | None, *, disabled: bool) -> int:
+    """What the keypad of an Altivar 71 shows (HMIS)."""
+    motor = body.motor
+    change = motor.acceleration * (1 if motor.frequency >= 0 else -1)
+    shown = (
+        (body.fault is not None and not body.turning, FAULT),
+        (motor.braking, INJECTING),
+        (stop is Stop.FAST and motor.frequency != 0, FAST_STOP),
+        (motor.energised and change > 0, ACCELERATING),
+        (motor.energised and change < 0, DECELERATING),
+        (motor.energised, RUNNING),
+        (disabled, FREEWHEEL),
+    )
+    return next((state for holds, state in shown if holds), READY)
+
+
+def show_altivar_words(body: Body, stop: Stop | None, *, disabled: bool, reached: bool) -> None:
+    """Put the further words of the family into their registers."""
+    motor = body.motor
+    high = body.value("high_speed", 0.0)
+    marks = (
+        (body.fault is not None, 1),
+        (motor.energised, 2),
+        (high > 0 and abs(motor.frequency) >= high - 0.05, 5),
+        (reached, 7),
+        (motor.motor_thermal >= 100, 8),
+    )
+    body.show_code("LRS1", sum(1 << bit for holds, bit in marks if holds))
+    if body.traits.power_bit:
+        body.show_code("HMIS", keypad_state(body, stop, disabled=disabled))
+        body.show_code("LRS8", 0 if body.fault or motor.energised else 1 << 15)
+        body.show_code("CNFS", 1)
+    body.show_code("IL1R", 1 if body.terminal_hz is not None else 0)

@@ -1,0 +1,68 @@
+"""Faults of a drive: from code to raw value, shown, and moved through the history."""
+
+from __future__ import annotations
+
+from tui.drive.profile import Profile
+
+from .altivar_words import FaultRecords
+from .body import ActiveFault, Body
+from .errors import SimulatorError
+
+
+def fault_raw(profile: Profile, fault: str | int) -> int:
+    """The raw value of a fault given by code in any case, or by its raw value.
+
+    Raises SimulatorError for a code that the profile does not know.
+    """
+    if isinstance(fault, int):
+        return fault
+    wanted = fault.strip()
+    for known in profile.data.faults.codes:
+        if known.code.casefold() == wanted.casefold():
+            return known.raw
+    if wanted.isdecimal():
+        return int(wanted)
+    codes = ", ".join(f.code for f in profile.data.faults.codes[:8]) or "none"
+    raise SimulatorError(f"{profile.name} has no fault {fault!r}. Known: {codes} ...")
+
+
+class FaultHistory:
+    """The fault words of one drive."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._faults = body.profile.data.faults
+        self._records = FaultRecords(body)
+
+    def enter(self, raw: int, *, persists: bool) -> None:
+        """Give the drive a fault: keep its record, show it, and move the history on.
+
+        The history moves on by the new fault, or by the one before it where the last fault
+        has a word of its own beside the history.
+        """
+        body = self._body
+        self._records.take()
+        named = self._faults.parameter
+        present = body.registers.named(named) if named else None
+        newest = raw
+        if body.traits.history_before and present is not None:
+            newest = body.registers.present(present)
+        if present is not None:
+            body.registers.put(present, raw)
+        if newest != self._faults.none:
+            self._push(newest)
+        known = body.profile.fault(raw)
+        body.fault = ActiveFault(raw, known.code if known else str(raw), persists)
+
+    def _push(self, newest: int) -> None:
+        registers = self._body.registers
+        places = [self._body.profile[code] for code in self._faults.history]
+        kept = [newest, *(registers.present(place) for place in places)]
+        for place, value in zip(places, kept, strict=False):
+            registers.put(place, value)
+
+    def show(self) -> None:
+        """Show the present fault where its word does not keep the last one."""
+        if self._faults.parameter and not self._faults.shows_last:
+            fault = self._body.fault
+            self._body.show_code(self._faults.parameter, fault.raw if fault else self._faults.none)

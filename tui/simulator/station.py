@@ -1,0 +1,105 @@
+"""A drive's place on the line: its address, groups, baud and format, and its turnaround."""
+
+from __future__ import annotations
+
+from tui.drive.profile import Profile
+from tui.drive.schema import LinkChoice, LinkSetting, Parameter
+
+from .registers import Registers
+from .spec import LineTiming
+
+SHORTEST_TURNAROUND = 0.0015
+"""PX-MODBUS manual 4, 15.06: never less, in s."""
+LINE_ROLES = ("baud", "format", "parity")
+
+
+class Station:
+    """What the link settings in force make of one drive."""
+
+    def __init__(self, profile: Profile, registers: Registers, address: int) -> None:
+        self._profile = profile
+        self._registers = registers
+        self._given = address
+        self._settings: list[tuple[LinkSetting, Parameter]] = []
+
+    def settle(self, timing: LineTiming) -> None:
+        """Give the drive the settings of the line, as far as its own choices allow."""
+        roles: set[str] = set()
+        for setting in self._profile.data.link.settings:
+            fitting = [c.raw for c in setting.choices if _fits(c, timing)]
+            if setting.role in LINE_ROLES and setting.role not in roles and fitting:
+                parameter = self._profile[setting.parameter]
+                self._registers.settle(parameter, fitting[0])
+                self._settings.append((setting, parameter))
+                roles.add(setting.role)
+
+    def settle_address(self) -> None:
+        """Give the drive its address."""
+        if parameter := self._address_parameter():
+            self._registers.settle(parameter, self._given)
+
+    def _address_parameter(self) -> Parameter | None:
+        for setting in self._profile.data.link.settings:
+            if setting.role == "address":
+                return self._profile[setting.parameter]
+        return self._profile.quantity("line_address")
+
+    @property
+    def address(self) -> int:
+        """The address the drive answers at now."""
+        parameter = self._address_parameter()
+        return self._registers.in_force(parameter) if parameter else self._given
+
+    @property
+    def is_group(self) -> bool:
+        """Whether the drive's own address calls a group, so that it never answers there."""
+        return self._profile.data.addresses.zero_digit_is_group and "0" in str(self.address)
+
+    def is_called(self, address: int) -> bool:
+        """Whether a broadcast or group address means this drive too."""
+        addresses = self._profile.data.addresses
+        if not self.address:
+            return False
+        if address == addresses.broadcast:
+            return True
+        return addresses.zero_digit_is_group and in_group(self.address, address)
+
+    @property
+    def turnaround(self) -> float:
+        """Time from the end of a request to the start of the reply, in s."""
+        for setting in self._profile.data.link.settings:
+            if setting.role == "delay":
+                delay = self._registers.in_force(self._profile[setting.parameter])
+                return max(delay / 1000, SHORTEST_TURNAROUND)
+        return float(self._profile.data.link.turnaround_ms) / 1000
+
+    def hears(self, timing: LineTiming) -> bool:
+        """Whether the drive's protocol, baud and format in force are those of the line."""
+        for setting in self._profile.data.link.settings:
+            if setting.role == "protocol" and setting.factory is not None:
+                protocol = self._registers.in_force(self._profile[setting.parameter])
+                if protocol != setting.factory:
+                    return False
+        for setting, parameter in self._settings:
+            raw = self._registers.in_force(parameter)
+            choice = next((c for c in setting.choices if c.raw == raw), None)
+            if choice is not None and not _fits(choice, timing):
+                return False
+        return True
+
+
+def in_group(own: int, called: int) -> bool:
+    """Whether a group address calls an address: each zero digit stands for any digit but 0."""
+    mine, theirs = str(own), str(called)
+    if called == 0 or "0" not in theirs or "0" in mine or len(mine) != len(theirs):
+        return False
+    return all(t in ("0", m) for m, t in zip(mine, theirs, strict=True))
+
+
+def _fits(choice: LinkChoice, timing: LineTiming) -> bool:
+    """Whether a choice agrees with the line, as far as it says anything."""
+    return (
+        choice.baud in (None, timing.baud)
+        and choice.format in (None, timing.format)
+        and choice.parity in (None, timing.format[1])
+    )
