@@ -3,20 +3,12 @@
 from __future__ import annotations
 
 import logging
-import os
 from logging.handlers import RotatingFileHandler
 from pathlib import Path
 
+from tui.session.state import state_folder
+
 LEVELS = (logging.INFO, logging.DEBUG)
-
-
-def state_folder() -> Path:
-    """The folder for what the panel keeps; `DRIVEPANEL_STATE` names another."""
-    if configured := os.environ.get("DRIVEPANEL_STATE"):
-        return Path(configured)
-    from platformdirs import user_state_path
-
-    return user_state_path("drivepanel", appauthor=False)
 
 
 def log_file() -> Path:

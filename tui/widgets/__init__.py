@@ -1,0 +1,1 @@
+"""Parts of screens: lines that redraw only what changed, and what is drawn in them."""

@@ -1,0 +1,75 @@
+"""A widget of text lines that sends to the terminal only the lines that changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.text import Text
+from textual.geometry import Region, Size
+from textual.strip import Strip
+from textual.widget import Widget
+
+
+class Lines(Widget):
+    """Text lines at fixed places; showing the same lines again costs nothing."""
+
+    DEFAULT_CSS = "Lines { height: auto; width: 1fr; }"
+
+    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:
+        super().__init__(id=id, classes=classes)
+        self._lines: list[Text] = []
+        self._strips: dict[int, Strip] = {}
+        self.redrawn = 0
+        """How many lines were sent so far, for tests and benchmarks."""
+
+    @property
+    def lines(self) -> list[Text]:
+        """What is shown."""
+        return list(self._lines)
+
+    def show(self, lines: Sequence[Text]) -> None:
+        """Show these lines; only those that differ from the ones before are drawn."""
+        old = self._lines
+        self._lines = list(lines)
+        changed = [
+            y
+            for y in range(max(len(old), len(lines)))
+            if y >= len(old) or y >= len(lines) or not same(old[y], lines[y])
+        ]
+        for y in changed:
+            self._strips.pop(y, None)
+        if changed and self.size.width:
+            self.redrawn += len(changed)
+            self.refresh(*(Region(0, y, self.size.width, 1) for y in changed))
+        if len(old) != len(lines) and self.styles.is_auto_height:
+            self.refresh(layout=True)
+
+    def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
+        """One row a line."""
+        return len(self._lines)
+
+    def notify_style_update(self) -> None:
+        """Draw anew when colours change."""
+        self._strips.clear()
+        super().notify_style_update()
+
+    def render_line(self, y: int) -> Strip:
+        """A line, cut or filled to the width."""
+        width = self.size.width
+        strip = self._strips.get(y)
+        if strip is None or strip.cell_length != width:
+            strip = self._draw(y, width)
+            self._strips[y] = strip
+        return strip
+
+    def _draw(self, y: int, width: int) -> Strip:
+        style = self.rich_style
+        if y >= len(self._lines):
+            return Strip.blank(width, style)
+        segments = [s for s in self._lines[y].render(self.app.console) if s.text != "\n"]
+        return Strip(segments).apply_style(style).adjust_cell_length(width, style)
+
+
+def same(one: Text, other: Text) -> bool:
+    """Whether two lines look the same, their colours too."""
+    return one.plain == other.plain and one.spans == other.spans and one.style == other.style

@@ -1,0 +1,461 @@
+"""What the Monitor screen says: pure functions from one snapshot to lines of text."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.bus.line import Counters, LineState, LineStatus
+from tui.drive.profile import Profile, is_verified
+from tui.drive.schema import MonitoringValue, Parameter, Quantity
+from tui.drive.values import NOT_AVAILABLE, is_enumeration
+from tui.session.drive_state import DriveState, channel_text
+from tui.session.identify import DriveIdentity
+from tui.session.monitor import STALE_CYCLES, Snapshot, TrendPoint
+from tui.session.readings import Quality, Reading
+
+from .drawing import aligned, bar, cut, pair, rule, trend
+from .palette import (
+    ALARM,
+    ATTENTION,
+    FAINT,
+    FAULT,
+    FAULT_BLOCK,
+    LINE,
+    PLAIN,
+    RUNNING,
+    STALE,
+    STRONG,
+)
+
+LABELS: dict[Quantity, str] = {
+    "output_frequency": "Output",
+    "frequency_reference": "Reference",
+    "ramp_output": "After ramp",
+    "speed": "Speed",
+    "motor_current": "Current",
+    "motor_voltage": "Motor voltage",
+    "mains_voltage": "Mains",
+    "dc_bus": "DC bus",
+    "torque": "Torque",
+    "power": "Power",
+    "input_power": "Input power",
+    "drive_thermal": "Drive thermal",
+    "motor_thermal": "Motor thermal",
+    "motor_load": "Motor load",
+    "drive_load": "Drive load",
+    "energy": "Energy",
+    "run_hours": "Run time",
+    "power_on_hours": "Power-on time",
+}
+LABEL_WIDTH = 14
+WHOLE, DECIMALS, UNIT_WIDTH = 6, 2, 5
+NUMBER_WIDTH = WHOLE + DECIMALS + 1
+TREND_SPAN = 60.0
+STATE_STYLES: dict[str, Style] = {
+    "running": RUNNING,
+    "fault": FAULT_BLOCK,
+    "unknown": ALARM,
+    "stopping": PLAIN,
+}
+STATE_SIGNS = {"running": "▶", "fault": "■", "unknown": "?"}
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """All that the Monitor screen shows at one moment; times are monotonic, in seconds."""
+
+    profile: Profile
+    identity: DriveIdentity | None
+    device: int
+    line_label: str
+    snapshot: Snapshot | None
+    line: LineState
+    counters: Counters
+    load: float
+    trend: tuple[TrendPoint, ...]
+    period: float
+    now: float
+    clock: str
+    read_only: bool = False
+
+    def reading(self, code: str) -> Reading | None:
+        """A reading as good as it is now, not as it was when it came."""
+        if self.snapshot is None or (reading := self.snapshot.readings.get(code)) is None:
+            return None
+        rate = self.snapshot.rate
+        cycle = max(self.period, 1 / rate if rate else self.period)
+        slow = any(v.parameter == code and v.rate == "slow" for v in self.values)
+        return reading.aged(self.now, STALE_CYCLES * cycle * (10 if slow or self.rare(code) else 1))
+
+    def rare(self, code: str) -> bool:
+        """Whether the value is one of those read seldom beside the monitoring set."""
+        return code not in {value.parameter for value in self.values}
+
+    @property
+    def values(self) -> list[MonitoringValue]:
+        """The monitoring set."""
+        return self.profile.data.monitoring.values
+
+    @property
+    def lost(self) -> bool:
+        """Whether nothing on the screen is known to be current."""
+        return self.line.status is not LineStatus.CONNECTED or (
+            self.snapshot is not None and bool(self.snapshot.error)
+        )
+
+
+def header(view: View, width: int) -> list[Text]:
+    """Which drive, on which line, how busy it is, and the time."""
+    name = view.identity.name if view.identity else ""
+    reference = view.identity.reference if view.identity else ""
+    who = " ".join(part for part in (reference or view.profile.name, name) if part)
+    left = f" {who} · device {view.device} · {view.line_label}"
+    right = f"load {view.load * 100:3.0f} %  {view.clock} "
+    text = Text(no_wrap=True)
+    text.append(cut(left, max(0, width - len(right) - 1)), STRONG)
+    text.append(" " + right, FAINT)
+    return [text]
+
+
+def state_lines(view: View, width: int) -> list[Text]:
+    """What the motor does, in words, and who tells it to."""
+    lines = [rule("State", width)]
+    snapshot = view.snapshot
+    if snapshot is None:
+        lines.append(Text(" waiting for the first values", ALARM))
+        lines += [Text("")] * 4
+        return lines
+    state = snapshot.state
+    if view.lost:
+        lines.append(Text(cut(" ? NOT KNOWN NOW", width), ALARM))
+        lines.append(Text(cut(f"   was: {state.headline}", width), FAINT))
+    else:
+        style = STATE_STYLES.get(state.kind, STRONG)
+        sign = STATE_SIGNS.get(state.kind, "□")
+        lines.append(Text(cut(f" {sign} {state.headline.upper()} ", width), style))
+        lines.append(Text(cut(f"   {state.name}", width), PLAIN))
+    lines.append(_reached(state, view.lost))
+    lines.append(_channel(view, "Command", "command_channel"))
+    lines.append(_channel(view, "Reference", "reference_channel"))
+    return lines
+
+
+def _reached(state: DriveState, lost: bool) -> Text:
+    if lost or state.reached is None or state.kind != "running":
+        return Text("")
+    return Text("   at reference" if state.reached else "   on the ramp", FAINT)
+
+
+def _channel(view: View, label: str, quantity: Quantity) -> Text:
+    parameter = view.profile.quantity(quantity)
+    if parameter is None:
+        return Text("")
+    text = channel_text(parameter, view.reading(parameter.code))
+    return pair(f"   {label}", text or NOT_AVAILABLE, PLAIN if text else FAINT, 14)
+
+
+def motor_lines(view: View, width: int, height: int) -> list[Text]:
+    """The values of the monitoring set as numbers and bars, in the profile's order."""
+    lines = [rule("Motor", width, "limits from the drive")]
+    shown = [v for v in view.values if _is_measurement(view.profile, v)]
+    lines += [_measurement(view, value, width) for value in shown]
+    return lines[:height]
+
+
+def _is_measurement(profile: Profile, value: MonitoringValue) -> bool:
+    parameter = profile[value.parameter]
+    if parameter.quantity in LABELS:
+        return True
+    if parameter.bits or is_enumeration(parameter) or parameter.quantity is not None:
+        return False
+    return parameter.code != profile.data.faults.parameter and bool(
+        parameter.unit or parameter.confidence == "unverified"
+    )
+
+
+def _measurement(view: View, value: MonitoringValue, width: int) -> Text:
+    parameter = view.profile[value.parameter]
+    reading = view.reading(value.parameter)
+    text = Text(no_wrap=True)
+    mark = "" if is_verified(parameter) else " ?"
+    label = LABELS.get(parameter.quantity) if parameter.quantity else None
+    name = label or f"{parameter.code} {parameter.name}"
+    text.append(" " + cut(name, LABEL_WIDTH - len(mark)) + mark, FAINT)
+    _append_value(text, parameter, reading, view.now)
+    rest = width - text.cell_len - 1
+    if rest >= 8:
+        text.append(" ")
+        text.append_text(_bar(view, value, parameter, reading, rest))
+    return text
+
+
+def _append_value(text: Text, parameter: Parameter, reading: Reading | None, now: float) -> None:
+    if reading is None or reading.raw is None:
+        text.append(f"{NOT_AVAILABLE:>{NUMBER_WIDTH}} {cut(parameter.unit, UNIT_WIDTH)}", FAINT)
+        return
+    shown, unit = reading.text, reading.unit
+    if reading.physical is not None:
+        shown, unit = reading.physical.text, reading.physical.unit
+    if reading.quality is Quality.GOOD:
+        text.append(aligned(shown, WHOLE, DECIMALS), STRONG)
+        text.append(f" {cut(unit, UNIT_WIDTH)}", FAINT)
+    else:
+        text.append(aligned(shown, WHOLE, DECIMALS), STALE)
+        text.append(f" {cut(age_text(reading.age(now)), UNIT_WIDTH)}", STALE)
+
+
+def age_text(seconds: float) -> str:
+    """An age in at most five characters."""
+    if seconds < 100:
+        return f"{seconds:.0f}s"
+    if seconds < 6000:
+        return f"{seconds / 60:.0f}m"
+    return f"{seconds / 3600:.0f}h"
+
+
+def _bar(
+    view: View,
+    value: MonitoringValue,
+    parameter: Parameter,
+    reading: Reading | None,
+    width: int,
+) -> Text:
+    high = end_of(view, value.high)
+    low = end_of(view, value.low) or 0.0
+    if high is None or high <= low:
+        return Text("")
+    fresh = reading is not None and reading.quality is Quality.GOOD
+    number = reading.number if reading is not None and fresh else None
+    mark = None
+    if parameter.quantity == "output_frequency":
+        reference = view.profile.quantity("frequency_reference")
+        target = view.reading(reference.code) if reference else None
+        mark = abs(target.number) if target and target.number is not None else None
+        number = abs(number) if number is not None else None
+    ends = f" {high:g}"
+    drawn = bar(number, low, high, max(4, width - 6), mark)
+    drawn.append(cut(ends, 6), LINE)
+    return drawn
+
+
+def end_of(view: View, end: str) -> float | None:
+    """The end of a bar: a number, or the value of a parameter of the drive."""
+    if not end:
+        return None
+    try:
+        return float(end)
+    except ValueError:
+        reading = view.snapshot.readings.get(end) if view.snapshot else None
+        return reading.number if reading is not None else None
+
+
+def word_lines(
+    view: View, parameter: Parameter, width: int, height: int, title: str = ""
+) -> list[Text]:
+    """The named bits of a word, each at its place, with the word itself."""
+    reading = view.reading(parameter.code)
+    good = reading is not None and reading.raw is not None and reading.quality is Quality.GOOD
+    value = reading.text if reading is not None else NOT_AVAILABLE
+    code = parameter.code + ("" if is_verified(parameter) else " ?")
+    heading = f"{title} {code}" if title else code
+    lines = [rule(heading, width, value if good else NOT_AVAILABLE)]
+    named = parameter.bits
+    room = max(0, height - 1)
+    if len(named) > room:
+        named = named[: max(0, room - 1)]
+    for bit in named:
+        on = bool(good and reading and reading.raw is not None and reading.raw >> bit.bit & 1)
+        text = Text(no_wrap=True)
+        text.append(f" {bit.bit:>2} ", LINE)
+        style = ALARM if on and bit.alarm else STRONG if on else FAINT
+        text.append(("●" if on else "·") if good else " ", style)
+        words = (bit.on if on else bit.off) or bit.name
+        text.append(f" {cut(words if good else bit.name, width - 7)}", PLAIN if on else FAINT)
+        lines.append(text)
+    if len(named) < len(parameter.bits) and room:
+        lines.append(Text(f"    {len(parameter.bits) - len(named)} more: key w", FAINT))
+    return lines
+
+
+def trend_lines(view: View, width: int, height: int) -> list[Text]:
+    """Frequency and current of the last minute, side by side; newest at the right."""
+    half = (width - 2) // 2
+    left = _trend(view, 0, "output_frequency", "Frequency", half, height)
+    right = _trend(view, 1, "motor_current", "Current", width - 2 - half, height)
+    joined: list[Text] = []
+    for one, other in zip(left, right, strict=True):
+        line = one.copy()
+        line.append("  ")
+        line.append_text(other)
+        joined.append(line)
+    return joined
+
+
+def _trend(
+    view: View, index: int, quantity: Quantity, title: str, width: int, height: int
+) -> list[Text]:
+    parameter = view.profile.quantity(quantity)
+    if parameter is None:
+        nothing = Text(cut(" not known on this drive", width), FAINT)
+        return [rule(title, width), nothing, *[Text(" " * width)] * (height - 2)]
+    high = _trend_high(view, parameter, index)
+    columns = width - 1
+    step = TREND_SPAN / columns
+    rows = trend(_columns(view, index, columns, step), high, columns, height - 1)
+    lines = [rule(title, width, f"0..{high:g} {parameter.unit}, 60 s")]
+    return lines + [Text.assemble(("│", LINE), row) for row in rows]
+
+
+def _trend_high(view: View, parameter: Parameter, index: int) -> float:
+    """The top of a trend: the end of the value's bar, else a round number above the highest."""
+    for value in view.values:
+        if value.parameter == parameter.code and (end := end_of(view, value.high)):
+            return end
+    seen = [abs(v) for p in view.trend if (v := p.values[index]) is not None]
+    highest = max(seen, default=1.0)
+    return next((top for top in ROUND_TOPS if top >= highest), highest)
+
+
+ROUND_TOPS: Sequence[float] = (1, 2, 5, 10, 20, 50, 60, 100, 200, 500, 1000, 2000, 5000, 10000)
+
+
+def _columns(view: View, index: int, count: int, step: float) -> list[float | None]:
+    """The last value of each column; columns stand on whole steps, so they shift as one."""
+    last = int(view.now / step)
+    columns: list[float | None] = [None] * count
+    for point in view.trend:
+        at = count - 1 - (last - int(point.time / step))
+        if 0 <= at < count and point.values[index] is not None:
+            columns[at] = point.values[index]
+    return _bridged(columns, step, view)
+
+
+def _bridged(columns: list[float | None], step: float, view: View) -> list[float | None]:
+    """Columns narrower than a cycle take the value before them, as far as three cycles."""
+    reach = max(1, round(STALE_CYCLES * view.period / step))
+    filled = list(columns)
+    for at, value in enumerate(columns):
+        if value is None:
+            before = [v for v in columns[max(0, at - reach) : at] if v is not None]
+            filled[at] = before[-1] if before else None
+    return filled
+
+
+def message_lines(view: View, width: int) -> list[Text]:
+    """Two lines: what is wrong, or that nothing is."""
+    return [Text(" ") + line if line.plain else line for line in _messages(view, width - 2)]
+
+
+def _messages(view: View, width: int) -> list[Text]:
+    if view.line.status is not LineStatus.CONNECTED:
+        return _line_trouble(view, width)
+    snapshot = view.snapshot
+    if snapshot is None:
+        return [Text("connecting to the drive", FAINT), Text("")]
+    if snapshot.error:
+        return [
+            Text(cut("NO VALUES: what is shown is old", width), ALARM),
+            Text(cut(snapshot.error, width), STALE),
+        ]
+    state = snapshot.state
+    if state.fault is not None:
+        fault = state.fault
+        cause = fault.cause or "The profile gives no cause; see the drive's manual."
+        remedy = f" Do: {fault.remedy}" if fault.remedy else ""
+        return [
+            Text(cut(f"FAULT {fault.code} ({fault.raw}) {fault.name}", width), FAULT),
+            Text(cut(cause + remedy, width), PLAIN),
+        ]
+    return [_alarm_line(view, state, width), _last_fault(view, width)]
+
+
+def _alarm_line(view: View, state: DriveState, width: int) -> Text:
+    if state.kind == "fault":
+        return Text(cut("FAULT, code not read", width), FAULT)
+    if state.alarms:
+        names = ", ".join(bit.name for bit in state.alarms)
+        return Text(cut(f"ALARM {names}", width), ALARM)
+    if state.alarm:
+        return Text(cut("ALARM shown by the status word", width), ALARM)
+    return Text("no fault · no alarm", FAINT)
+
+
+def _last_fault(view: View, width: int) -> Text:
+    faults = view.profile.data.faults
+    reading = view.reading(faults.parameter) if faults.parameter else None
+    if reading is None or reading.raw in (None, faults.none):
+        return Text("")
+    known = view.profile.fault(reading.raw or 0)
+    name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
+    return Text(cut(f"last fault: {name}", width), FAINT)
+
+
+def _line_trouble(view: View, width: int) -> list[Text]:
+    line = view.line
+    since = age_text(max(0.0, view.now - line.since))
+    if line.status is LineStatus.CONNECTING:
+        head = Text(cut(f"CONNECTING for {since}", width), ALARM)
+    else:
+        again = ""
+        if line.next_try is not None:
+            again = f", trying again in {max(0.0, line.next_try - view.now):.0f} s"
+        word = "LINE LOST" if line.status is LineStatus.LOST else "LINE CLOSED"
+        head = Text(cut(f"{word} for {since}{again}", width), ALARM)
+    return [head, Text(cut(line.reason, width), STALE)]
+
+
+def status_lines(view: View, width: int) -> list[Text]:
+    """What the panel itself does: monitoring, how fast, how well the line answers."""
+    text = Text(no_wrap=True)
+    text.append(" MONITORING", ATTENTION if not view.lost else ALARM)
+    rate = view.snapshot.rate if view.snapshot else 0.0
+    counts = view.counters
+    bad = counts.timeouts + counts.checksum + counts.wrong
+    text.append(f"  {rate:4.1f} cycles/s of {1 / view.period:.1f} wished", FAINT)
+    text.append(f"  {counts.requests} requests, ", FAINT)
+    text.append(f"{bad} unanswered or damaged", ALARM if bad else FAINT)
+    if view.read_only:
+        text.append("  read-only", FAINT)
+    text.truncate(width)
+    return [text]
+
+
+def history_lines(view: View, width: int, height: int) -> list[Text]:
+    """The drive's fault history, the newest first."""
+    lines = [rule("Fault history", width)]
+    for number, code in enumerate(view.profile.data.faults.history, start=1):
+        reading = view.reading(code)
+        text = Text(no_wrap=True)
+        text.append(f" {number} ", LINE)
+        text.append(cut(code, 6), FAINT)
+        if reading is None or reading.raw is None:
+            text.append(NOT_AVAILABLE, FAINT)
+        else:
+            fault = view.profile.fault(reading.raw)
+            name = f"{fault.code} {fault.name}" if fault else f"code {reading.raw}"
+            text.append(cut(name, max(0, width - 9)), PLAIN)
+        lines.append(text)
+    if len(lines) == 1:
+        lines.append(Text(" not known on this drive", FAINT))
+    return lines[:height]
+
+
+def line_lines(view: View, width: int, height: int) -> list[Text]:
+    """The counters of the line."""
+    c = view.counters
+    rows = (
+        ("Requests", str(c.requests)),
+        ("Replies", str(c.replies)),
+        ("No answer", str(c.timeouts)),
+        ("Damaged", str(c.checksum)),
+        ("Wrong", str(c.wrong)),
+        ("Refused", str(c.exceptions)),
+        ("Thrown away", str(c.stale)),
+        ("Bytes out, in", f"{c.bytes_out} {c.bytes_in}"),
+    )
+    lines = [rule("Line", width)]
+    return (lines + [pair(f" {label}", value, PLAIN, 16) for label, value in rows])[:height]

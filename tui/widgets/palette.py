@@ -1,0 +1,59 @@
+"""The colours of the panel: grey while all is well, colour for a state that wants to be seen."""
+
+from __future__ import annotations
+
+from rich.style import Style
+from textual.theme import Theme
+
+GROUND = "#202326"
+SURFACE = "#2a2e32"
+TEXT = "#c9ced2"
+DIM = "#838b92"
+RULE = "#4a5158"
+FOCUS = "#7fb0dc"
+RED = "#ff6b64"
+AMBER = "#e6ac3c"
+CYAN = "#52c4d0"
+GREEN = "#74c47a"
+
+THEME = Theme(
+    name="drivepanel",
+    dark=True,
+    primary=FOCUS,
+    secondary=CYAN,
+    accent=FOCUS,
+    warning=AMBER,
+    error=RED,
+    success=GREEN,
+    foreground=TEXT,
+    background=GROUND,
+    surface=SURFACE,
+    panel=SURFACE,
+    variables={
+        "border": FOCUS,
+        "border-blurred": RULE,
+        "input-cursor-text-style": "reverse",
+        "block-cursor-foreground": GROUND,
+        "block-cursor-background": FOCUS,
+        "block-cursor-text-style": "none",
+        "block-cursor-blurred-foreground": TEXT,
+        "block-cursor-blurred-background": RULE,
+        "footer-key-foreground": FOCUS,
+    },
+)
+
+PLAIN = Style(color=TEXT)
+FAINT = Style(color=DIM)
+LINE = Style(color=RULE)
+TITLE = Style(color=DIM)
+STRONG = Style(color="#ffffff", bold=True)
+KEY = Style(color=FOCUS, bold=True)
+FAULT = Style(color=RED, bold=True)
+FAULT_BLOCK = Style(color="#ffffff", bgcolor="#a8281f", bold=True)
+ALARM = Style(color=AMBER, bold=True)
+STALE = Style(color=AMBER, dim=False)
+RUNNING = Style(color=GREEN, bold=True)
+ATTENTION = Style(color=CYAN, bold=True)
+BAR = Style(color="#8fa3b3")
+BAR_REST = Style(color="#3a4046")
+MARK = Style(color="#ffffff", bold=True)
