@@ -30,7 +30,7 @@ def test_priority_bits_run_the_motor_whatever_the_sources() -> None:
     bench.taken("FA00", STOP)
     bench.run(1)
     assert 0 < bench.word("FD00") < 3000
-    bench.run(5)
+    bench.run(6)
     assert bench.word("FD01") == 0x4000
 
 
@@ -51,7 +51,7 @@ def test_without_priority_the_sources_decide() -> None:
 def test_reverse() -> None:
     bench = started()
     bench.taken("FA00", RUN_REVERSE)
-    bench.run(10)
+    bench.run(7)
     assert bench.word("FD00") == 3000
     assert bench.word("FD01") & 1 << 9
     assert bench.drive.motor.frequency == pytest.approx(-30)

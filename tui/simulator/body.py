@@ -130,7 +130,7 @@ class Body:
         """Acceleration and deceleration in Hz/s, after the drive's own ramp times."""
         span = self.value("rated_frequency", self.rating.frequency)
         up = self.value("acceleration_2" if second else "acceleration", 3.0)
-        down = self.value("deceleration_2" if second else "deceleration", 3.0)
+        down = self.value("deceleration_2" if second else "deceleration", up)
         return span / max(up, 0.01), span / max(down, 0.01)
 
     def rates(self, stop: Stop, second: bool = False) -> tuple[float, float]:

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 
 from tui.drive.schema import Parameter, Quantity
 
+from .altivar21_words import show_altivar21_words
 from .body import Body, Fallback
 from .motor import Order, Stop
 
@@ -193,6 +194,7 @@ class Altivar21Chart:
         sources = self._sources()
         motor = body.motor
         if body.fault is None:
+            show_altivar21_words(body)
             for before, now in BEFORE_FAULT.items():
                 if twin := body.registers.named(now):
                     body.show_code(before, body.registers.present(twin))
