@@ -9,6 +9,7 @@ from .backoff import pause
 from .expectation import EXCEPTION, Expectation
 from .limits import CAUTIOUS, Limits
 from .model import DeviceState, Priority, Timing
+from .requests import WriteMany
 from .rtu import Piece
 
 RECENT = 16
@@ -129,8 +130,10 @@ class Devices:
         that fit it may come first."""
         late = self._still_outstanding(device, now)
         sure = all(each.expectation.function != expectation.function for each in late)
-        # a copy of the very same write proves as much as the answer itself
+        # a reply that repeats all of its request is as good from the same request before;
+        # that of function 16 says nothing of the values
         whole = expectation.length == len(expectation.prefix)
+        whole = whole and expectation.function != WriteMany.function
         same = 0 if whole else sum(each.expectation == expectation for each in late)
         return sure, same
 

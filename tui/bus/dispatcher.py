@@ -61,7 +61,7 @@ class Dispatcher:
     def fail_all(self, reason: str, kind: type[LineError]) -> None:
         """Fail everything that waits."""
         for job in self._queue.drain():
-            job.fail(kind(reason))
+            job.fail(kind(_with_fate(job, reason) if job.begun else reason))
 
     def stray(self, piece: Piece, time: float) -> None:
         """A whole frame came that nobody waited for; it may be what others were held back for."""
@@ -117,12 +117,17 @@ class Dispatcher:
         if not job.begun and not job.answer.set_running_or_notify_cancel():
             return
         job.begun = True
+        begun = self._clock()
         try:
             outcome = await master.exchange(self._sending(job))
             if outcome.verdict.kind is Kind.UNSURE:
                 outcome = await self._resolve_echo(master, job, outcome)
-        except LineLost as error:
-            job.fail(LineLost(_with_fate(job, str(error))))
+        except LineLost:
+            # failed with the others, once the line's state says that it is lost
+            self._queue.put_back(job)
+            if job.expectation is not None:
+                now = self._clock()
+                self._devices.may_come(job.request.device, job.expectation, begun, now)
             raise
         except asyncio.CancelledError:
             job.fail(LineClosed(_with_fate(job, "The line was closed during the request.")))
@@ -135,11 +140,11 @@ class Dispatcher:
     def _sending(self, job: Job) -> Sending:
         request = job.request
         if job.expectation is None:
-            return Sending(request.device, request.pdu(), None, 0.0)
+            return Sending(request.device, job.pdu, None, 0.0)
         sure, skip = self._devices.doubts(request.device, job.expectation, self._clock())
         return Sending(
             request.device,
-            request.pdu(),
+            job.pdu,
             job.expectation,
             self._devices.time_out(request.device, request.function, job.priority),
             sure,
@@ -157,7 +162,7 @@ class Dispatcher:
                 Sending(request.device, probe.pdu(), probe.expectation(), time_out)
             )
         if master.echo is False:
-            verdict.kind, verdict.pdu = Kind.REPLY, request.pdu()
+            verdict.kind, verdict.pdu = Kind.REPLY, job.pdu
         else:
             verdict.kind = Kind.NOTHING
             verdict.detail = "only the adapter's echo of it came back"

@@ -32,6 +32,7 @@ class Job:
     answer: Future[Answer] = field(default_factory=Future)
     repeats: int = 0
     """How often it has been sent again."""
+    pdu: bytes = b""
     begun: bool = False
     """Whether it was taken from the queue once, so that it cannot be withdrawn any more."""
     expectation: Expectation | None = None
@@ -39,6 +40,8 @@ class Job:
     """Place among the jobs of its priority; kept when it is sent again."""
 
     def __post_init__(self) -> None:
+        # made now, in the thread of the one who asks: the line's own has a silence to keep
+        self.pdu = self.request.pdu()
         if self.request.device != BROADCAST:
             self.expectation = self.request.expectation()
 

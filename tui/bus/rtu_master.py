@@ -14,6 +14,8 @@ from .transport import Transport
 
 BABBLE = 1.0
 """Seconds to wait for silence on a line that never falls silent, before sending all the same."""
+LEAD = 0.0004
+"""Seconds before the end of the silence at which the next request is chosen and made ready."""
 IDLE_LIMIT = 4096
 """Bytes kept of what comes in while nothing is due."""
 
@@ -77,18 +79,23 @@ class RtuMaster:
         self._ended()
 
     async def quiet(self) -> None:
-        """Wait until the line has been silent long enough for the next request."""
+        """Wait until the line has been silent nearly long enough for the next request.
+
+        The rest of the silence is waited just before sending, when the request is ready.
+        """
+        await self._silent(LEAD)
+        self._sort_idle()
+
+    async def _silent(self, lead: float) -> None:
         clock = self._around.clock
         give_up = clock() + BABBLE + max(0.0, self._hold - clock())
         while self.failure is None:
             now = clock()
-            until = max(self._last + self._silence, self._hold)
+            until = max(self._last + self._silence - lead, self._hold)
             if now >= until or now >= give_up:
-                break
+                return
             await self._transport.rest(min(until, give_up))
-        if self.failure is not None:
-            raise self.failure
-        self._sort_idle()
+        raise self.failure
 
     async def exchange(self, sending: Sending) -> Outcome:
         """Send a request and await its reply, its remains, or the end of its time."""
@@ -98,6 +105,9 @@ class RtuMaster:
             data, sending.expectation, echo=self.echo, exceptions=sending.sure, skip=sending.skip
         )
         self._done = asyncio.get_running_loop().create_future()
+        await self._silent(0.0)
+        if self._idle:
+            self._sort_idle()
         self._exchange = exchange
         begun = clock()
         self._sent = self._last = begun + len(data) * self._character
@@ -178,7 +188,7 @@ class RtuMaster:
             return
         for piece in pieces(verdict.received):
             if piece.data == request and piece.pdu != verdict.pdu:
-                note = "echo"
+                note = "echo or answer" if verdict.kind is Kind.UNSURE else "echo"
             elif not piece.whole:
                 note = "damaged" if verdict.kind is Kind.DAMAGED else "noise"
             elif piece.device != device:

@@ -1,0 +1,203 @@
+"""A line that is not there yet, goes away, comes back, or is somebody else's."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+import serial
+from pymodbus.client import AsyncModbusSerialClient
+
+from tui.bus.errors import LineClosed, LineLost, PortBusy, PortMissing
+from tui.bus.line import Line, LineState, LineStatus, Priority, Timing
+from tui.bus.link import RtuTcpLink, SerialLink, TcpLink
+
+from .conftest import OpenLine
+from .peer import PtyPeer, TcpPeer, eventually, honest, silent
+from .plain import outcome, plain_serial
+
+QUICK = Timing(first_timeout=20.0, min_timeout=20.0, reconnect_first=0.1, reconnect_longest=0.3)
+
+
+async def test_plain_client_gives_up_a_port_that_is_not_there_yet(tmp_path: Path) -> None:
+    port = tmp_path / "port"
+    client = AsyncModbusSerialClient(str(port), reconnect_delay=0.1)
+    assert not await client.connect()
+    with PtyPeer(honest, link=port):
+        await asyncio.sleep(0.6)
+        assert not client.connected
+    client.close()
+
+
+async def test_line_connects_when_the_port_appears(tmp_path: Path, open_line: OpenLine) -> None:
+    port = tmp_path / "port"
+    line = open_line(str(port), QUICK, wait=None)
+    await asyncio.to_thread(eventually, lambda: line.state.status is LineStatus.LOST)
+    assert "does not exist" in line.state.reason
+    assert line.state.next_try is not None
+    with pytest.raises(LineLost, match="does not exist"):
+        await line.read(1, 5)
+    with PtyPeer(honest, link=port):
+        await asyncio.to_thread(eventually, lambda: line.state.status is LineStatus.CONNECTED)
+        assert (await line.read(1, 5)).words == (5,)
+
+
+async def test_request_made_while_connecting_is_sent(open_line: OpenLine) -> None:
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path, wait=None)
+        assert (await line.read(1, 5)).words == (5,)
+
+
+async def test_plain_client_waits_out_its_time_after_an_unplug() -> None:
+    with PtyPeer(silent) as peer:
+        async with plain_serial(peer.path, timeout=1.0) as client:
+            reading = asyncio.create_task(
+                outcome(client.read_holding_registers(1, count=1, device_id=1))
+            )
+            await asyncio.to_thread(peer.await_requests, 1)
+            begun = time.monotonic()
+            peer.unplug()
+            assert await reading is None
+            assert time.monotonic() - begun > 0.5
+
+
+async def test_unplug_fails_everything_at_once_and_replug_mends_it(
+    tmp_path: Path, open_line: OpenLine
+) -> None:
+    port = tmp_path / "port"
+    seen: list[LineState] = []
+    with PtyPeer(silent, link=port) as peer:
+        line = open_line(str(port), QUICK)
+        unsubscribe = line.on_state(seen.append)
+        requests = [
+            asyncio.create_task(line.read(1, n, priority=Priority.OPERATOR_READ)) for n in range(3)
+        ]
+        await asyncio.to_thread(peer.await_requests, 1)
+        peer.unplug()
+        async with asyncio.timeout(10.0):
+            for result in await asyncio.gather(*requests, return_exceptions=True):
+                assert isinstance(result, LineLost)
+    with PtyPeer(honest, link=port):
+        await asyncio.to_thread(eventually, lambda: line.state.status is LineStatus.CONNECTED)
+        assert (await line.read(1, 5)).words == (5,)
+    assert seen[0].status is LineStatus.LOST
+    assert LineStatus.CONNECTED in [state.status for state in seen]
+    unsubscribe()
+    count = len(seen)
+    line.close()
+    assert len(seen) == count
+
+
+@pytest.mark.parametrize("kind", [TcpLink, RtuTcpLink])
+async def test_server_that_hangs_up_is_called_again(
+    kind: type[TcpLink] | type[RtuTcpLink], open_line: OpenLine
+) -> None:
+    from .peer import request_length, tcp_reply, tcp_request_length
+
+    tcp = kind is TcpLink
+    with TcpPeer(silent, length=tcp_request_length if tcp else request_length) as peer:
+        line = open_line(kind("127.0.0.1", peer.port), QUICK)
+        reading = asyncio.create_task(line.read(1, 5))
+        await asyncio.to_thread(peer.await_requests, 1)
+        peer.hang_up()
+        async with asyncio.timeout(10.0):
+            with pytest.raises(LineLost):
+                await reading
+        peer.script = (lambda request, _: [tcp_reply(request)]) if tcp else honest
+        await asyncio.to_thread(eventually, lambda: line.state.status is LineStatus.CONNECTED)
+        assert (await line.read(1, 5)).words == (5,)
+
+
+def test_open_with_wait_raises_what_is_wrong(tmp_path: Path) -> None:
+    line = Line(SerialLink(str(tmp_path / "none")))
+    with pytest.raises(PortMissing, match="does not exist"):
+        line.open(wait=5.0)
+    assert line.state.status is LineStatus.CLOSED
+    with TcpPeer(honest) as peer:
+        port = peer.port
+    line = Line(TcpLink("127.0.0.1", port))
+    with pytest.raises(LineLost, match="nothing listens there"):
+        line.open(wait=0.3)
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs /proc")
+def test_busy_port_names_its_holder() -> None:
+    script = (
+        "import serial, sys; port = serial.Serial(sys.argv[1], exclusive=True);"
+        "print('open', flush=True); sys.stdin.read()"
+    )
+    with PtyPeer(honest) as peer:
+        other = subprocess.Popen(
+            [sys.executable, "-c", script, peer.path],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+        )
+        assert other.stdout is not None
+        assert other.stdout.readline() == b"open\n"
+        line = Line(SerialLink(peer.path))
+        with pytest.raises(PortBusy, match=f"pid {other.pid}") as caught:
+            line.open(wait=5.0)
+        other.communicate()
+        assert caught.value.holder is not None
+        line = Line(SerialLink(peer.path))
+        line.open(wait=5.0)
+        with pytest.raises(serial.SerialException):
+            serial.Serial(peer.path, exclusive=True)
+        line.close()
+        serial.Serial(peer.path, exclusive=True).close()
+
+
+async def test_pseudo_terminal_is_opened_without_parity_and_says_so(open_line: OpenLine) -> None:
+    with PtyPeer(honest) as peer:
+        line = open_line(SerialLink(peer.path, 19200, "8E1"))
+        assert line.state.reason == "A pseudo-terminal has no parity: opened with N."
+        assert (await line.read(1, 5)).words == (5,)
+        plain = open_line_of(peer)
+        assert plain.state.status is LineStatus.LOST
+        plain.close()
+
+
+def open_line_of(peer: PtyPeer) -> Line:
+    """A second line on a port that is taken; it keeps trying."""
+    line = Line(SerialLink(peer.path), timing=QUICK)
+    line.open()
+    eventually(lambda: line.state.status is LineStatus.LOST)
+    return line
+
+
+async def test_close_fails_what_waits_and_is_final(open_line: OpenLine) -> None:
+    with PtyPeer(silent) as peer:
+        line = open_line(peer.path)
+        requests = [asyncio.create_task(line.read(1, n)) for n in range(3)]
+        await asyncio.to_thread(peer.await_requests, 1)
+        await asyncio.to_thread(line.close)
+        line.close()
+        for result in await asyncio.gather(*requests, return_exceptions=True):
+            assert isinstance(result, LineClosed)
+        with pytest.raises(LineClosed):
+            await line.read(1, 5)
+        with pytest.raises(LineClosed):
+            line.open()
+        with pytest.raises(LineClosed):
+            line.spawn(asyncio.Event().wait, "nothing")
+        assert line.state.status is LineStatus.CLOSED
+
+
+def test_close_before_open() -> None:
+    Line(SerialLink("/dev/null")).close()
+
+
+async def test_idle_and_lost_lines_do_not_spin(tmp_path: Path, open_line: OpenLine) -> None:
+    with PtyPeer(honest) as peer:
+        idle = open_line(peer.path)
+        await idle.read(1, 5)
+        lost = open_line(str(tmp_path / "none"), wait=None)
+        await asyncio.to_thread(eventually, lambda: lost.state.status is LineStatus.LOST)
+        before = time.process_time()
+        await asyncio.sleep(1.0)
+        # the peer polls twenty times a second; a spinning thread would take the whole second
+        assert time.process_time() - before < 0.5

@@ -1,0 +1,207 @@
+"""Who goes first, and how little one silent drive costs the others."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Sequence
+
+import pytest
+
+from tui.bus.errors import LineBusy, NoAnswer, RequestRefused
+from tui.bus.line import Priority, Timing
+
+from .conftest import OpenLine
+from .peer import PtyPeer, Step, honest, reply, silent
+from .plain import outcome, plain_serial
+
+DEAD = 9
+
+
+def slow(request: bytes, _count: int) -> Sequence[Step]:
+    return [0.1, reply(request)]
+
+
+def one_dead(request: bytes, _count: int) -> Sequence[Step]:
+    return [] if request[0] == DEAD else [reply(request)]
+
+
+async def test_plain_client_serves_first_come_first_served() -> None:
+    with PtyPeer(slow) as peer:
+        async with plain_serial(peer.path, timeout=2.0) as client:
+            polls = [
+                client.read_holding_registers(address, count=1, device_id=1) for address in range(5)
+            ]
+            await asyncio.gather(*polls, client.write_register(99, 0, device_id=1))
+        assert [request[1] for request in peer.requests].index(6) == 5
+
+
+async def test_urgent_requests_overtake(open_line: OpenLine) -> None:
+    with PtyPeer(slow) as peer:
+        line = open_line(peer.path)
+        waiting = [asyncio.create_task(line.read(1, 50))]
+        await asyncio.to_thread(peer.await_requests, 1)
+        # backwards, so that only the priority can bring them in order
+        for priority in reversed(Priority):
+            waiting.append(asyncio.create_task(line.read(1, int(priority), priority=priority)))
+            await asyncio.sleep(0.005)
+        await asyncio.gather(*waiting)
+        assert [request[3] for request in peer.requests] == [50, 0, 1, 2, 3, 4]
+
+
+async def test_stop_waits_for_the_exchange_in_flight_only(open_line: OpenLine) -> None:
+    def silent_for_reads(request: bytes, _count: int) -> Sequence[Step]:
+        return [reply(request)] if request[1] == 6 else []
+
+    # the dead reads leave late replies awaited and polls backed off: the stop minds neither
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=60.0)
+    with PtyPeer(silent_for_reads) as peer:
+        line = open_line(peer.path, timing)
+        reads = [
+            asyncio.create_task(line.read(1, address, priority=Priority.OPERATOR_READ))
+            for address in range(5)
+        ]
+        await asyncio.to_thread(peer.await_requests, 1)
+        await line.write(1, 99, [0], priority=Priority.STOP)
+        assert [request[1] for request in peer.requests] == [3, 6]
+        for task in reads:
+            task.cancel()
+
+
+async def test_stop_is_sent_again_although_its_first_answer_may_come_late(
+    open_line: OpenLine,
+) -> None:
+    def second(request: bytes, count: int) -> Sequence[Step]:
+        return [] if count == 0 else [reply(request)]
+
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, late_reply=60.0)
+    with PtyPeer(second) as peer:
+        line = open_line(peer.path, timing)
+        with pytest.raises(NoAnswer):
+            await line.write(1, 99, [0], priority=Priority.STOP)
+        await line.write(1, 99, [0], priority=Priority.STOP)
+        # several words: a late answer to the first could not be told from that to the second
+        peer.script = silent
+        with pytest.raises(NoAnswer):
+            await line.write(1, 99, [0, 0], priority=Priority.STOP)
+        peer.script = honest
+        with pytest.raises(NoAnswer):
+            await line.write(1, 99, [0, 0], priority=Priority.STOP)
+        assert len(peer.requests) == 4
+
+
+async def test_plain_client_stops_the_line_for_a_dead_drive() -> None:
+    with PtyPeer(one_dead) as peer:
+        async with plain_serial(peer.path, timeout=0.2, retries=3) as client:
+            dead = asyncio.create_task(
+                outcome(client.read_holding_registers(1, count=1, device_id=DEAD))
+            )
+            await asyncio.sleep(0.05)
+            begun = time.monotonic()
+            await outcome(client.read_holding_registers(1, count=1, device_id=1))
+            assert time.monotonic() - begun >= 0.7
+            assert await dead is None
+
+
+async def test_dead_drive_costs_one_time_out_a_back_off_period(open_line: OpenLine) -> None:
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, back_off_first=60.0, late_reply=0.3)
+    with PtyPeer(one_dead) as peer:
+        line = open_line(peer.path, timing)
+        for address in range(20):
+            with pytest.raises(NoAnswer) as caught:
+                await line.read(DEAD, address)
+            assert (await line.read(1, address)).words == (address,)
+        assert len(peer.asked(DEAD)) == 1
+        assert len(peer.asked(1)) == 20
+        assert caught.value.retry_in is not None
+        assert 0 < caught.value.retry_in <= 60.0
+        assert "asked again in" in str(caught.value)
+        state = line.device_state(DEAD)
+        assert state.answers is False
+        assert state.failures == 1
+        assert state.next_try is not None
+        assert line.device_state(1).answers is True
+        assert line.device_state(8).answers is None
+
+
+async def test_operator_reaches_a_drive_that_polls_leave_alone(open_line: OpenLine) -> None:
+    timing = Timing(first_timeout=0.2, min_timeout=0.2, back_off_first=60.0, late_reply=0.3)
+    with PtyPeer(one_dead) as peer:
+        line = open_line(peer.path, timing)
+        with pytest.raises(NoAnswer):
+            await line.read(DEAD, 1)
+        peer.script = honest
+        got = await line.read(DEAD, 2, priority=Priority.OPERATOR_READ)
+        assert got.words == (2,)
+        # it answers: polls go out again at once
+        assert (await line.read(DEAD, 3)).words == (3,)
+
+
+async def test_polls_go_on_by_themselves_after_the_back_off(open_line: OpenLine) -> None:
+    timing = Timing(first_timeout=0.1, min_timeout=0.1, back_off_first=0.3, late_reply=0.1)
+    with PtyPeer(one_dead) as peer:
+        line = open_line(peer.path, timing)
+        for failures in (1, 2):
+            with pytest.raises(NoAnswer):
+                await line.read(DEAD, 1)
+            state = line.device_state(DEAD)
+            assert state.failures == failures
+            assert state.next_try is not None
+            await asyncio.sleep(max(0.0, state.next_try - time.monotonic()) + 0.01)
+        assert peer.arrivals[1] - peer.arrivals[0] >= 0.3
+        peer.script = honest
+        assert (await line.read(DEAD, 2)).words == (2,)
+
+
+async def test_full_queue_refuses_polls_but_no_stop(open_line: OpenLine) -> None:
+    def very_slow(request: bytes, count: int) -> Sequence[Step]:
+        return [1.0 if count == 0 else 0.0, reply(request)]
+
+    with PtyPeer(very_slow) as peer:
+        line = open_line(peer.path, Timing(first_timeout=5.0, queue_length=8))
+        flying = asyncio.create_task(line.read(1, 0))
+        await asyncio.to_thread(peer.await_requests, 1)
+        polls = [asyncio.create_task(line.read(1, n)) for n in range(4)]
+        await asyncio.sleep(0.05)
+        with pytest.raises(LineBusy):
+            await line.read(1, 20)
+        others = [
+            asyncio.create_task(line.read(1, n, priority=Priority.OPERATOR_READ)) for n in range(4)
+        ]
+        await asyncio.sleep(0.05)
+        with pytest.raises(LineBusy):
+            await line.write(1, 20, [1])
+        await line.write(1, 99, [0], priority=Priority.STOP)
+        await asyncio.gather(flying, *polls, *others)
+        assert peer.requests[1][3] == 99
+
+
+async def test_read_only_line_refuses_everything_that_changes(open_line: OpenLine) -> None:
+    from .conftest import WIDE
+
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path, read_only=True)
+        calls: list[Callable[[], Awaitable[object]]] = [
+            lambda: line.write(1, 5, [7]),
+            lambda: line.write(1, 5, [7], priority=Priority.STOP),
+            lambda: line.write(1, 5, [7, 8]),
+            lambda: line.read_write(1, 5, 1, 6, [7]),
+            lambda: line.broadcast(5, [7], limits=WIDE),
+            lambda: line.diagnose(1, 10),
+        ]
+        for call in calls:
+            with pytest.raises(RequestRefused, match="read-only"):
+                await call()
+        assert (await line.read(1, 5)).words == (5,)
+        assert await line.diagnose(1, 0, 7) == 7
+        assert len(peer.requests) == 2
+
+
+async def test_undescribed_device_gets_single_reads_only(open_line: OpenLine) -> None:
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path)
+        assert (await line.read(77, 5)).words == (5,)
+        for refused in (line.read(77, 5, 2), line.write(77, 5, [1]), line.diagnose(77, 0)):
+            with pytest.raises(RequestRefused):
+                await refused
+        assert len(peer.requests) == 1

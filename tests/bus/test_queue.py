@@ -1,0 +1,227 @@
+"""Order of requests, back-off, time-outs and late replies; with a clock of the test's own."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.bus.backoff import pause
+from tui.bus.devices import CALM, Devices
+from tui.bus.errors import LineBusy, LineClosed
+from tui.bus.jobs import Job, JobQueue
+from tui.bus.line import Priority, Timing
+from tui.bus.requests import Read, Request, WriteMany, WriteOne
+from tui.bus.rtu import Piece, frame
+from tui.bus.trace import Trace
+
+from .conftest import WIDE
+from .peer import honest_pdu
+
+
+def job(priority: Priority, address: int = 0) -> Job:
+    return Job(Read(1, address, 1), priority, WIDE)
+
+
+def now(_job: Job) -> float:
+    return 0.0
+
+
+def test_order() -> None:
+    queue = JobQueue(20)
+    jobs = [
+        job(priority) for priority in (4, 3, 3, 2, 1, 0, 2) for priority in [Priority(priority)]
+    ]
+    for each in jobs:
+        queue.put(each)
+    taken = [queue.take(now, 0.0)[0] for _ in jobs]
+    assert [jobs.index(each) for each in taken if each] == [5, 4, 3, 6, 1, 2, 0]
+    assert queue.take(now, 0.0) == (None, None)
+
+
+def test_what_must_wait_is_passed_by() -> None:
+    queue = JobQueue(20)
+    first, second = job(Priority.STOP, 1), job(Priority.POLL, 2)
+    queue.put(first)
+    queue.put(second)
+    ready = {first: 5.0, second: 3.0}
+    assert queue.take(ready.__getitem__, 1.0) == (None, 3.0)
+    assert queue.take(ready.__getitem__, 4.0) == (second, None)
+    assert queue.take(ready.__getitem__, 4.0) == (None, 5.0)
+    assert queue.take(ready.__getitem__, 5.0) == (first, None)
+
+
+def test_job_that_is_sent_again_keeps_its_place() -> None:
+    queue = JobQueue(20)
+    first, second = job(Priority.POLL), job(Priority.POLL)
+    queue.put(first)
+    queue.put(second)
+    assert queue.take(now, 0.0)[0] is first
+    queue.put_back(first)
+    assert queue.take(now, 0.0)[0] is first
+
+
+def test_withdrawn_jobs_are_dropped() -> None:
+    queue = JobQueue(20)
+    gone = job(Priority.POLL)
+    queue.put(gone)
+    assert gone.answer.cancel()
+    assert queue.take(now, 0.0) == (None, None)
+    gone.fail(LineClosed())
+    assert gone.answer.cancelled()
+
+
+def test_queue_is_bounded() -> None:
+    queue = JobQueue(4)
+    for _ in range(2):
+        queue.put(job(Priority.POLL))
+    with pytest.raises(LineBusy):
+        queue.put(job(Priority.BACKGROUND))
+    for _ in range(2):
+        queue.put(job(Priority.OPERATOR_READ))
+    with pytest.raises(LineBusy):
+        queue.put(job(Priority.OPERATOR_WRITE))
+    queue.put(job(Priority.STOP))
+    assert len(queue) == 5
+    assert len(queue.drain()) == 5
+    assert len(queue) == 0
+
+
+def test_back_off_doubles_to_its_cap() -> None:
+    assert [pause(failures, 1.0, 10.0) for failures in range(7)] == [0, 1, 2, 4, 8, 10, 10]
+    assert pause(100_000, 1.0, 10.0) == 10.0
+
+
+TIMING = Timing(first_timeout=1.0, min_timeout=0.1, late_reply=2.0, scan_timeout=0.3)
+READ = Read(1, 5, 1)
+EXPECTED = READ.expectation()
+LATE = Piece(frame(1, honest_pdu(READ.pdu())), whole=True)
+
+
+@pytest.fixture
+def devices() -> Devices:
+    return Devices(TIMING, mistakable=True)
+
+
+def test_time_out_follows_the_turnaround(devices: Devices) -> None:
+    poll = Priority.POLL
+    assert devices.time_out(1, 3, poll) == 1.0
+    devices.answered(1, EXPECTED, 0.05, 10.0)
+    assert devices.time_out(1, 3, poll) == pytest.approx(0.2)
+    assert devices.time_out(1, 6, poll) == 1.0
+    devices.answered(1, EXPECTED, 0.001, 10.0)
+    assert devices.time_out(1, 3, poll) == pytest.approx(0.2)
+    for _ in range(20):
+        devices.answered(1, EXPECTED, 0.001, 10.0)
+    assert devices.time_out(1, 3, poll) == pytest.approx(0.1)
+    devices.answered(1, EXPECTED, 0.9, 10.0)
+    assert devices.time_out(1, 3, poll) == 1.0
+    assert devices.state(1).turnaround == 0.9
+
+
+def test_time_out_grows_with_failures(devices: Devices) -> None:
+    devices.answered(1, EXPECTED, 0.01, 10.0)
+    outs = []
+    for _ in range(5):
+        outs.append(devices.time_out(1, 3, Priority.POLL))
+        devices.silent(1, EXPECTED, 10.0, 11.0)
+    assert outs == pytest.approx([0.1, 0.2, 0.4, 0.8, 1.0])
+
+
+def test_scan_waits_shortly_for_unknown_devices_only(devices: Devices) -> None:
+    background = Priority.BACKGROUND
+    assert devices.time_out(1, 3, background) == 0.3
+    devices.answered(1, EXPECTED, 0.01, 10.0)
+    assert devices.time_out(1, 6, background) == 1.0
+
+
+def test_silent_device_is_left_alone_by_polls(devices: Devices) -> None:
+    devices.silent(1, EXPECTED, 9.0, 10.0)
+    assert devices.backed_off(1, Priority.POLL, 10.0) == 1.0
+    assert devices.backed_off(1, Priority.POLL, 11.0) is None
+    assert devices.backed_off(1, Priority.OPERATOR_READ, 10.0) is None
+    assert devices.backed_off(2, Priority.POLL, 10.0) is None
+    # a scan asks an address that never answered by every function it knows
+    assert devices.backed_off(1, Priority.BACKGROUND, 10.0) is None
+    devices.silent(1, EXPECTED, 11.0, 12.0)
+    assert devices.backed_off(1, Priority.POLL, 12.0) == 2.0
+    assert devices.state(1).silent_since == 10.0
+    devices.answered(1, EXPECTED, 0.01, 13.0)
+    assert devices.backed_off(1, Priority.POLL, 13.0) is None
+    assert devices.state(1).silent_since is None
+
+
+@pytest.mark.parametrize(
+    ("request_", "waits"),
+    [
+        (READ, True),
+        (Read(1, 99, 1), True),
+        (Read(1, 5, 2), False),
+        (WriteOne(1, 5, 1), False),
+        (Read(2, 5, 1), False),
+    ],
+)
+def test_only_what_could_be_mistaken_waits(
+    devices: Devices, request_: Request, waits: bool
+) -> None:
+    devices.silent(1, EXPECTED, 9.0, 10.0)
+    wanted = (request_.device, request_.expectation())
+    assert devices.not_before(*wanted, Priority.OPERATOR_READ, 10.0) == (11.0 if waits else 0.0)
+    assert devices.not_before(*wanted, Priority.STOP, 10.0) == 0.0
+    assert devices.not_before(*wanted, Priority.OPERATOR_READ, 11.0) == 0.0
+
+
+def test_late_reply_ends_the_wait_and_is_remembered(devices: Devices) -> None:
+    devices.silent(1, EXPECTED, 9.0, 10.0)
+    assert devices.stray(LATE, 13.0)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, 13.0) == 0.0
+    # three seconds late: six are waited the next time, and the line is left quiet at first
+    devices.silent(1, EXPECTED, 19.0, 20.0)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, 20.0) == 26.0
+    assert 20.0 < devices.not_before(2, EXPECTED, Priority.POLL, 20.0) < 21.0
+    assert devices.not_before(2, EXPECTED, Priority.STOP, 20.0) == 0.0
+
+
+def test_nothing_is_mistaken_over_modbus_tcp() -> None:
+    devices = Devices(TIMING, mistakable=False)
+    devices.silent(1, EXPECTED, 9.0, 10.0)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, 10.0) == 0.0
+
+
+def test_reply_that_came_twice_slows_the_same_request(devices: Devices) -> None:
+    devices.answered(1, EXPECTED, 0.01, 10.0)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, 10.0) == 0.0
+    assert devices.stray(LATE, 10.05)
+    devices.answered(1, EXPECTED, 0.01, 11.0)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, 11.0) == pytest.approx(11.1)
+    for _ in range(CALM):
+        devices.answered(1, EXPECTED, 0.01, 12.0)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, 13.0) == 0.0
+
+
+def test_frame_of_nobody_is_unexplained(devices: Devices) -> None:
+    assert not devices.stray(LATE, 10.0)
+    devices.silent(1, WriteOne(1, 5, 1).expectation(), 9.0, 10.0)
+    assert not devices.stray(LATE, 10.0)
+    assert devices.stray(Piece(frame(1, bytes([0x86, 2])), whole=True), 10.0)
+
+
+@pytest.mark.parametrize(
+    ("request_", "doubts"),
+    [
+        (Read(1, 5, 1), (False, 1)),
+        (Read(1, 5, 2), (False, 0)),
+        (WriteOne(1, 5, 1), (False, 0)),
+        (WriteMany(1, 5, (1, 2)), (False, 1)),
+        (Read(2, 5, 1), (True, 0)),
+    ],
+)
+def test_doubts_of_a_stop(devices: Devices, request_: Request, doubts: tuple[bool, int]) -> None:
+    for earlier in (READ, WriteOne(1, 5, 1), WriteMany(1, 5, (7, 8))):
+        devices.silent(1, earlier.expectation(), 9.0, 10.0)
+    assert devices.doubts(request_.device, request_.expectation(), 10.0) == doubts
+
+
+def test_trace_is_bounded() -> None:
+    trace = Trace(3)
+    for time in range(5):
+        trace.add(time, "out", bytes([time]))
+    assert [frame_.data for frame_ in trace.frames()] == [b"\2", b"\3", b"\4"]

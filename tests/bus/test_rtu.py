@@ -1,0 +1,170 @@
+"""Frames inside received bytes, and the verdicts on them; no port, no clock."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.bus.requests import Identify, Read, Request, WriteOne
+from tui.bus.rtu import Piece, find_reply, frame, is_whole, pieces
+from tui.bus.rtu_exchange import Kind, RtuExchange
+
+from .peer import honest_pdu
+
+READ = Read(1, 5, 2)
+REPLY = frame(1, honest_pdu(READ.pdu()))
+OTHER = frame(7, bytes([3, 2, 0, 9]))
+
+
+def exchange_of(request: Request, **more: bool | int | None) -> RtuExchange:
+    data = frame(request.device, request.pdu())
+    return RtuExchange(data, request.expectation(), **more)  # type: ignore[arg-type]
+
+
+@given(noise=st.binary(max_size=12), tail=st.binary(max_size=12))
+def test_reply_is_found_among_any_bytes(noise: bytes, tail: bytes) -> None:
+    match = find_reply(noise + REPLY + tail, 1, READ.expectation())
+    assert match is not None
+    assert match.pdu == REPLY[1:-2] or is_whole((noise + REPLY + tail)[match.start : match.end])
+
+
+@given(cut=st.integers(0, len(REPLY) - 1), bit=st.integers(0, 8 * len(REPLY) - 1))
+def test_cut_or_damaged_reply_is_not_found(cut: int, bit: int) -> None:
+    assert find_reply(REPLY[:cut], 1, READ.expectation()) is None
+    damaged = bytearray(REPLY)
+    damaged[bit // 8] ^= 1 << bit % 8
+    assert find_reply(damaged, 1, READ.expectation()) is None
+
+
+def test_identification_is_found_by_its_object_lengths() -> None:
+    request = Identify(1)
+    whole = frame(1, honest_pdu(request.pdu()))
+    for length in range(len(whole)):
+        assert find_reply(whole[:length], 1, request.expectation()) is None
+    assert find_reply(b"\x01\x2b" + whole, 1, request.expectation()) is not None
+
+
+@pytest.mark.parametrize("pdu", [bytes([0xAB, 1]), bytes([0xAB, 14, 1])])
+def test_refusals_of_identification_are_found(pdu: bytes) -> None:
+    match = find_reply(b"\0" + frame(1, pdu), 1, Identify(1).expectation())
+    assert match is not None
+    assert match.exception == 1
+    assert find_reply(frame(1, pdu), 1, Identify(1).expectation(), exceptions=False) is None
+
+
+def test_pieces() -> None:
+    assert pieces(b"\x33" + OTHER + b"\x44\x55" + REPLY) == [
+        Piece(b"\x33", whole=False),
+        Piece(OTHER, whole=True),
+        Piece(b"\x44\x55", whole=False),
+        Piece(REPLY, whole=True),
+    ]
+    assert pieces(b"") == []
+    assert Piece(OTHER, whole=True).device == 7
+
+
+@given(st.binary(max_size=300))
+def test_pieces_lose_no_byte(data: bytes) -> None:
+    assert b"".join(piece.data for piece in pieces(data)) == data
+
+
+@given(st.lists(st.integers(1, 5), max_size=20))
+def test_reply_in_lumps(sizes: list[int]) -> None:
+    exchange, rest, verdict = exchange_of(READ), OTHER + REPLY, None
+    for size in [*sizes, len(rest)]:
+        lump, rest = rest[:size], rest[size:]
+        verdict = verdict or exchange.feed(lump)
+    assert verdict is not None
+    assert verdict.kind is Kind.REPLY
+    assert verdict.resynchronised
+
+
+def test_first_replies_can_belong_to_others() -> None:
+    exchange = exchange_of(READ, skip=1)
+    assert exchange.feed(REPLY) is None
+    verdict = exchange.feed(REPLY)
+    assert verdict is not None
+    assert verdict.kind is Kind.REPLY
+
+
+WRITE = WriteOne(1, 5, 7)
+COPY = frame(1, WRITE.pdu())
+
+
+@pytest.mark.parametrize(
+    ("echo", "received", "kind"),
+    [
+        (False, b"", Kind.NOTHING),
+        (False, COPY, Kind.REPLY),
+        (True, COPY, Kind.NOTHING),
+        (True, COPY * 2, Kind.REPLY),
+        (None, b"", Kind.NOTHING),
+        (None, COPY, Kind.UNSURE),
+        (None, COPY * 2, Kind.REPLY),
+        (True, COPY + frame(1, bytes([0x86, 3])), Kind.EXCEPTION),
+        (None, COPY + frame(1, bytes([0x86, 3])), Kind.EXCEPTION),
+    ],
+)
+def test_write_through_an_adapter(echo: bool | None, received: bytes, kind: Kind) -> None:
+    exchange = exchange_of(WRITE, echo=echo)
+    verdict = exchange.feed(received) or exchange.expired()
+    assert verdict.kind is kind
+
+
+@pytest.mark.parametrize(
+    ("received", "echo"),
+    [
+        (REPLY, False),
+        (frame(1, READ.pdu()) + REPLY, True),
+        (b"\x55" + REPLY, None),
+        (frame(1, READ.pdu()), True),
+        (b"", False),
+        (b"\x55", None),
+    ],
+)
+def test_echo_is_learnt_from_reads(received: bytes, echo: bool | None) -> None:
+    exchange = exchange_of(READ)
+    if exchange.feed(received) is None:
+        exchange.expired()
+    assert exchange.echo is echo
+
+
+@pytest.mark.parametrize(
+    ("received", "ends"),
+    [
+        (b"\x55", False),
+        (b"\x55\x66\x77\x88\x99", False),
+        (OTHER, False),
+        (frame(1, READ.pdu())[:4], False),
+        (frame(1, READ.pdu()), False),
+        (REPLY[:4], True),
+        (REPLY[1:], True),
+        (b"\x55" + REPLY[1:], True),
+        (OTHER + REPLY[:3], True),
+        (b"\x01\x83\x02", True),
+    ],
+)
+def test_silence_ends_the_wait_for_remains_of_the_reply_only(received: bytes, ends: bool) -> None:
+    exchange = exchange_of(READ)
+    assert exchange.feed(received) is None
+    verdict = exchange.silent()
+    assert (verdict is not None) is ends
+    if verdict is not None:
+        assert verdict.kind is Kind.DAMAGED
+
+
+@pytest.mark.parametrize(
+    ("received", "kind"),
+    [
+        (b"", Kind.NOTHING),
+        (b"\x55", Kind.NOTHING),
+        (OTHER, Kind.NOTHING),
+        (b"\x55\x66\x77\x88", Kind.DAMAGED),
+        (frame(1, bytes([4, 2, 0, 9])), Kind.WRONG),
+    ],
+)
+def test_end_of_time(received: bytes, kind: Kind) -> None:
+    exchange = exchange_of(READ)
+    exchange.feed(received)
+    assert exchange.expired().kind is kind

@@ -1,0 +1,193 @@
+"""One line used from many threads and loops at once."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import random
+import threading
+from pathlib import Path
+
+import pytest
+
+from tui.bus.errors import LineClosed, LineError
+from tui.bus.line import Line, LineStatus, Priority
+from tui.bus.link import SerialLink
+from tui.bus.ports import is_pseudo_terminal, list_ports
+
+from .conftest import WIDE, OpenLine
+from .peer import PtyPeer, eventually, honest, silent
+
+
+def test_many_threads_get_their_own_answers(open_line: OpenLine) -> None:
+    wrong: list[tuple[int, tuple[int, ...]]] = []
+
+    def ask(line: Line, seed: int) -> None:
+        chance = random.Random(seed)
+
+        async def work() -> None:
+            for _ in range(30):
+                address, count = chance.randrange(60000), chance.randrange(1, 6)
+                got = await line.read(1, address, count, priority=chance.choice(list(Priority)))
+                if got.words != tuple(range(address, address + count)):
+                    wrong.append((address, got.words))
+
+        asyncio.run(work())
+
+    with PtyPeer(honest) as peer:
+        line = open_line(SerialLink(peer.path, 115200))
+        threads = [threading.Thread(target=ask, args=(line, seed)) for seed in range(6)]
+        for thread in threads:
+            thread.start()
+        for thread in threads:
+            thread.join()
+        assert wrong == []
+        assert line.counters.replies == 180
+
+
+def test_cancelling_at_any_moment_shifts_nothing(open_line: OpenLine) -> None:
+    chance = random.Random(1)
+
+    async def work(line: Line) -> int:
+        answered = 0
+        for address in range(120):
+            task = asyncio.create_task(line.read(1, address))
+            await asyncio.sleep(chance.random() * 0.006)
+            task.cancel()
+            try:
+                got = await task
+            except asyncio.CancelledError:
+                continue
+            assert got.words == (address,)
+            answered += 1
+        assert (await line.read(1, 999)).words == (999,)
+        return answered
+
+    with PtyPeer(honest) as peer:
+        line = open_line(SerialLink(peer.path, 115200))
+        asyncio.run(work(line))
+
+
+def test_closing_at_any_moment_answers_everybody() -> None:
+    async def ask(line: Line) -> None:
+        while True:
+            await line.read(1, 5)
+
+    def run(line: Line, ended: list[BaseException]) -> None:
+        try:
+            asyncio.run(ask(line))
+        except LineError as error:
+            ended.append(error)
+
+    with PtyPeer(honest) as peer:
+        for turn in range(10):
+            ended: list[BaseException] = []
+            line = Line(SerialLink(peer.path, 115200))
+            line.describe(1, WIDE)
+            line.open(wait=5.0)
+            threads = [threading.Thread(target=run, args=(line, ended)) for _ in range(4)]
+            for thread in threads:
+                thread.start()
+            threading.Event().wait(0.004 * turn)
+            line.close()
+            for thread in threads:
+                thread.join(10.0)
+            assert [type(error) for error in ended] == [LineClosed] * 4
+
+
+def test_caller_that_ends_leaves_no_trace(
+    open_line: OpenLine, caplog: pytest.LogCaptureFixture
+) -> None:
+    async def leave(line: Line) -> None:
+        with pytest.raises(TimeoutError):
+            async with asyncio.timeout(0.05):
+                await line.read(1, 5)
+
+    with PtyPeer(lambda request, _: [0.2, *honest(request, 0)]) as peer:
+        line = open_line(peer.path)
+        asyncio.run(leave(line))
+        eventually(lambda: line.counters.replies == 1)
+    assert not [record for record in caplog.records if record.levelno >= logging.WARNING]
+
+
+def test_worker_goes_on_while_the_callers_loop_stands_still(open_line: OpenLine) -> None:
+    seen: list[int] = []
+
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path)
+
+        async def poll() -> None:
+            while True:
+                seen.extend((await line.read(1, 5)).words)
+
+        worker = line.spawn(poll, "poll")
+
+        async def frozen() -> None:
+            # the whole loop stands still, as a screen's does before a stalled terminal
+            eventually(lambda: len(seen) > 5)
+
+        asyncio.run(frozen())
+        assert not worker.done()
+        worker.cancel()
+        worker.cancel()
+        assert worker.wait(10.0)
+        assert worker.done()
+        assert worker.error is None
+
+
+def test_worker_that_fails_says_so(open_line: OpenLine, caplog: pytest.LogCaptureFixture) -> None:
+    async def fail() -> None:
+        raise ValueError("on purpose")
+
+    with PtyPeer(honest) as peer:
+        line = open_line(peer.path)
+        worker = line.spawn(fail, "doomed")
+        assert worker.wait(10.0)
+        assert isinstance(worker.error, ValueError)
+        assert "doomed ended by an error" in caplog.text
+        assert line.state.status is LineStatus.CONNECTED
+
+
+def test_worker_may_close_the_line_that_it_works_in(open_line: OpenLine) -> None:
+    with PtyPeer(silent) as peer:
+        line = open_line(peer.path)
+
+        async def close() -> None:
+            line.close()
+
+        worker = line.spawn(close, "closer")
+        assert worker.wait(10.0)
+        eventually(lambda: line.state.status is LineStatus.CLOSED)
+
+
+def test_listener_that_fails_does_no_harm(
+    open_line: OpenLine, caplog: pytest.LogCaptureFixture
+) -> None:
+    def listen(_state: object) -> None:
+        raise ValueError("on purpose")
+
+    with PtyPeer(honest) as peer:
+        line = Line(SerialLink(peer.path))
+        line.on_state(listen)
+        line.open(wait=5.0)
+        assert asyncio.run(line.read(1, 5)).words == (5,)
+        line.close()
+    assert "listener" in caplog.text
+
+
+def test_protocol_library_says_nothing(
+    open_line: OpenLine, capfd: pytest.CaptureFixture[str]
+) -> None:
+    with PtyPeer(lambda _request, _count: [b"\x01\x2b\x0e\x01\x02"]) as peer:
+        line = open_line(peer.path)
+        with pytest.raises(LineError):
+            asyncio.run(line.identify(1))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_ports(tmp_path: Path) -> None:
+    with PtyPeer(honest) as peer:
+        assert is_pseudo_terminal(peer.path)
+    assert not is_pseudo_terminal(str(tmp_path))
+    assert not is_pseudo_terminal(str(tmp_path / "none"))
+    assert [port.path for port in list_ports()] == sorted(port.path for port in list_ports())
