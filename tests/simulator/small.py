@@ -87,6 +87,8 @@ def altivar_parameters() -> list[dict[str, Any]]:
         parameter("LFT", 7121, "r"),
         parameter("DP1", 7201, "r"),
         parameter("DP2", 7202, "r"),
+        *(parameter(f"EP{n}", 7210 + n, "r") for n in (0, 1)),
+        *(parameter(f"LCP{n}", 7240 + n, "r") for n in (0, 1)),
         parameter("SCS", 8001, quantity="save_settings", values=_names(2), storage="ram"),
         parameter("CHCF", 8401, "rw-stopped", values=_names(4), factory=1, **_CONFIG),
         parameter("COP", 8402, "rw-stopped", values=_names(4), factory=0, **_CONFIG),
@@ -265,7 +267,10 @@ def atv21() -> Profile:
             "link": {
                 "baud": 19200,
                 "format": "8E1",
-                "settings": [{"parameter": "F802", "role": "address"}],
+                "settings": [
+                    {"parameter": "F802", "role": "address"},
+                    {"parameter": "F829", "role": "protocol", "factory": 1},
+                ],
             },
             "functions": [
                 {"code": 3, "name": "3", "max_read": 5},
@@ -365,6 +370,7 @@ def atv21() -> Profile:
                 parameter("F603", 0x603, factory=0, storage="eeprom"),
                 parameter("F802", 0x802, factory=1, min=0, max=247, storage="eeprom")
                 | {"quantity": "line_address"},
+                parameter("F829", 0x829, factory=1, effective="after-reset", storage="eeprom"),
                 parameter("F803", 0x803, unit="s", factory=3, min=0, max=100, storage="eeprom"),
                 *(parameter(f"F{n}", int(f"0{n}", 16), **block) for n in (870, 871)),
                 *(parameter(f"F{n}", int(f"0{n}", 16), **block) for n in range(875, 880)),

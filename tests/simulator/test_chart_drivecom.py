@@ -332,3 +332,24 @@ def test_in_the_io_profile_6_is_an_order_and_no_shutdown() -> None:
     bench.taken("CMD", 6)
     bench.run(3)
     assert bench.word("RFR") == 0x10000 - 300
+
+
+def test_a_fault_leaves_a_record_of_what_the_drive_did() -> None:
+    bench = started()
+    bench.run(3)
+    status, current = bench.word("ETA"), bench.word("LCR")
+    bench.drive.provoke("OCF")
+    assert (bench.word("EP0"), bench.word("LCP0")) == (status, current)
+    bench.taken("CMD", 0)
+    bench.taken("CMD", 0x80)
+    bench.drive.provoke("ObF")
+    assert (bench.word("EP1"), bench.word("LCP1")) == (status, current)
+    assert bench.word("LCP0") == 0
+
+
+def test_reaching_access_level_3_gives_the_channels_their_factory_values() -> None:
+    bench = Bench("atv312", {"LAC": 0, "CHCF": 2})
+    bench.taken("LAC", 1)
+    assert bench.word("FR1") == 164
+    bench.taken("LAC", 2)
+    assert [bench.word(code) for code in ("FR1", "CD1", "CHCF")] == [1, 1, 1]

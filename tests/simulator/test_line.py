@@ -197,3 +197,11 @@ def test_the_turnaround_is_that_of_the_profile_or_of_the_drives_delay() -> None:
     assert on.drive(3).turnaround == pytest.approx(0.010)
     asked(on, 3, write(1505, 40))
     assert on.drive(3).turnaround == pytest.approx(0.040)
+
+
+def test_another_protocol_makes_an_altivar_21_deaf_after_the_next_power_up() -> None:
+    on = line(*TWO)
+    assert asked(on, 3, write(0x829, 2)) is not None
+    assert asked(on, 3, read(9)) is not None
+    on.drive(3).power_cycle()
+    assert asked(on, 3, read(9)) is None

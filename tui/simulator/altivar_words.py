@@ -23,6 +23,8 @@ RECORDED: Mapping[str, str] = {
 }
 """Beginnings of the codes of a fault's record, and the word that each keeps; 0 is the last."""
 RECORDS = 9
+VOLTAGES: Mapping[float, int] = {230.0: 4, 400.0: 6, 575.0: 8}
+"""Raw values of VCAL on three phases, by the voltage of the motor in V."""
 
 (INJECTING, READY, FREEWHEEL, RUNNING, ACCELERATING, DECELERATING, FAST_STOP, FAULT) = (
     1,
@@ -89,4 +91,6 @@ def show_altivar_words(body: Body, stop: Stop | None, *, disabled: bool, reached
         body.show_code("HMIS", keypad_state(body, stop, disabled=disabled))
         body.show_code("LRS8", 0 if body.fault or motor.energised else 1 << 15)
         body.show_code("CNFS", 1)
+        body.show_code("PPN", body.rating.poles // 2)
+        body.show_code("VCAL", VOLTAGES.get(body.rating.voltage, 0))
     body.show_code("IL1R", 1 if body.terminal_hz is not None else 0)

@@ -283,8 +283,11 @@ class SimulatedDrive:
             self._body.fallback = consequence.fallback
 
     def _refresh(self) -> None:
-        """Bring the shown words up to date without letting time pass."""
-        self._chart.order()
+        """Bring motor and shown words up to date without letting time pass."""
+        body = self._body
+        order = self._chart.order()
+        mains = self._mains() if self._powered else 0.0
+        body.motor = step(body.motor, body.rating, order, self._load.torque, mains, 0.0)
         self._show()
 
     def _show(self) -> None:

@@ -1,0 +1,106 @@
+"""The families with the profiles that come with the panel: alive, plausible, as commissioned."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.drive.chart import read_chart, watched_codes
+from tui.drive.library import load
+from tui.drive.schema import Parameter, Quantity
+from tui.simulator import DriveSpec, SimulatedDrive
+
+FAMILIES = ("atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca")
+ALTIVAR = FAMILIES[:4]
+
+
+def drive(profile: str, **more: object) -> SimulatedDrive:
+    return SimulatedDrive(load(profile), DriveSpec(profile, 2, **more))  # type: ignore[arg-type]
+
+
+def run(simulated: SimulatedDrive, seconds: float) -> None:
+    for _ in range(round(seconds / 0.05)):
+        simulated.step(0.05)
+
+
+def state(simulated: SimulatedDrive) -> str:
+    profile = simulated.profile
+    raws = {code: simulated.raw(code) for code in watched_codes(profile)}
+    return read_chart(profile, raws).kind
+
+
+def value(simulated: SimulatedDrive, quantity: Quantity) -> float:
+    parameter = simulated.profile.quantity(quantity)
+    assert parameter is not None, quantity
+    scale = simulated.profile.scale(parameter, {})
+    return simulated.raw(parameter.code) * float(parameter.scale if scale is None else scale)
+
+
+@pytest.mark.parametrize("profile", FAMILIES)
+def test_a_plain_drive_stands_without_a_fault(profile: str) -> None:
+    simulated = drive(profile)
+    run(simulated, 2)
+    assert simulated.fault is None
+    assert simulated.motor.frequency == 0
+    assert state(simulated) in ("ready", "blocked", "stopped")
+
+
+@pytest.mark.parametrize("profile", FAMILIES)
+def test_a_run_order_at_the_terminals_makes_it_run_and_its_end_stops_it(profile: str) -> None:
+    simulated = drive(profile, run_hz=30.0)
+    run(simulated, 12)
+    assert simulated.motor.frequency == pytest.approx(30, abs=0.1)
+    assert state(simulated) == "running"
+    simulated.halt()
+    run(simulated, 12)
+    assert simulated.motor.frequency == 0
+    assert state(simulated) in ("ready", "blocked", "stopped")
+
+
+@pytest.mark.parametrize("profile", FAMILIES)
+def test_a_fault_is_seen_and_its_end_too(profile: str) -> None:
+    simulated = drive(profile)
+    simulated.provoke(9)
+    assert state(simulated) == "fault"
+    simulated.power_cycle()
+    assert state(simulated) != "fault"
+
+
+@pytest.mark.parametrize("profile", ALTIVAR)
+def test_the_values_of_a_running_motor_are_alive_and_plausible(profile: str) -> None:
+    simulated = drive(profile, run_hz=40.0)
+    run(simulated, 30)
+    assert value(simulated, "output_frequency") == pytest.approx(40, abs=0.1)
+    assert value(simulated, "frequency_reference") == pytest.approx(40, abs=0.1)
+    assert 1050 < value(simulated, "speed") <= 1200
+    assert value(simulated, "motor_current") > 0
+    assert 20 < value(simulated, "torque") < 100
+    first = [simulated.raw(p.code) for p in monitored(simulated)]
+    run(simulated, 10)
+    second = [simulated.raw(p.code) for p in monitored(simulated)]
+    assert first != second, "a load that never changes makes a dead trend"
+
+
+def monitored(simulated: SimulatedDrive) -> list[Parameter]:
+    wanted: tuple[Quantity, ...] = ("motor_current", "torque", "power")
+    found = [simulated.profile.quantity(q) for q in wanted]
+    return [p for p in found if p is not None]
+
+
+@pytest.mark.parametrize("profile", ["atv71", "atv21"])
+def test_the_drive_tells_the_model_that_it_identifies_itself_as(profile: str) -> None:
+    simulated = drive(profile)
+    identification = simulated.profile.data.identification
+    raw = simulated.raw(identification.model_parameter)
+    assert raw != 0
+    assert raw in {model.code for model in identification.models}
+
+
+@pytest.mark.parametrize("profile", FAMILIES)
+def test_every_word_of_every_family_can_be_read(profile: str) -> None:
+    simulated = drive(profile, run_hz=20.0)
+    run(simulated, 1)
+    for parameter in simulated.profile.parameters:
+        request = bytes([3]) + parameter.address.to_bytes(2, "big") + b"\0\1"
+        reply = simulated.answer(2, request)
+        assert reply is not None, parameter.code
+        assert len(reply) == 4, parameter.code
