@@ -59,6 +59,17 @@ def test_line_timing(baud: int, form: str, bits: int, silence: float) -> None:
     assert timing.silence == pytest.approx(silence)
 
 
+@pytest.mark.parametrize("form", ["", "8X1", "7E1", "8E3", "8e1"])
+def test_a_format_is_checked(form: str) -> None:
+    with pytest.raises(SimulatorError, match="character format"):
+        LineTiming(19200, form)
+
+
+def test_a_baud_is_checked() -> None:
+    with pytest.raises(SimulatorError, match="baud"):
+        LineTiming(0)
+
+
 @pytest.mark.parametrize("rates", [{"lost": -0.1}, {"late": 1.1}, {"lost": 0.6, "late": 0.6}])
 def test_rates_are_probabilities(rates: dict[str, float]) -> None:
     with pytest.raises(SimulatorError):

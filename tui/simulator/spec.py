@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 
@@ -9,6 +10,7 @@ from .errors import SimulatorError
 
 DEFAULT_ADDRESS = 1
 LAST_ADDRESS = 247
+_FORMAT = re.compile(r"8[NEO][12]")
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,15 @@ class LineTiming:
     baud: int = 19200
     format: str = "8E1"
     real_time: bool = False
+
+    def __post_init__(self) -> None:
+        """Refuse a format or a baud that no serial port has."""
+        if not _FORMAT.fullmatch(self.format):
+            raise SimulatorError(
+                f"{self.format!r} is no character format; write it like 8E1, 8O1, 8N1 or 8N2."
+            )
+        if self.baud < 1:
+            raise SimulatorError(f"A line of {self.baud} baud carries nothing; 19200 is usual.")
 
     @property
     def bits_per_character(self) -> int:
