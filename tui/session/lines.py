@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from tui.bus.errors import LinkSyntaxError
 from tui.bus.line import Line
 from tui.bus.link import Link, RtuTcpLink, SerialLink, label, parse_link
 
@@ -48,8 +49,29 @@ def open_line(text: str, *, read_only: bool = False, wait: float | None = None) 
     if text.casefold().startswith(SIMULATED):
         from tui.simulator import parse_drives
 
+        check_line(text)
         return _simulated(parse_drives(text[len(SIMULATED) :]), read_only=read_only, wait=wait)
     return _opened(OpenLine(text, Line(parse_link(text), read_only=read_only)), wait)
+
+
+def check_line(text: str) -> None:
+    """Raise LinkSyntaxError, or the simulator's error, for a text that is no LINE."""
+    if text.casefold().startswith(SIMULATED):
+        from tui.simulator import SimulatorError, parse_drives
+
+        try:
+            parse_drives(text[len(SIMULATED) :])
+        except SimulatorError as error:
+            raise LinkSyntaxError(str(error)) from error
+    else:
+        parse_link(text)
+
+
+def serial_ports() -> list[tuple[str, str]]:
+    """Paths and descriptions of the serial ports of this machine."""
+    from tui.bus.ports import list_ports
+
+    return [(port.path, port.description) for port in list_ports()]
 
 
 def demo_line(drives: Mapping[str, float]) -> OpenLine:

@@ -1,0 +1,141 @@
+"""The panel: its screens, its global keys, its theme; wiring only."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Iterable
+from typing import ClassVar
+
+from textual.app import App, SystemCommand
+from textual.screen import Screen
+
+from tui.session.drive_session import DriveSession
+from tui.session.lines import OpenLine, open_line
+from tui.session.state import remember_line
+from tui.widgets.clock import Clock
+from tui.widgets.palette import THEME
+
+from .screens.actions import ACTIONS, CONNECTION, bindings
+from .screens.connection import ConnectionScreen
+from .screens.help import HelpScreen
+
+log = logging.getLogger("drivepanel")
+
+CONNECT_WITHIN = 4.0
+"""Seconds in which a line chosen by a person must connect."""
+
+Opener = Callable[..., OpenLine]
+
+
+class DrivePanelApp(App[None]):
+    """The panel on one line at a time.
+
+    `start` is a LINE to open at once, `device` a drive on it to watch at once.
+    """
+
+    TITLE = "Drive Panel"
+    BINDINGS: ClassVar = bindings(None)
+    ENABLE_COMMAND_PALETTE = True
+    COMMAND_PALETTE_BINDING = "ctrl+p"
+
+    def __init__(
+        self,
+        *,
+        open_line: Opener = open_line,
+        start: str | None = None,
+        device: int | None = None,
+        clock: Clock | None = None,
+        read_only: bool = False,
+    ) -> None:
+        super().__init__()
+        self.clock = clock or Clock()
+        self.read_only = read_only
+        self.period = 0.5
+        self.opened: OpenLine | None = None
+        self.connection = ConnectionScreen()
+        self._open = open_line
+        self._start = start
+        self._device = device
+
+    def on_mount(self) -> None:
+        """Show Connection, and open the line that was named."""
+        self.register_theme(THEME)
+        self.theme = THEME.name
+        self.push_screen(self.connection)
+        if self._start is not None:
+            self.call_after_refresh(self.connection.start, self._start, self._device)
+
+    def on_unmount(self) -> None:
+        """Leave no line open."""
+        self.disconnect()
+
+    @property
+    def line_text(self) -> str:
+        """The open line as it was typed, or nothing."""
+        return self.opened.text if self.opened else ""
+
+    @property
+    def line_label(self) -> str:
+        """The open line as it is called on a screen, or nothing."""
+        return self.opened.label if self.opened else ""
+
+    async def connect(self, text: str) -> None:
+        """Open a line in place of the one that is open; raises the line's errors."""
+        self.disconnect()
+        self.opened = await asyncio.to_thread(
+            self._open, text, read_only=self.read_only, wait=CONNECT_WITHIN
+        )
+        log.info("opened %s", self.opened.label)
+        await asyncio.to_thread(remember_line, self.opened.text)
+
+    def disconnect(self) -> None:
+        """Close the open line, if there is one."""
+        if self.opened is not None:
+            log.info("closed %s", self.opened.label)
+            self.opened.close()
+            self.opened = None
+
+    def show_monitor(self, session: DriveSession) -> None:
+        """Show Monitor on a drive."""
+        from .screens.monitor import MonitorScreen
+
+        log.info("watching device %s, %s", session.device, session.profile.id)
+        self.push_screen(MonitorScreen(session))
+
+    def step_drive(self, device: int, step: int) -> None:
+        """Monitor on the next or previous drive found on the line."""
+        from .screens.monitor import MonitorScreen
+
+        drives = sorted(d for d, found in self.connection.found.items() if found.session)
+        if len(drives) < 2 or device not in drives:
+            self.notify("This is the only drive found on the line.", timeout=3)
+            return
+        found = self.connection.found[drives[(drives.index(device) + step) % len(drives)]]
+        if found.session is not None:
+            self.switch_screen(MonitorScreen(found.session))
+
+    def action_help(self) -> None:
+        """Every key of the screen on top."""
+        if not isinstance(self.screen, HelpScreen):
+            self.push_screen(HelpScreen(self._screen_name()))
+
+    def _screen_name(self) -> str:
+        return (self.screen.TITLE or CONNECTION).lower()
+
+    def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
+        """Every action of the screen on top, for the command palette."""
+        name = (screen.TITLE or CONNECTION).lower()
+        for action in ACTIONS:
+            if name not in action.screens or action.id == "command_palette":
+                continue
+            owner = self if action.app else screen
+            yield SystemCommand(
+                action.help.rstrip("."),
+                f"Key {action.shown}",
+                lambda owner=owner, id=action.id: self.run_named(owner, id),
+            )
+
+    async def run_named(self, owner: object, action: str) -> None:
+        """Run an action of the table on the screen or the app."""
+        await self.run_action(action, owner)  # type: ignore[arg-type]

@@ -1,0 +1,116 @@
+"""Every action of the panel in one place: its key, its words, the screens it belongs to.
+
+Bindings, the line of keys, the help screen and the command palette are made from this table.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from textual.binding import Binding, BindingType
+
+CONNECTION, MONITOR, FRAMES = "connection", "monitor", "frames"
+EVERYWHERE = (CONNECTION, MONITOR, FRAMES)
+
+
+@dataclass(frozen=True, slots=True)
+class Action:
+    """One thing a person can do."""
+
+    id: str
+    """Name of the method, with its arguments as Textual writes them."""
+    keys: str
+    """Keys as Textual names them, separated by commas."""
+    shown: str
+    """The key as a person reads it."""
+    label: str
+    """One or two words for the line of keys."""
+    help: str
+    """A sentence for the help screen and the palette."""
+    screens: tuple[str, ...] = EVERYWHERE
+    app: bool = False
+    """True for an action of the app, False for one of the screen."""
+    line: bool = True
+    """Whether it stands in the line of keys."""
+
+
+ACTIONS: tuple[Action, ...] = (
+    Action(
+        "open_chosen", "enter", "Enter", "open", "Open the chosen line or drive.", (CONNECTION,)
+    ),
+    Action("scan", "s", "s", "scan", "Look for drives at the addresses given.", (CONNECTION,)),
+    Action(
+        "type_line",
+        "n",
+        "n",
+        "type a line",
+        "Type a line: serial, TCP, RTU over TCP, sim.",
+        (CONNECTION,),
+    ),
+    Action("refresh_lines", "r", "r", "refresh", "Look for serial ports again.", (CONNECTION,)),
+    Action("disconnect", "x", "x", "close line", "Close the line.", (CONNECTION,)),
+    Action(
+        "stop_scan",
+        "escape",
+        "Esc",
+        "stop scan",
+        "Stop looking for drives.",
+        (CONNECTION,),
+        line=False,
+    ),
+    Action("leave", "escape", "Esc", "lines", "Go back to Connection.", (MONITOR,)),
+    Action(
+        "step_drive(-1)",
+        "left_square_bracket",
+        "[",
+        "",
+        "The drive before on this line.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "step_drive(1)",
+        "right_square_bracket",
+        "[ ]",
+        "drive",
+        "The next drive on this line.",
+        (MONITOR,),
+    ),
+    Action(
+        "change_rate(1)", "plus,equals_sign", "+", "", "Poll twice as fast.", (MONITOR,), line=False
+    ),
+    Action("change_rate(-1)", "minus", "+ -", "rate", "Poll half as fast.", (MONITOR,)),
+    Action("next_word", "w", "w", "word", "Show the next word of bits.", (MONITOR,)),
+    Action("frames", "l", "l", "frames", "Show the frames on the line.", (MONITOR,)),
+    Action("leave", "escape,l", "Esc", "back", "Go back to Monitor.", (FRAMES,)),
+    Action("hold", "h", "h", "hold", "Hold the list still, or let it run.", (FRAMES,)),
+    Action("command_palette", "ctrl+p", "^p", "actions", "Find any action by its name.", app=True),
+    Action("help", "question_mark,f1", "?", "help", "Show every key.", app=True),
+    Action("quit", "q,ctrl+q", "q", "leave", "Leave the panel.", app=True),
+)
+
+
+def bindings(screen: str | None) -> list[BindingType]:
+    """Textual's bindings of a screen, or of the app for None."""
+    return [
+        Binding(
+            action.keys,
+            action.id,
+            action.label or action.help,
+            show=False,
+            id=f"{screen or 'app'}.{action.id.partition('(')[0]}.{index}",
+            tooltip=action.help,
+        )
+        for index, action in enumerate(ACTIONS)
+        if action.app == (screen is None) and (screen is None or screen in action.screens)
+    ]
+
+
+def of_screen(screen: str) -> list[Action]:
+    """Actions that work on a screen, those of the app last."""
+    return [action for action in ACTIONS if screen in action.screens]
+
+
+def keys_of(screen: str) -> list[tuple[str, str]]:
+    """What the line of keys says on a screen."""
+    return [(action.shown, action.label) for action in of_screen(screen) if action.line]

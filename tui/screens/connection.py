@@ -1,0 +1,425 @@
+"""Connection: choose a line, find the drives on it."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.text import Text
+from textual import work
+from textual.app import ComposeResult
+from textual.containers import Horizontal, Vertical
+from textual.screen import Screen
+from textual.widgets import Input, Label, OptionList
+from textual.widgets.option_list import Option
+
+from tui.bus.errors import LineError
+from tui.bus.line import LineStatus
+from tui.drive import library
+from tui.drive.errors import DriveError
+from tui.session.addresses import parse_addresses
+from tui.session.drive_session import DriveSession
+from tui.session.identify import DriveIdentity, ScanResult, scan
+from tui.session.state import recent_lines
+from tui.widgets.drawing import cut, key_line, rule
+from tui.widgets.lines import Lines
+from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, RUNNING, STRONG
+
+from .actions import CONNECTION, bindings, keys_of
+from .choices import LineChoice, groups
+from .hints import hint_for
+
+if TYPE_CHECKING:
+    from tui.app import DrivePanelApp
+
+GLANCE = 3.0
+"""Seconds between two looks at the state of the drives found."""
+
+
+@dataclass(slots=True)
+class FoundDrive:
+    """A drive that answered, with what is known of it."""
+
+    identity: DriveIdentity
+    session: DriveSession | None = None
+    state: str = ""
+    kind: str = ""
+
+
+class ConnectionScreen(Screen[None]):
+    """Lines on the left, the chosen line and its drives on the right, what to do next below."""
+
+    CSS_PATH = "connection.tcss"
+    BINDINGS: ClassVar = bindings(CONNECTION)
+    TITLE = "Connection"
+    AUTO_FOCUS = "#lines"
+
+    app: DrivePanelApp
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: dict[int, FoundDrive] = {}
+        self._choices: dict[str, LineChoice] = {}
+        self._happened: tuple[str, str, str] = ("", "", "")
+
+    def compose(self) -> ComposeResult:
+        """Two columns and the lines below."""
+        yield Lines(id="header")
+        with Horizontal(id="body"):
+            with Vertical(id="left"):
+                yield Lines(id="lines-title")
+                yield OptionList(id="lines", compact=True)
+            with Vertical(id="right"):
+                yield Lines(id="line-title")
+                with Horizontal(classes="settings"):
+                    yield Label("Baud")
+                    yield Input("19200", id="baud", type="integer", max_length=6, compact=True)
+                    yield Label("Format")
+                    yield Input("8E1", id="format", max_length=3, compact=True)
+                with Horizontal(classes="settings"):
+                    yield Label("Ask")
+                    yield Input("1-10", id="addresses", compact=True)
+                    yield Label("Profile")
+                    yield Input("", id="profile", placeholder="identify", compact=True)
+                yield Lines(id="drives-title")
+                yield OptionList(id="drives", compact=True)
+        yield Lines(id="message")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Show what there is."""
+        self.query_one("#keys", Lines).show([key_line(keys_of(CONNECTION))])
+        self.say("", "Choose a line and press Enter, or n to type one.")
+        self.action_refresh_lines()
+        self.set_interval(1.0, self.show_heads)
+        self.set_interval(GLANCE, self.glance)
+        self.call_after_refresh(self.show_heads)
+
+    def on_resize(self) -> None:
+        """Titles have the width of their columns."""
+        self.call_after_refresh(self._redraw)
+
+    def on_screen_resume(self) -> None:
+        """States may have changed meanwhile."""
+        self.call_after_refresh(self._redraw)
+        self.glance()
+
+    def _redraw(self) -> None:
+        self.show_heads()
+        self.show_drives()
+        self._show_message()
+
+    # what is shown
+
+    def show_heads(self) -> None:
+        """The titles, with the state of the line."""
+        if not self.is_current:
+            return
+        width = self.size.width
+        right = f"{self.app.clock.time_of_day()} "
+        head = Text(no_wrap=True)
+        head.append(cut(" Drive Panel · Connection", width - len(right)), STRONG)
+        head.append(right, FAINT)
+        self.query_one("#header", Lines).show([head])
+        self._title("#lines-title", "Lines")
+        opened = self.app.opened
+        state = opened.line.state if opened else None
+        words = state.status.value if state else "not open"
+        self._title("#line-title", self.app.line_label or "No line", words)
+        count = f"{len(self.found)} found" if self.found else ""
+        self._title("#drives-title", "Drives", count)
+        if state is not None and state.status is LineStatus.LOST:
+            self.say(f"LINE LOST: {state.reason}", "It is tried again by itself.", ALARM_KIND)
+
+    def _title(self, where: str, title: str, right: str = "") -> None:
+        lines = self.query_one(where, Lines)
+        width = lines.size.width
+        lines.show([rule(cut(title, min(len(title), max(4, width - 14))), width, right)])
+
+    def say(self, happened: str, next_step: str, kind: str = "") -> None:
+        """What happened last, and what to try next."""
+        self._happened = (happened, next_step, kind)
+        self._show_message()
+
+    def _show_message(self) -> None:
+        happened, next_step, kind = self._happened
+        width = max(10, self.size.width - 2)
+        style = {ERROR_KIND: FAULT, ALARM_KIND: ALARM}.get(kind, PLAIN)
+        parts = _wrapped(happened, width, 2)
+        lines = [Text(f" {part}", style) for part in parts]
+        lines += [Text(f" {part}", FAINT) for part in _wrapped(next_step, width, 3 - len(lines))]
+        lines += [Text("")] * (3 - len(lines))
+        self.query_one("#message", Lines).show(lines)
+
+    def show_drives(self) -> None:
+        """The drives that answered, one a line."""
+        drives = self.query_one("#drives", OptionList)
+        width = max(20, drives.size.width - 1)
+        chosen = drives.highlighted
+        drives.clear_options()
+        drives.add_options(
+            Option(drive_line(drive, width), id=str(device))
+            for device, drive in sorted(self.found.items())
+        )
+        if self.found:
+            drives.highlighted = min(chosen or 0, len(self.found) - 1)
+
+    # lines
+
+    def action_refresh_lines(self) -> None:
+        """Look for serial ports and recent lines."""
+        from tui.session.lines import serial_ports
+
+        options = self.query_one("#lines", OptionList)
+        chosen = options.highlighted
+        options.clear_options()
+        self._choices.clear()
+        for group in groups(serial_ports(), recent_lines()):
+            options.add_option(Option(Text(group.title, FAINT), disabled=True))
+            for choice in group.choices:
+                key = f"{group.title} {choice.text}"
+                self._choices[key] = choice
+                text = Text(f" {choice.text}", PLAIN, no_wrap=True, overflow="ellipsis")
+                if choice.description:
+                    text.append(f"  {choice.description}", FAINT)
+                options.add_option(Option(text, id=key))
+            if not group.choices:
+                options.add_option(Option(Text(f"  {group.empty}", FAINT), disabled=True))
+        first = next((i for i, o in enumerate(options.options) if not o.disabled), None)
+        options.highlighted = chosen if chosen is not None else first
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Enter on a line opens it, Enter on a drive watches it."""
+        if event.option_list.id == "lines":
+            choice = self._choices[event.option.id or ""]
+            self.open_line(self._line_text(choice))
+        else:
+            self.open_drive(int(event.option.id or 0))
+
+    def _line_text(self, choice: LineChoice) -> str:
+        """The LINE of a choice; a serial port with the settings typed beside it."""
+        if not choice.path:
+            return choice.text
+        baud = self.query_one("#baud", Input).value.strip() or "19200"
+        form = self.query_one("#format", Input).value.strip().upper() or "8E1"
+        return f"serial:{choice.path},{baud},{form}"
+
+    def action_type_line(self) -> None:
+        """Type a line."""
+        from .line_dialog import LineDialog
+
+        def typed(text: str | None) -> None:
+            if text:
+                self.open_line(text)
+
+        self.app.push_screen(LineDialog(self.app.line_text), typed)
+
+    @work(exclusive=True, group="line")
+    async def open_line(self, text: str) -> None:
+        """Open a line and ask for its drives."""
+        self.found.clear()
+        self.show_drives()
+        self.say(f"Opening {text}", "")
+        try:
+            await self.app.connect(text)
+        except (LineError, DriveError) as error:
+            self.fail(error)
+            return
+        self.action_refresh_lines()
+        self.show_heads()
+        self.action_scan()
+
+    @work(exclusive=True, group="line")
+    async def start(self, text: str, device: int | None) -> None:
+        """Open a line; with a device, watch that drive as soon as it is known."""
+        try:
+            await self.app.connect(text)
+        except (LineError, DriveError) as error:
+            self.fail(error)
+            return
+        self.action_refresh_lines()
+        self.show_heads()
+        if device is None:
+            self.action_scan()
+            return
+        await self.scan([device]).wait()
+        if device in self.found:
+            self.open_drive(device)
+
+    def fail(self, error: Exception) -> None:
+        """Show an error with what to try next."""
+        self.say(str(error), hint_for(error), ERROR_KIND)
+
+    # drives
+
+    def action_scan(self) -> None:
+        """Look for drives at the addresses given."""
+        opened = self.app.opened
+        if opened is None:
+            self.say("No line is open.", "Choose one and press Enter.", ALARM_KIND)
+            return
+        try:
+            wanted = list(opened.devices) or parse_addresses(
+                self.query_one("#addresses", Input).value
+            )
+        except LineError as error:
+            self.fail(error)
+            return
+        self.scan(wanted)
+
+    @work(exclusive=True, group="scan")
+    async def scan(self, devices: Sequence[int]) -> None:
+        """Ask each address; drives appear as they answer."""
+        opened = self.app.opened
+        if opened is None:
+            return
+        results: list[ScanResult] = []
+        for number, device in enumerate(devices, start=1):
+            self.say(f"Asking address {device}, {number} of {len(devices)}", "Esc stops.")
+            try:
+                await scan(opened.line, [device], results.append)
+            except LineError as error:
+                self.fail(error)
+                return
+            while results:
+                await self._take(results.pop())
+        self._sum_up(devices)
+
+    def _sum_up(self, devices: Sequence[int]) -> None:
+        if not self.found:
+            span = f"{devices[0]} to {devices[-1]}" if len(devices) > 1 else f"{devices[0]}"
+            self.say(
+                f"No drive answered at address {span}.",
+                "Check baud, format and wiring; try other addresses (Ask), then s.",
+                ALARM_KIND,
+            )
+            return
+        self.say(
+            f"{len(self.found)} of {len(devices)} addresses answered.",
+            "Choose a drive and press Enter to watch it.",
+        )
+        self.query_one("#drives", OptionList).focus()
+
+    async def _take(self, result: ScanResult) -> None:
+        """Keep a drive that answered, with its profile and state."""
+        if result.identity is None:
+            self.say(result.error, "The address is taken; scan again with s.", ALARM_KIND)
+            return
+        drive = FoundDrive(result.identity)
+        self.found[result.device] = drive
+        await self._equip(drive)
+        await self._look_at(drive)
+        self.show_drives()
+        self.show_heads()
+
+    async def _equip(self, drive: FoundDrive) -> None:
+        """Give a drive its profile: the typed one, else the one that fits."""
+        typed = self.query_one("#profile", Input).value.strip().lower()
+        identity = drive.identity
+        wanted = typed or identity.profile or next(iter(identity.candidates), None)
+        opened = self.app.opened
+        if wanted is None or opened is None:
+            return
+        try:
+            profile = await asyncio.to_thread(library.load, wanted)
+        except DriveError as error:
+            self.fail(error)
+            return
+        drive.session = DriveSession(opened.line, identity.device, profile, identity)
+
+    async def _look_at(self, drive: FoundDrive) -> None:
+        if drive.session is None:
+            drive.state, drive.kind = "no profile", "unknown"
+            return
+        try:
+            state = await drive.session.glance()
+        except LineError:
+            drive.state, drive.kind = "no answer", "unknown"
+        else:
+            drive.state, drive.kind = state.headline, state.kind
+
+    @work(exclusive=True, group="glance")
+    async def glance(self) -> None:
+        """Look at the state of every drive found, while this screen is on top."""
+        if not self.is_current or self.app.opened is None:
+            return
+        before = {device: drive.state for device, drive in self.found.items()}
+        for drive in list(self.found.values()):
+            await self._look_at(drive)
+        if before != {device: drive.state for device, drive in self.found.items()}:
+            self.show_drives()
+
+    @work(exclusive=True, group="open")
+    async def open_drive(self, device: int) -> None:
+        """Open Monitor on a drive."""
+        drive = self.found.get(device)
+        if drive is None:
+            return
+        if drive.session is None:
+            await self._equip(drive)
+        if drive.session is None:
+            known = ", ".join(listing.id for listing in library.listings())
+            self.say(
+                f"Device {device} does not say which drive it is.",
+                f"Type its profile beside Profile: {known}.",
+                ALARM_KIND,
+            )
+            self.query_one("#profile", Input).focus()
+            return
+        self.action_stop_scan()
+        self.app.show_monitor(drive.session)
+
+    def action_stop_scan(self) -> None:
+        """Stop looking for drives."""
+        stopped = [w for w in self.workers if w.group == "scan" and w.is_running]
+        self.workers.cancel_group(self, "scan")
+        if stopped:
+            self.say("Stopped looking for drives.", "s looks again.")
+
+    def action_disconnect(self) -> None:
+        """Close the line."""
+        self.workers.cancel_group(self, "scan")
+        self.found.clear()
+        self.show_drives()
+        self.app.disconnect()
+        self.say("The line is closed.", "Choose a line and press Enter.")
+        self.show_heads()
+        self.query_one("#lines", OptionList).focus()
+
+    def action_open_chosen(self) -> None:
+        """What Enter does in the lists; a field hands Enter over to the list of lines."""
+        focused = self.focused
+        (focused if isinstance(focused, OptionList) else self._lines()).action_select()
+
+    def _lines(self) -> OptionList:
+        return self.query_one("#lines", OptionList)
+
+
+ERROR_KIND, ALARM_KIND = "error", "alarm"
+STATE_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
+
+
+def drive_line(drive: FoundDrive, width: int) -> Text:
+    """A drive in one line: address, reference, name, version, state."""
+    identity = drive.identity
+    profile = drive.session.profile.name if drive.session else ""
+    who = identity.reference or profile or "unknown drive"
+    about = " ".join(part for part in (identity.name, identity.version_text) if part)
+    state = drive.state
+    text = Text(no_wrap=True, overflow="ellipsis")
+    text.append(f" {identity.device:>3} ", FAINT)
+    room = max(10, width - 5 - len(state) - 1)
+    text.append(cut(who, min(15, room)), STRONG)
+    text.append(f" {cut(about, max(0, room - 16))}" if room > 18 else " ", FAINT)
+    text.append(state, STATE_STYLES.get(drive.kind, PLAIN))
+    return text
+
+
+def _wrapped(text: str, width: int, most: int) -> list[str]:
+    import textwrap
+
+    if not text or most < 1:
+        return []
+    return textwrap.wrap(text, width, max_lines=most, placeholder=" …")

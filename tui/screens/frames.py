@@ -1,0 +1,79 @@
+"""Frames: the last bytes on the line, as they went out and came in."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.screen import Screen
+
+from tui.bus.line import Frame, Line
+from tui.widgets.drawing import key_line, rule
+from tui.widgets.lines import Lines
+from tui.widgets.palette import ALARM, FAINT, PLAIN
+
+from .actions import FRAMES, bindings, keys_of
+
+if TYPE_CHECKING:
+    from tui.app import DrivePanelApp
+
+REFRESH = 0.5
+
+
+class FramesScreen(Screen[None]):
+    """The frame log of the line; the newest at the bottom."""
+
+    CSS_PATH = "frames.tcss"
+    BINDINGS: ClassVar = bindings(FRAMES)
+    TITLE = "Frames"
+
+    app: DrivePanelApp
+
+    def __init__(self, line: Line) -> None:
+        super().__init__()
+        self._line = line
+        self._held: tuple[Frame, ...] | None = None
+
+    def compose(self) -> ComposeResult:
+        """One list and the keys."""
+        yield Lines(id="frames")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Look at the trace now and then."""
+        self.set_interval(REFRESH, self.look)
+        self.query_one("#keys", Lines).show([key_line(keys_of(FRAMES))])
+        self.call_after_refresh(self.look)
+
+    def look(self) -> None:
+        """Show the newest frames that fit."""
+        width, height = self.size
+        frames = self._held if self._held is not None else tuple(self._line.trace)
+        room = max(1, height - 2)
+        title = "Frames on the line" + (" (held)" if self._held is not None else "")
+        lines = [rule(title, width, f"{len(frames)} kept")]
+        now = self.app.clock.monotonic()
+        lines += [frame_line(frame, now, width) for frame in frames[-room:]]
+        self.query_one("#frames", Lines).show(lines)
+
+    def action_hold(self) -> None:
+        """Hold the list still, or let it run."""
+        self._held = tuple(self._line.trace) if self._held is None else None
+        self.look()
+
+    def action_leave(self) -> None:
+        """Back to Monitor."""
+        self.app.pop_screen()
+
+
+def frame_line(frame: Frame, now: float, width: int) -> Text:
+    """One frame: how long ago, direction, bytes, and what was said of it."""
+    text = Text(no_wrap=True)
+    text.append(f" {now - frame.time:7.2f} s ago  ", FAINT)
+    text.append(f"{frame.direction:<4}", FAINT)
+    text.append(frame.data.hex(" ").upper(), PLAIN)
+    if frame.note:
+        text.append(f"  {frame.note}", ALARM)
+    text.truncate(width)
+    return text

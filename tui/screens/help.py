@@ -1,0 +1,60 @@
+"""Help: every key of the screen below, and what the signs mean."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import VerticalScroll
+from textual.screen import ModalScreen
+from textual.widgets import Static
+
+from tui.widgets.palette import ALARM, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
+
+from .actions import of_screen
+
+SIGNS: tuple[tuple[str, str, str], ...] = (
+    ("▶", "green", "the motor runs"),
+    ("■", "red", "the drive is in fault"),
+    ("?", "amber", "state not known, or (behind a name) not confirmed by a manual"),
+    ("-----", "grey", "no value: not read yet, or the drive does not have it"),
+    ("12s", "amber", "an old value, with its age in place of its unit"),
+    ("│", "white", "on a bar: the reference"),
+    ("●", "white", "a bit that is 1"),
+)
+STYLES = {"green": RUNNING, "red": FAULT, "amber": ALARM, "grey": FAINT, "white": PLAIN}
+
+
+class HelpScreen(ModalScreen[None]):
+    """The keys of one screen, made from the table of actions."""
+
+    CSS_PATH = "help.tcss"
+    BINDINGS: ClassVar = [
+        Binding("escape,question_mark,f1,q", "dismiss(None)", "close", show=False)
+    ]
+
+    def __init__(self, screen: str) -> None:
+        super().__init__()
+        self._of = screen
+
+    def compose(self) -> ComposeResult:
+        """One text that scrolls where the terminal is small."""
+        with VerticalScroll(id="help"):
+            yield Static(help_text(self._of))
+
+
+def help_text(screen: str) -> Text:
+    """Keys and signs of a screen."""
+    text = Text()
+    text.append(f"Keys on {screen}\n", TITLE)
+    for action in of_screen(screen):
+        text.append(f"  {action.shown:<7}", KEY)
+        text.append(f"{action.help}\n", PLAIN)
+    text.append("\nSigns\n", TITLE)
+    for sign, colour, meaning in SIGNS:
+        text.append(f"  {sign:<7}", STYLES[colour])
+        text.append(f"{meaning}\n", PLAIN)
+    text.append("\nEsc closes.", FAINT)
+    return text

@@ -1,0 +1,24 @@
+"""What to try next after an error, by its kind."""
+
+from __future__ import annotations
+
+from tui.bus import errors as line
+from tui.drive import errors as drive
+
+HINTS: tuple[tuple[type[Exception], str], ...] = (
+    (line.PortBusy, "Close the program that holds the port, then press Enter again."),
+    (line.PortMissing, "Plug in the adapter and press r, or choose another line."),
+    (line.PortRefused, "Ask for the right to use the port (group dialout), or choose another."),
+    (line.LinkSyntaxError, "n types the line again."),
+    (line.NoAnswer, "Check address, baud, format and wiring; s asks again."),
+    (line.ChecksumFault, "Check baud, format, shielding and termination; s asks again."),
+    (line.LineLost, "Check cable, gateway and network; press Enter to try again."),
+    (line.LineError, "Press Enter to try again, or choose another line."),
+    (drive.UnknownProfile, "Clear or correct the profile, then s."),
+    (drive.ProfileError, "Mend the file; drivepanel profiles --check tells every fault."),
+)
+
+
+def hint_for(error: Exception) -> str:
+    """What to try next."""
+    return next((hint for kind, hint in HINTS if isinstance(error, kind)), "Try again.")

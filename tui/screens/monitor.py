@@ -1,0 +1,224 @@
+"""Monitor: what the motor does, at one glance."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Horizontal, Vertical
+from textual.events import Resize
+from textual.screen import Screen
+from textual.timer import Timer
+
+from tui.drive.schema import Parameter
+from tui.session.drive_session import DriveSession
+from tui.widgets import monitor_view as draw
+from tui.widgets.drawing import key_line
+from tui.widgets.lines import Lines
+
+from .actions import MONITOR, bindings, keys_of
+
+if TYPE_CHECKING:
+    from tui.app import DrivePanelApp
+
+REFRESH = 0.25
+"""Seconds between two looks at the latest snapshot; the line polls at its own pace."""
+WIDE = (110, 36)
+"""Columns and rows from which all words stand side by side."""
+PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
+SMALL_LEFT = 31
+WIDE_LEFT = 40
+WORD_WIDTH = 30
+
+
+class MonitorScreen(Screen[None]):
+    """One drive, watched live; the screen only looks at what the line's worker brought."""
+
+    CSS_PATH = "monitor.tcss"
+    BINDINGS: ClassVar = bindings(MONITOR)
+    TITLE = "Monitor"
+
+    app: DrivePanelApp
+
+    def __init__(self, session: DriveSession) -> None:
+        super().__init__()
+        self.session = session
+        self._word = 0
+        self._timer: Timer | None = None
+        self._busy: tuple[float, float] | None = None
+        self._load = 0.0
+
+    def compose(self) -> ComposeResult:
+        """Fixed places, filled by lines."""
+        yield Lines(id="header")
+        with Horizontal(id="body"):
+            with Vertical(id="left"):
+                yield Lines(id="state")
+                yield Lines(id="word")
+                yield Lines(id="history")
+            with Vertical(id="right"):
+                yield Lines(id="motor")
+                yield Lines(id="trend")
+        with Horizontal(id="words"):
+            for index in range(4):
+                yield Lines(id=f"word{index}", classes="word")
+        yield Lines(id="message")
+        yield Lines(id="status")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Start watching."""
+        self.session.monitor.start(period=self.app.period, extra=self._extras())
+        self._timer = self.set_interval(REFRESH, self.look)
+        self.query_one("#keys", Lines).show([key_line(keys_of(MONITOR))])
+        self.call_after_refresh(self.look)
+
+    def on_unmount(self) -> None:
+        """Stop watching; nobody looks any more."""
+        self.session.monitor.stop()
+
+    def on_resize(self, event: Resize) -> None:
+        """More room, more words."""
+        self.set_class(event.size.width >= WIDE[0] and event.size.height >= WIDE[1], "wide")
+        self.call_after_refresh(self.look)
+
+    def on_screen_resume(self) -> None:
+        """Look again after another screen was on top."""
+        self.call_after_refresh(self.look)
+
+    @property
+    def wide(self) -> bool:
+        """Whether all words stand side by side."""
+        return self.has_class("wide")
+
+    def look(self) -> None:
+        """Show the latest snapshot; lines that stay the same are not drawn."""
+        if not self.is_current:
+            return
+        view = self._view()
+        for id, lines in self._parts(view).items():
+            self.query_one(f"#{id}", Lines).show(lines)
+
+    def _view(self) -> draw.View:
+        now = self.app.clock.monotonic()
+        monitor = self.session.monitor
+        line = self.session.line
+        counters = line.counters
+        self._measure_load(now, counters.busy_seconds)
+        return draw.View(
+            profile=self.session.profile,
+            identity=self.session.identity,
+            device=self.session.device,
+            line_label=self.app.line_label,
+            snapshot=monitor.latest,
+            line=line.state,
+            counters=counters,
+            load=self._load,
+            trend=monitor.trend,
+            period=monitor.period,
+            now=now,
+            clock=self.app.clock.time_of_day(),
+            read_only=self.app.read_only,
+        )
+
+    def _measure_load(self, now: float, busy: float) -> None:
+        """Share of the last seconds in which the line was busy."""
+        if self._busy is None:
+            self._busy = (now, busy)
+            return
+        since, before = self._busy
+        if now - since >= 2.0:
+            self._load = min(1.0, max(0.0, (busy - before) / (now - since)))
+            self._busy = (now, busy)
+
+    def _parts(self, view: draw.View) -> dict[str, list[Text]]:
+        width, height = self.size
+        left = WIDE_LEFT if self.wide else SMALL_LEFT
+        right = max(20, width - left - 1)
+        parts = {
+            "header": draw.header(view, width),
+            "state": draw.state_lines(view, left),
+            "message": draw.message_lines(view, width),
+            "status": draw.status_lines(view, width),
+        }
+        words = self._words()
+        below = 17 if self.wide else 0
+        body = height - below - 5
+        motor = draw.motor_lines(view, right, body - 6)
+        parts["motor"] = [*motor, Text("")]
+        parts["trend"] = draw.trend_lines(view, right, max(3, body - len(motor) - 1))
+        rest = body - len(parts["state"])
+        if self.wide:
+            parts["history"] = draw.history_lines(view, left, rest)
+            parts["word"] = []
+            parts |= self._wide_words(view, words, below)
+        else:
+            parts["history"] = []
+            word = words[self._word % len(words)] if words else None
+            parts["word"] = draw.word_lines(view, word, left, rest, "Word") if word else []
+        return parts
+
+    def _wide_words(
+        self, view: draw.View, words: list[Parameter], height: int
+    ) -> dict[str, list[Text]]:
+        """Three words from the chosen one on, and the counters of the line."""
+        parts: dict[str, list[Text]] = {}
+        for index in range(3):
+            chosen = (self._word + index) % len(words) if words else 0
+            parts[f"word{index}"] = (
+                draw.word_lines(view, words[chosen], WORD_WIDTH - 1, height)
+                if index < len(words)
+                else []
+            )
+        parts["word3"] = draw.line_lines(view, WORD_WIDTH - 1, height)
+        return parts
+
+    def _words(self) -> list[Parameter]:
+        """Words with named bits: the monitoring set's, then inputs and outputs."""
+        profile = self.session.profile
+        watched = [profile[v.parameter] for v in profile.data.monitoring.values]
+        found = [parameter for parameter in watched if parameter.bits]
+        for quantity in ("digital_inputs", "digital_outputs"):
+            parameter = profile.quantity(quantity)
+            if parameter is not None and parameter.bits and parameter not in found:
+                found.append(parameter)
+        return sorted(found, key=lambda p: p.quantity != "status_word")
+
+    def _extras(self) -> list[str]:
+        """What is read seldom: ends of bars, channels, history, inputs and outputs."""
+        profile = self.session.profile
+        codes = [v.high for v in profile.data.monitoring.values if profile.get(v.high)]
+        for quantity in ("command_channel", "reference_channel"):
+            parameter = profile.quantity(quantity)
+            if parameter is not None:
+                codes.append(parameter.code)
+        codes += profile.data.faults.history
+        codes += [parameter.code for parameter in self._words()]
+        return list(dict.fromkeys(codes))
+
+    def action_leave(self) -> None:
+        """Back to Connection."""
+        self.app.pop_screen()
+
+    def action_step_drive(self, step: int) -> None:
+        """Another drive of this line."""
+        self.app.step_drive(self.session.device, step)
+
+    def action_change_rate(self, step: int) -> None:
+        """A faster or slower poll, out of a fixed row of rates."""
+        now = PERIODS.index(min(PERIODS, key=lambda p: abs(p - self.app.period)))
+        self.app.period = PERIODS[max(0, min(len(PERIODS) - 1, now - step))]
+        self.session.monitor.period = self.app.period
+        self.look()
+
+    def action_next_word(self) -> None:
+        """The next word of bits."""
+        self._word = (self._word + 1) % max(1, len(self._words()))
+        self.look()
+
+    def action_frames(self) -> None:
+        """The frames on the line."""
+        from .frames import FramesScreen
+
+        self.app.push_screen(FramesScreen(self.session.line))
