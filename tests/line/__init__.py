@@ -1,0 +1,1 @@
+"""End to end: our programs and other people's, over real lines."""

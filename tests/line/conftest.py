@@ -1,0 +1,63 @@
+"""Peers for the tests of a whole line: programs that the project did not write."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from conftest import need_peer
+from programs import PATIENCE
+
+HERE = Path(__file__).parent
+Peer = Callable[[str, str], str]
+
+
+@pytest.fixture(scope="session")
+def built_server(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
+    """The server on libmodbus, compiled; or the reason why it could not be."""
+    target = tmp_path_factory.mktemp("libmodbus") / "modbus_server"
+    try:
+        flags = subprocess.run(
+            ["pkg-config", "--cflags", "--libs", "libmodbus"],
+            capture_output=True,
+            text=True,
+            check=True,
+            timeout=PATIENCE,
+        ).stdout.split()
+    except (OSError, subprocess.CalledProcessError):
+        return "libmodbus is not here; it comes with the packages libmodbus-dev and pkg-config."
+    source = str(HERE / "modbus_server.c")
+    command = ["gcc", "-Wall", "-Wextra", "-Werror", "-o", str(target), source, *flags]
+    try:
+        built = subprocess.run(
+            command, capture_output=True, text=True, timeout=PATIENCE, check=False
+        )
+    except FileNotFoundError:
+        return "gcc is not here; it comes with the package gcc."
+    assert built.returncode == 0, built.stderr
+    return target
+
+
+@pytest.fixture
+def libmodbus_server(built_server: Path | str) -> Path:
+    """The server on libmodbus; skips where it cannot be built here."""
+    if isinstance(built_server, str):
+        need_peer(built_server)
+    return Path(built_server)
+
+
+@pytest.fixture
+def node(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> str:
+    """Node.js with modbus-serial, found where `DRIVEPANEL_NODE_MODULES` says."""
+    program = peer("node", "nodejs")
+    modules = os.environ.get("DRIVEPANEL_NODE_MODULES", "")
+    if not modules or not Path(modules, "modbus-serial").is_dir():
+        need_peer(
+            "modbus-serial is not here; install it with npm and name its node_modules folder "
+            "in DRIVEPANEL_NODE_MODULES."
+        )
+    monkeypatch.setenv("NODE_PATH", modules)
+    return program
