@@ -1,0 +1,84 @@
+"""The example drive of profiles/README.md is checked, simulated and read like any other."""
+
+from __future__ import annotations
+
+import re
+import struct
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tui.cli.main import main
+from tui.drive import library
+from tui.session.drive_session import DriveSession
+from tui.session.drive_state import drive_state
+from tui.session.lines import open_line
+from tui.simulator import DriveSpec, SimulatedDrive, Simulation
+
+README = Path(__file__).parents[2] / "profiles" / "README.md"
+ADDRESS = 5
+PUMP = "example-pump"
+
+
+@pytest.fixture
+def own_file() -> Path:
+    """The one TOML block of the README, in the configuration folder."""
+    [text] = re.findall(
+        r"^```toml\n(.*?)^```$", README.read_text("utf-8"), re.MULTILINE | re.DOTALL
+    )
+    folder = library.user_folder()
+    folder.mkdir(parents=True)
+    path = folder / "pump.toml"
+    path.write_text(text, encoding="utf-8")
+    library.load.cache_clear()
+    return path
+
+
+def test_the_command_line_checks_and_lists_it(own_file: Path) -> None:
+    checked = CliRunner().invoke(main, ["profiles", "--check", str(own_file)])
+    assert checked.exit_code == 0, checked.output
+    assert "no fault found" in checked.output
+    listed = CliRunner().invoke(main, ["profiles"])
+    [line] = [one for one in listed.output.splitlines() if "(your own)" in one]
+    assert line.startswith(PUMP)
+
+
+def test_a_simulated_one_keeps_its_functions_and_limits(own_file: Path) -> None:
+    drive = SimulatedDrive(library.load(PUMP), DriveSpec(PUMP, ADDRESS, sets={"FREQ": 482}))
+
+    def ask(function: int, first: int, second: int) -> bytes | None:
+        return drive.answer(ADDRESS, struct.pack(">BHH", function, first, second))
+
+    assert ask(3, 101, 1) == struct.pack(">BBH", 3, 2, 482)
+    assert ask(6, 200, 450) == struct.pack(">BHH", 6, 200, 450)
+    assert ask(3, 200, 1) == struct.pack(">BBH", 3, 2, 450)
+    assert ask(6, 200, 6001) == bytes([0x86, 3]), "above the maximum of RAMP"
+    assert ask(3, 100, 17) == bytes([0x83, 3]), "past 16 words"
+    assert ask(3, 150, 1) == bytes([0x83, 2]), "no such parameter"
+    assert ask(16, 200, 1) == bytes([0x90, 1]), "no such function"
+
+
+@pytest.mark.parametrize(
+    ("status", "state", "alarms"),
+    [(0x1, "ready", 0), (0x3, "running", 0), (0xB, "running", 1), (0x4, "fault", 0)],
+)
+async def test_it_is_read_over_a_line_with_its_state(
+    own_file: Path, status: int, state: str, alarms: int
+) -> None:
+    profile = library.load(PUMP)
+    drive = DriveSpec(PUMP, ADDRESS, sets={"STAT": status, "FREQ": -125, "TRIP": 7})
+    with Simulation([drive]) as simulation:
+        host, port = simulation.serve_tcp()
+        opened = open_line(f"tcp:{host}:{port}", wait=5)
+        try:
+            session = DriveSession(opened.line, ADDRESS, profile)
+            readings = await session.read(["FREQ", "RAMP", "MODE", "STAT", "TRIP"])
+            session.close()
+        finally:
+            opened.close()
+    texts = {code: one.value.text for code, one in readings.items() if one.value}
+    assert [texts[code] for code in ("FREQ", "RAMP", "MODE")] == ["-12.5", "3.00", "By hand"]
+    seen = drive_state(profile, readings)
+    assert (seen.id, len(seen.alarms)) == (state, alarms)
+    assert (seen.fault.code if seen.fault else "") == ("COM" if state == "fault" else "")
