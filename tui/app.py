@@ -7,10 +7,11 @@ import logging
 from collections.abc import Callable, Iterable
 from typing import ClassVar
 
-from textual.app import App, SystemCommand
+from textual.app import SystemCommand
 from textual.screen import Screen
 
 from tui.session.drive_session import DriveSession
+from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line
 from tui.widgets.clock import Clock
@@ -19,6 +20,7 @@ from tui.widgets.palette import THEME
 from .screens.actions import ACTIONS, CONNECTION, bindings
 from .screens.connection import ConnectionScreen
 from .screens.help import HelpScreen
+from .screens.panel import Panel
 
 log = logging.getLogger("drivepanel")
 
@@ -28,7 +30,7 @@ CONNECT_WITHIN = 4.0
 Opener = Callable[..., OpenLine]
 
 
-class DrivePanelApp(App[None]):
+class DrivePanelApp(Panel):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once.
@@ -53,6 +55,7 @@ class DrivePanelApp(App[None]):
         self.read_only = read_only
         self.period = 0.5
         self.opened: OpenLine | None = None
+        self.keeper: Keeper | None = None
         self.connection = ConnectionScreen()
         self._open = open_line
         self._start = start
@@ -70,22 +73,13 @@ class DrivePanelApp(App[None]):
         """Leave no line open."""
         self.disconnect()
 
-    @property
-    def line_text(self) -> str:
-        """The open line as it was typed, or nothing."""
-        return self.opened.text if self.opened else ""
-
-    @property
-    def line_label(self) -> str:
-        """The open line as it is called on a screen, or nothing."""
-        return self.opened.label if self.opened else ""
-
     async def connect(self, text: str) -> None:
         """Open a line in place of the one that is open; raises the line's errors."""
         self.disconnect()
         self.opened = await asyncio.to_thread(
             self._open, text, read_only=self.read_only, wait=CONNECT_WITHIN
         )
+        self.keeper = Keeper(self.opened.line)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 
@@ -94,7 +88,7 @@ class DrivePanelApp(App[None]):
         if self.opened is not None:
             log.info("closed %s", self.opened.label)
             self.opened.close()
-            self.opened = None
+            self.opened = self.keeper = None
 
     def show_monitor(self, session: DriveSession) -> None:
         """Show Monitor on a drive."""

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rich.text import Text
 from textual import work
@@ -22,6 +22,7 @@ from tui.drive.errors import DriveError
 from tui.session.addresses import parse_addresses
 from tui.session.drive_session import DriveSession
 from tui.session.identify import DriveIdentity, ScanResult, scan
+from tui.session.keeper import Look
 from tui.session.state import recent_lines
 from tui.widgets.drawing import cut, key_line, rule
 from tui.widgets.lines import Lines
@@ -30,12 +31,10 @@ from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, RUNNING, STRONG
 from .actions import CONNECTION, bindings, keys_of
 from .choices import LineChoice, groups
 from .hints import hint_for
+from .panel import Panel
 
-if TYPE_CHECKING:
-    from tui.app import DrivePanelApp
-
-GLANCE = 3.0
-"""Seconds between two looks at the state of the drives found."""
+LOOK = 0.5
+"""Seconds between two looks at the states that the keeper has seen."""
 
 
 @dataclass(slots=True)
@@ -44,7 +43,7 @@ class FoundDrive:
 
     identity: DriveIdentity
     session: DriveSession | None = None
-    state: str = ""
+    state: str = "no profile"
     kind: str = ""
 
 
@@ -56,13 +55,14 @@ class ConnectionScreen(Screen[None]):
     TITLE = "Connection"
     AUTO_FOCUS = "#lines"
 
-    app: DrivePanelApp
+    app: Panel
 
     def __init__(self) -> None:
         super().__init__()
         self.found: dict[int, FoundDrive] = {}
         self._choices: dict[str, LineChoice] = {}
         self._happened: tuple[str, str, str] = ("", "", "")
+        self._warned: set[int] = set()
 
     def compose(self) -> ComposeResult:
         """Two columns and the lines below."""
@@ -94,7 +94,7 @@ class ConnectionScreen(Screen[None]):
         self.say("", "Choose a line and press Enter, or n to type one.")
         self.action_refresh_lines()
         self.set_interval(1.0, self.show_heads)
-        self.set_interval(GLANCE, self.glance)
+        self.set_interval(LOOK, self.look)
         self.call_after_refresh(self.show_heads)
 
     def on_resize(self) -> None:
@@ -104,10 +104,10 @@ class ConnectionScreen(Screen[None]):
     def on_screen_resume(self) -> None:
         """States may have changed meanwhile."""
         self.call_after_refresh(self._redraw)
-        self.glance()
 
     def _redraw(self) -> None:
         self.show_heads()
+        self.action_refresh_lines()
         self.show_drives()
         self._show_message()
 
@@ -173,6 +173,7 @@ class ConnectionScreen(Screen[None]):
         from tui.session.lines import serial_ports
 
         options = self.query_one("#lines", OptionList)
+        width = max(20, options.size.width - 1)
         chosen = options.highlighted
         options.clear_options()
         self._choices.clear()
@@ -181,10 +182,7 @@ class ConnectionScreen(Screen[None]):
             for choice in group.choices:
                 key = f"{group.title} {choice.text}"
                 self._choices[key] = choice
-                text = Text(f" {choice.text}", PLAIN, no_wrap=True, overflow="ellipsis")
-                if choice.description:
-                    text.append(f"  {choice.description}", FAINT)
-                options.add_option(Option(text, id=key))
+                options.add_option(Option(choice_line(choice, width), id=key))
             if not group.choices:
                 options.add_option(Option(Text(f"  {group.empty}", FAINT), disabled=True))
         first = next((i for i, o in enumerate(options.options) if not o.disabled), None)
@@ -219,8 +217,7 @@ class ConnectionScreen(Screen[None]):
     @work(exclusive=True, group="line")
     async def open_line(self, text: str) -> None:
         """Open a line and ask for its drives."""
-        self.found.clear()
-        self.show_drives()
+        self._forget_drives()
         self.say(f"Opening {text}", "")
         try:
             await self.app.connect(text)
@@ -247,6 +244,11 @@ class ConnectionScreen(Screen[None]):
         await self.scan([device]).wait()
         if device in self.found:
             self.open_drive(device)
+
+    def _forget_drives(self) -> None:
+        self.found.clear()
+        self._warned.clear()
+        self.show_drives()
 
     def fail(self, error: Exception) -> None:
         """Show an error with what to try next."""
@@ -310,7 +312,6 @@ class ConnectionScreen(Screen[None]):
         drive = FoundDrive(result.identity)
         self.found[result.device] = drive
         await self._equip(drive)
-        await self._look_at(drive)
         self.show_drives()
         self.show_heads()
 
@@ -328,28 +329,38 @@ class ConnectionScreen(Screen[None]):
             self.fail(error)
             return
         drive.session = DriveSession(opened.line, identity.device, profile, identity)
+        drive.state = "asking"
+        if self.app.keeper is not None:
+            self.app.keeper.keep(drive.session)
 
-    async def _look_at(self, drive: FoundDrive) -> None:
-        if drive.session is None:
-            drive.state, drive.kind = "no profile", "unknown"
+    def look(self) -> None:
+        """Show the states that the keeper of the line has seen."""
+        keeper = self.app.keeper
+        if not self.is_current or keeper is None:
             return
-        try:
-            state = await drive.session.glance()
-        except LineError:
-            drive.state, drive.kind = "no answer", "unknown"
-        else:
-            drive.state, drive.kind = state.headline, state.kind
-
-    @work(exclusive=True, group="glance")
-    async def glance(self) -> None:
-        """Look at the state of every drive found, while this screen is on top."""
-        if not self.is_current or self.app.opened is None:
-            return
+        looks = keeper.looks
         before = {device: drive.state for device, drive in self.found.items()}
-        for drive in list(self.found.values()):
-            await self._look_at(drive)
+        for device, drive in self.found.items():
+            if look := looks.get(device):
+                drive.state = look.state.headline if look.state else "no answer"
+                drive.kind = look.state.kind if look.state else "unknown"
         if before != {device: drive.state for device, drive in self.found.items()}:
             self.show_drives()
+        self._warn(looks)
+
+    def _warn(self, looks: Mapping[int, Look]) -> None:
+        """Say once of a drive that it trips when it is left alone."""
+        for device, look in looks.items():
+            drive = self.found.get(device)
+            if look.timeout is None or drive is None or device in self._warned:
+                continue
+            self._warned.add(device)
+            self.say(
+                f"Device {device} watches the line: left alone for {look.timeout:g} s, it does"
+                " what its communication time-out is set to.",
+                "The panel asks it on while the line is open. Enter on a drive watches it.",
+                ALARM_KIND,
+            )
 
     @work(exclusive=True, group="open")
     async def open_drive(self, device: int) -> None:
@@ -381,8 +392,7 @@ class ConnectionScreen(Screen[None]):
     def action_disconnect(self) -> None:
         """Close the line."""
         self.workers.cancel_group(self, "scan")
-        self.found.clear()
-        self.show_drives()
+        self._forget_drives()
         self.app.disconnect()
         self.say("The line is closed.", "Choose a line and press Enter.")
         self.show_heads()
@@ -399,6 +409,15 @@ class ConnectionScreen(Screen[None]):
 
 ERROR_KIND, ALARM_KIND = "error", "alarm"
 STATE_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
+
+
+def choice_line(choice: LineChoice, width: int) -> Text:
+    """A line that can be opened, with as much of its description as there is room for."""
+    text = Text(" " + cut(choice.text, min(len(choice.text), width - 1)), PLAIN)
+    room = width - text.cell_len - 2
+    if choice.description and room >= 6:
+        text.append("  " + cut(choice.description, min(len(choice.description), room)), FAINT)
+    return text
 
 
 def drive_line(drive: FoundDrive, width: int) -> Text:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -14,9 +14,7 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN
 
 from .actions import FRAMES, bindings, keys_of
-
-if TYPE_CHECKING:
-    from tui.app import DrivePanelApp
+from .panel import Panel
 
 REFRESH = 0.5
 
@@ -28,7 +26,7 @@ class FramesScreen(Screen[None]):
     BINDINGS: ClassVar = bindings(FRAMES)
     TITLE = "Frames"
 
-    app: DrivePanelApp
+    app: Panel
 
     def __init__(self, line: Line) -> None:
         super().__init__()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, ClassVar
+from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -18,9 +18,7 @@ from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
 from .actions import MONITOR, bindings, keys_of
-
-if TYPE_CHECKING:
-    from tui.app import DrivePanelApp
+from .panel import Panel
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
@@ -30,6 +28,7 @@ PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 SMALL_LEFT = 31
 WIDE_LEFT = 40
 WORD_WIDTH = 30
+WORDS_HEIGHT = 15
 
 
 class MonitorScreen(Screen[None]):
@@ -39,7 +38,7 @@ class MonitorScreen(Screen[None]):
     BINDINGS: ClassVar = bindings(MONITOR)
     TITLE = "Monitor"
 
-    app: DrivePanelApp
+    app: Panel
 
     def __init__(self, session: DriveSession) -> None:
         super().__init__()
@@ -143,7 +142,7 @@ class MonitorScreen(Screen[None]):
             "status": draw.status_lines(view, width),
         }
         words = self._words()
-        below = 17 if self.wide else 0
+        below = WORDS_HEIGHT if self.wide else 0
         body = height - below - 5
         motor = draw.motor_lines(view, right, body - 6)
         parts["motor"] = [*motor, Text("")]

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tui.bus.line import Line, Priority
-from tui.drive.chart import watched_codes
 from tui.drive.profile import Profile
 
-from .drive_state import DriveState, drive_state
 from .identify import DriveIdentity
 from .monitor import Monitor
 from .reader import Rating, Reader
@@ -39,14 +37,6 @@ class DriveSession:
         Raises the line's errors (no answer, line lost) and UnknownParameter.
         """
         return await self._reader.read(codes, priority=priority)
-
-    async def glance(self) -> DriveState:
-        """The state of the drive now, from its status words alone; raises the line's errors."""
-        codes = watched_codes(self.profile)
-        if self.profile.data.faults.parameter:
-            codes.append(self.profile.data.faults.parameter)
-        readings = await self.read(codes, priority=Priority.BACKGROUND)
-        return drive_state(self.profile, readings)
 
     def rate(self, code: str, rating: Rating) -> None:
         """Tell what 100 % of a parameter is, from the drive's nameplate."""

@@ -31,7 +31,10 @@ class OpenLine:
     @property
     def label(self) -> str:
         """How the line is called on a screen."""
-        return self.text if self.simulation else label(self.line.link)
+        if self.simulation is None:
+            return label(self.line.link)
+        count = len(self.devices)
+        return self.text if count == 1 else f"{SIMULATED}{count} drives"
 
     def close(self) -> None:
         """Close the line, then what it was connected to."""

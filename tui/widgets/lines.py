@@ -66,7 +66,13 @@ class Lines(Widget):
         style = self.rich_style
         if y >= len(self._lines):
             return Strip.blank(width, style)
-        segments = [s for s in self._lines[y].render(self.app.console) if s.text != "\n"]
+        line = self._lines[y]
+        # rich drops the style of a text that has no spans
+        styled = Text(line.plain, end="")
+        styled.stylize(line.style)
+        for span in line.spans:
+            styled.stylize(span.style, span.start, span.end)
+        segments = list(styled.render(self.app.console, end=""))
         return Strip(segments).apply_style(style).adjust_cell_length(width, style)
 
 

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from tui.bus.line import Counters, LineState, LineStatus
 from tui.drive.profile import Profile, is_verified
-from tui.drive.schema import MonitoringValue, Parameter, Quantity
+from tui.drive.schema import Bit, MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.identify import DriveIdentity
@@ -195,9 +195,11 @@ def _measurement(view: View, value: MonitoringValue, width: int) -> Text:
 
 def _append_value(text: Text, parameter: Parameter, reading: Reading | None, now: float) -> None:
     if reading is None or reading.raw is None:
-        text.append(f"{NOT_AVAILABLE:>{NUMBER_WIDTH}} {cut(parameter.unit, UNIT_WIDTH)}", FAINT)
+        text.append(
+            f"{NOT_AVAILABLE:>{NUMBER_WIDTH}} {cut(parameter.unit or 'raw', UNIT_WIDTH)}", FAINT
+        )
         return
-    shown, unit = reading.text, reading.unit
+    shown, unit = reading.text, reading.unit or "raw"
     if reading.physical is not None:
         shown, unit = reading.physical.text, reading.physical.unit
     if reading.quality is Quality.GOOD:
@@ -273,12 +275,23 @@ def word_lines(
         text.append(f" {bit.bit:>2} ", LINE)
         style = ALARM if on and bit.alarm else STRONG if on else FAINT
         text.append(("●" if on else "·") if good else " ", style)
-        words = (bit.on if on else bit.off) or bit.name
-        text.append(f" {cut(words if good else bit.name, width - 7)}", PLAIN if on else FAINT)
+        text.append(f" {cut(_bit_words(bit, on, width - 7), width - 7)}", PLAIN if on else FAINT)
         lines.append(text)
     if len(named) < len(parameter.bits) and room:
         lines.append(Text(f"    {len(parameter.bits) - len(named)} more: key w", FAINT))
     return lines
+
+
+PLAIN_ANSWERS = frozenset({"", "yes", "no", "on", "off", "none", "0", "1"})
+
+
+def _bit_words(bit: Bit, on: bool, room: int) -> str:
+    """The name of a bit; what it says as well, where that is more than yes or no and fits."""
+    said = bit.on if on else bit.off
+    if said.lower() in PLAIN_ANSWERS:
+        return bit.name
+    both = f"{bit.name}: {said}"
+    return both if len(both) <= room else bit.name
 
 
 def trend_lines(view: View, width: int, height: int) -> list[Text]:
@@ -417,7 +430,7 @@ def status_lines(view: View, width: int) -> list[Text]:
     bad = counts.timeouts + counts.checksum + counts.wrong
     text.append(f"  {rate:4.1f} cycles/s of {1 / view.period:.1f} wished", FAINT)
     text.append(f"  {counts.requests} requests, ", FAINT)
-    text.append(f"{bad} unanswered or damaged", ALARM if bad else FAINT)
+    text.append(f"{bad} unanswered or damaged", FAINT)
     if view.read_only:
         text.append("  read-only", FAINT)
     text.truncate(width)

@@ -1,0 +1,49 @@
+"""What screens may ask of the app they stand in."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+
+from textual.app import App
+
+from tui.session.drive_session import DriveSession
+from tui.session.keeper import Keeper
+from tui.session.lines import OpenLine
+from tui.widgets.clock import Clock
+
+
+class Panel(App[None]):
+    """The app as its screens see it: one line at a time, the drives found on it."""
+
+    clock: Clock
+    read_only: bool
+    period: float
+    """Wished time of a monitoring cycle in seconds, the same for every drive."""
+    opened: OpenLine | None
+    keeper: Keeper | None
+
+    @property
+    def line_text(self) -> str:
+        """The open line as it was typed, or nothing."""
+        return self.opened.text if self.opened else ""
+
+    @property
+    def line_label(self) -> str:
+        """The open line as it is called on a screen, or nothing."""
+        return self.opened.label if self.opened else ""
+
+    @abstractmethod
+    async def connect(self, text: str) -> None:
+        """Open a line in place of the one that is open; raises the line's errors."""
+
+    @abstractmethod
+    def disconnect(self) -> None:
+        """Close the open line, if there is one."""
+
+    @abstractmethod
+    def show_monitor(self, session: DriveSession) -> None:
+        """Show Monitor on a drive."""
+
+    @abstractmethod
+    def step_drive(self, device: int, step: int) -> None:
+        """Monitor on the next or previous drive found on the line."""
