@@ -143,6 +143,16 @@ class Profile:
             text = follows.absent
         return Decimal(text) if text is not None else None
 
+    def unit(self, parameter: Parameter, raws: Mapping[str, int]) -> str:
+        """The unit of a parameter, given raw values by code; `raw` where it is not known."""
+        told = parameter.unit_by
+        if told is None:
+            return parameter.unit
+        word = raws.get(told.parameter)
+        if word is None:
+            return "raw"
+        return told.units.get(str(word >> told.shift & told.mask), "raw")
+
 
 def parse_address(text: str) -> int | None:
     """A wire address from `W9001`, `16#2329`, `0x2329` or `9001`; None if it is none of these."""

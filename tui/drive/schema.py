@@ -256,6 +256,16 @@ class ScaleBy(Table, frozen=True, kw_only=True):
     """Scale where the drive says that it has no such parameter; without it the scale is unknown."""
 
 
+class UnitBy(Table, frozen=True, kw_only=True):
+    """A unit told by some bits of another parameter (counters of energy and time)."""
+
+    parameter: str
+    shift: Annotated[int, Meta(ge=0, le=15)]
+    mask: Annotated[int, Meta(ge=1, le=0xFFFF)]
+    """Mask of the value after it was shifted down."""
+    units: dict[str, str]
+
+
 class Parameter(Table, frozen=True, kw_only=True):
     """One word (or pair of words) of a drive."""
 
@@ -270,6 +280,7 @@ class Parameter(Table, frozen=True, kw_only=True):
     unit: str = ""
     scale: DecimalText = "1"
     scale_by: ScaleBy | None = None
+    unit_by: UnitBy | None = None
     base: str = ""
     """What a percentage is a percentage of, as far as it is known."""
     rating: str = ""

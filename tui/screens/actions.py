@@ -47,7 +47,9 @@ ACTIONS: tuple[Action, ...] = (
         "Type a line: serial, TCP, RTU over TCP, sim.",
         (CONNECTION,),
     ),
-    Action("refresh_lines", "r", "r", "refresh", "Look for serial ports again.", (CONNECTION,)),
+    Action(
+        "refresh_lines", "r", "r", "", "Look for serial ports again.", (CONNECTION,), line=False
+    ),
     Action("disconnect", "x", "x", "close line", "Close the line.", (CONNECTION,)),
     Action(
         "stop_scan",

@@ -431,7 +431,7 @@ def drive_line(drive: FoundDrive, width: int) -> Text:
     text.append(f" {identity.device:>3} ", FAINT)
     room = max(10, width - 5 - len(state) - 1)
     text.append(cut(who, min(15, room)), STRONG)
-    text.append(f" {cut(about, max(0, room - 16))}" if room > 18 else " ", FAINT)
+    text.append(f" {cut(about, max(0, room - 17))} " if room > 19 else " ", FAINT)
     text.append(state, STATE_STYLES.get(drive.kind, PLAIN))
     return text
 

@@ -26,9 +26,10 @@ WIDE = (110, 36)
 """Columns and rows from which all words stand side by side."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 SMALL_LEFT = 31
-WIDE_LEFT = 40
+WIDE_LEFT = 34
 WORD_WIDTH = 30
-WORDS_HEIGHT = 15
+WORDS_HEIGHT = 16
+WIDE_MOTOR = 46
 
 
 class MonitorScreen(Screen[None]):
@@ -141,35 +142,31 @@ class MonitorScreen(Screen[None]):
             "message": draw.message_lines(view, width),
             "status": draw.status_lines(view, width),
         }
-        words = self._words()
-        below = WORDS_HEIGHT if self.wide else 0
-        body = height - below - 5
-        motor = draw.motor_lines(view, right, body - 6)
-        parts["motor"] = [*motor, Text("")]
-        parts["trend"] = draw.trend_lines(view, right, max(3, body - len(motor) - 1))
+        body = height - (WORDS_HEIGHT if self.wide else 0) - 5
         rest = body - len(parts["state"])
         if self.wide:
+            parts["motor"] = draw.motor_lines(view, WIDE_MOTOR, body)
+            parts["trend"] = draw.stacked_trends(view, right - WIDE_MOTOR - 1, body)
             parts["history"] = draw.history_lines(view, left, rest)
             parts["word"] = []
-            parts |= self._wide_words(view, words, below)
-        else:
-            parts["history"] = []
-            word = words[self._word % len(words)] if words else None
-            parts["word"] = draw.word_lines(view, word, left, rest, "Word") if word else []
+            return parts | self._wide_words(view, WORDS_HEIGHT)
+        motor = draw.motor_lines(view, right, body - 4)
+        parts["motor"] = [*motor, Text("")]
+        parts["trend"] = draw.trend_lines(view, right, max(3, body - len(motor) - 1))
+        parts["history"] = []
+        pages = draw.word_pages(self._words(), rest - 1)
+        page = pages[self._word % len(pages)] if pages else None
+        parts["word"] = draw.word_lines(view, page, left) if page else []
         return parts
 
-    def _wide_words(
-        self, view: draw.View, words: list[Parameter], height: int
-    ) -> dict[str, list[Text]]:
+    def _wide_words(self, view: draw.View, height: int) -> dict[str, list[Text]]:
         """Three words from the chosen one on, and the counters of the line."""
         parts: dict[str, list[Text]] = {}
+        pages = draw.word_pages(self._words(), height - 1)
         for index in range(3):
-            chosen = (self._word + index) % len(words) if words else 0
-            parts[f"word{index}"] = (
-                draw.word_lines(view, words[chosen], WORD_WIDTH - 1, height)
-                if index < len(words)
-                else []
-            )
+            shown = index < len(pages)
+            page = pages[(self._word + index) % len(pages)] if shown else None
+            parts[f"word{index}"] = draw.word_lines(view, page, WORD_WIDTH - 1) if page else []
         parts["word3"] = draw.line_lines(view, WORD_WIDTH - 1, height)
         return parts
 
@@ -213,7 +210,7 @@ class MonitorScreen(Screen[None]):
 
     def action_next_word(self) -> None:
         """The next word of bits."""
-        self._word = (self._word + 1) % max(1, len(self._words()))
+        self._word += 1
         self.look()
 
     def action_frames(self) -> None:

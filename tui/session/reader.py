@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
-from tui.bus.errors import DeviceException
+from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Line, Priority, Reply
 from tui.bus.link import TcpLink, character_time, silence
-from tui.drive.profile import Profile
+from tui.drive.profile import Profile, is_verified
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
 from tui.drive.schema import Parameter
 from tui.drive.values import Value, decode, from_words, percent_of, word_count
@@ -60,6 +60,8 @@ class Reader:
     """What 100 % is, by code, where a person has told it from the nameplate."""
     _sources: dict[str, Raw] = field(default_factory=dict)
     _refused: dict[str, Raw] = field(default_factory=dict)
+    _unanswered: dict[str, Raw] = field(default_factory=dict)
+    """Unconfirmed words at which the drive fell silent while it answers others."""
     _plans: dict[tuple[frozenset[str], frozenset[str]], ReadPlan] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -95,17 +97,42 @@ class Reader:
 
     async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
-        for request in self._plan(codes.difference(self._refused)).requests:
+        sure, unsure = self._by_trust(codes.difference(self._refused, found))
+        for request in self._plan(sure).requests:
             found.update(await self._exchange(request, priority))
+        for request in self._plan(unsure).requests:
+            found.update(await self._exchange_unsure(request, priority))
         for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
         self._note_sources(found)
         return found
 
+    def _by_trust(self, codes: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
+        """Confirmed words apart from the others, where a wrong address meets silence."""
+        function = self.profile.function(3)
+        if function is None or function.past_limit != "silence":
+            return codes, frozenset()
+        sure = frozenset(code for code in codes if is_verified(self.profile[code]))
+        return sure, codes - sure
+
+    async def _exchange_unsure(self, request: ReadRequest, priority: Priority) -> dict[str, Raw]:
+        """A read of words that the drive may not have: its silence there is no dead drive."""
+        try:
+            return await self._exchange(request, priority)
+        except NoAnswer:
+            status = self.profile.quantity("status_word")
+            if status is None:
+                raise
+            await self.line.read(self.device, status.address, 1, priority=Priority.OPERATOR_READ)
+            nothing = Raw(time.monotonic(), None, "no answer: perhaps this drive has no such word")
+            self._unanswered.update({place.code: nothing for place in request.places})
+            return {place.code: nothing for place in request.places}
+
     def _still_refused(self, codes: frozenset[str]) -> dict[str, Raw]:
         """Refusals young enough that a poll need not ask again."""
         oldest = time.monotonic() - ASK_AGAIN
-        return {c: r for c, r in self._refused.items() if c in codes and r.time > oldest}
+        refused = {c: r for c, r in self._refused.items() if c in codes and r.time > oldest}
+        return refused | {c: r for c, r in self._unanswered.items() if c in codes}
 
     def _note_sources(self, found: Mapping[str, Raw]) -> None:
         """A scale source that is read for its own sake is fresher than the one kept."""
@@ -178,7 +205,10 @@ class Reader:
         known = {code: one.raw for code, one in self._sources.items() if one.raw is not None}
         absent = {code for code, one in self._sources.items() if one.absent}
         scale = self.profile.scale(parameter, known, absent)
-        return decode(parameter, raw, self.profile.names(parameter), scale)
+        value = decode(parameter, raw, self.profile.names(parameter), scale)
+        if parameter.unit_by is not None and value.number is not None:
+            value = replace(value, unit=self.profile.unit(parameter, known))
+        return value
 
     def _physical(self, parameter: Parameter, value: Value) -> Value | None:
         """A percentage in the unit of its rating: the person's, else the drive's own."""
@@ -198,4 +228,5 @@ class Reader:
 def _depends_on(parameter: Parameter) -> list[str]:
     """Parameters without which this one's value cannot be told."""
     scale = parameter.scale_by.parameter if parameter.scale_by else ""
-    return [code for code in (scale, parameter.rating) if code]
+    unit = parameter.unit_by.parameter if parameter.unit_by else ""
+    return [code for code in (scale, unit, parameter.rating) if code]

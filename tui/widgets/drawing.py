@@ -10,7 +10,6 @@ from rich.text import Text
 
 from .palette import BAR, BAR_REST, FAINT, LINE, MARK, PLAIN, TITLE
 
-EIGHTHS_WIDE = " ▏▎▍▌▋▊▉█"
 EIGHTHS_HIGH = " ▁▂▃▄▅▆▇█"
 
 
@@ -80,9 +79,7 @@ def _cell(index: int, start: float, end: float, style: Style) -> tuple[str, Styl
     filled = max(0.0, min(end, index + 1) - max(start, index))
     if filled <= 0:
         return "·", BAR_REST
-    if start > index:  # the bar begins inside this cell: from a zero in the middle
-        return ("█" if filled >= 0.5 else "▐"), style
-    return EIGHTHS_WIDE[max(1, round(filled * 8))], style
+    return ("▆" if filled >= 0.5 else "▖"), style  # leaves a gap to the bar above
 
 
 def trend(

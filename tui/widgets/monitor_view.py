@@ -127,7 +127,7 @@ def state_lines(view: View, width: int) -> list[Text]:
     snapshot = view.snapshot
     if snapshot is None:
         lines.append(Text(" waiting for the first values", ALARM))
-        lines += [Text("")] * 4
+        lines += [Text("")] * 3
         return lines
     state = snapshot.state
     if view.lost:
@@ -137,17 +137,20 @@ def state_lines(view: View, width: int) -> list[Text]:
         style = STATE_STYLES.get(state.kind, STRONG)
         sign = STATE_SIGNS.get(state.kind, "□")
         lines.append(Text(cut(f" {sign} {state.headline.upper()} ", width), style))
-        lines.append(Text(cut(f"   {state.name}", width), PLAIN))
-    lines.append(_reached(state, view.lost))
+        lines.append(Text(cut(f"   {_detail(state)}", width), PLAIN))
     lines.append(_channel(view, "Command", "command_channel"))
     lines.append(_channel(view, "Reference", "reference_channel"))
     return lines
 
 
-def _reached(state: DriveState, lost: bool) -> Text:
-    if lost or state.reached is None or state.kind != "running":
-        return Text("")
-    return Text("   at reference" if state.reached else "   on the ramp", FAINT)
+def _detail(state: DriveState) -> str:
+    """What the headline does not say: at reference or not, and the chart's own name."""
+    parts = []
+    if state.reached is not None and state.kind == "running":
+        parts.append("at reference" if state.reached else "on the ramp")
+    if state.name.casefold() not in state.headline.casefold():
+        parts.append(state.name)
+    return ", ".join(parts)
 
 
 def _channel(view: View, label: str, quantity: Quantity) -> Text:
@@ -160,9 +163,11 @@ def _channel(view: View, label: str, quantity: Quantity) -> Text:
 
 def motor_lines(view: View, width: int, height: int) -> list[Text]:
     """The values of the monitoring set as numbers and bars, in the profile's order."""
-    lines = [rule("Motor", width, "limits from the drive")]
+    lines = [rule("Motor", width, "ends of the bars are the drive's" if width > 60 else "")]
     shown = [v for v in view.values if _is_measurement(view.profile, v)]
-    lines += [_measurement(view, value, width) for value in shown]
+    barred = any(value.high for value in shown)
+    label = LABEL_WIDTH if barred else max(LABEL_WIDTH, width - NUMBER_WIDTH - UNIT_WIDTH - 3)
+    lines += [_measurement(view, value, width, min(label, 40)) for value in shown]
     return lines[:height]
 
 
@@ -173,18 +178,18 @@ def _is_measurement(profile: Profile, value: MonitoringValue) -> bool:
     if parameter.bits or is_enumeration(parameter) or parameter.quantity is not None:
         return False
     return parameter.code != profile.data.faults.parameter and bool(
-        parameter.unit or parameter.confidence == "unverified"
+        parameter.unit or not is_verified(parameter)
     )
 
 
-def _measurement(view: View, value: MonitoringValue, width: int) -> Text:
+def _measurement(view: View, value: MonitoringValue, width: int, label_width: int) -> Text:
     parameter = view.profile[value.parameter]
     reading = view.reading(value.parameter)
     text = Text(no_wrap=True)
     mark = "" if is_verified(parameter) else " ?"
     label = LABELS.get(parameter.quantity) if parameter.quantity else None
     name = label or f"{parameter.code} {parameter.name}"
-    text.append(" " + cut(name, LABEL_WIDTH - len(mark)) + mark, FAINT)
+    text.append(" " + cut(name, label_width - len(mark)) + mark, FAINT)
     _append_value(text, parameter, reading, view.now)
     rest = width - text.cell_len - 1
     if rest >= 8:
@@ -255,34 +260,54 @@ def end_of(view: View, end: str) -> float | None:
         return reading.number if reading is not None else None
 
 
-def word_lines(
-    view: View, parameter: Parameter, width: int, height: int, title: str = ""
-) -> list[Text]:
-    """The named bits of a word, each at its place, with the word itself."""
+@dataclass(frozen=True, slots=True)
+class WordPage:
+    """Bits of a word that are shown together."""
+
+    parameter: Parameter
+    bits: tuple[Bit, ...]
+    number: int
+    of: int
+
+
+def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
+    """The words in pages of at most so many bits."""
+    pages: list[WordPage] = []
+    for parameter in words:
+        bits = parameter.bits
+        chunks = [tuple(bits[at : at + room]) for at in range(0, len(bits), max(1, room))]
+        pages += [WordPage(parameter, c, n, len(chunks)) for n, c in enumerate(chunks, start=1)]
+    return pages
+
+
+def word_lines(view: View, page: WordPage, width: int) -> list[Text]:
+    """Named bits of a word, each at its place, with the word itself."""
+    parameter = page.parameter
     reading = view.reading(parameter.code)
     good = reading is not None and reading.raw is not None and reading.quality is Quality.GOOD
-    value = reading.text if reading is not None else NOT_AVAILABLE
-    code = parameter.code + ("" if is_verified(parameter) else " ?")
-    heading = f"{title} {code}" if title else code
-    lines = [rule(heading, width, value if good else NOT_AVAILABLE)]
-    named = parameter.bits
-    room = max(0, height - 1)
-    if len(named) > room:
-        named = named[: max(0, room - 1)]
-    for bit in named:
-        on = bool(good and reading and reading.raw is not None and reading.raw >> bit.bit & 1)
-        text = Text(no_wrap=True)
-        text.append(f" {bit.bit:>2} ", LINE)
-        style = ALARM if on and bit.alarm else STRONG if on else FAINT
-        text.append(("●" if on else "·") if good else " ", style)
-        text.append(f" {cut(_bit_words(bit, on, width - 7), width - 7)}", PLAIN if on else FAINT)
-        lines.append(text)
-    if len(named) < len(parameter.bits) and room:
-        lines.append(Text(f"    {len(parameter.bits) - len(named)} more: key w", FAINT))
-    return lines
+    raw = reading.raw if good and reading is not None else None
+    heading = parameter.code + ("" if is_verified(parameter) else " ?")
+    if page.of > 1:
+        heading += f" {page.number}/{page.of}"
+    shown = reading.text if reading is not None and raw is not None else NOT_AVAILABLE
+    lines = [rule(heading, width, shown)]
+    return lines + [_bit_line(bit, raw, width) for bit in page.bits]
 
 
-PLAIN_ANSWERS = frozenset({"", "yes", "no", "on", "off", "none", "0", "1"})
+def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
+    text = Text(no_wrap=True)
+    text.append(f" {bit.bit:>2} ", LINE)
+    room = width - 7
+    if raw is None:
+        text.append(f"  {cut(bit.name, room)}", FAINT)
+        return text
+    on = bool(raw >> bit.bit & 1)
+    text.append("●" if on else "·", ALARM if on and bit.alarm else STRONG if on else FAINT)
+    text.append(f" {cut(_bit_words(bit, on, room), room)}", PLAIN if on else FAINT)
+    return text
+
+
+PLAIN_ANSWERS = frozenset({"", "yes", "no", "on", "off", "none", "normal", "0", "1"})
 
 
 def _bit_words(bit: Bit, on: bool, room: int) -> str:
@@ -290,8 +315,19 @@ def _bit_words(bit: Bit, on: bool, room: int) -> str:
     said = bit.on if on else bit.off
     if said.lower() in PLAIN_ANSWERS:
         return bit.name
+    if said.casefold() in bit.name.casefold():
+        return bit.name
     both = f"{bit.name}: {said}"
-    return both if len(both) <= room else bit.name
+    return both if len(both) <= room else said
+
+
+def stacked_trends(view: View, width: int, height: int) -> list[Text]:
+    """Frequency above current, the last minute of each; newest at the right."""
+    upper = height // 2
+    return [
+        *_trend(view, 0, "output_frequency", "Frequency", width, upper),
+        *_trend(view, 1, "motor_current", "Current", width, height - upper),
+    ]
 
 
 def trend_lines(view: View, width: int, height: int) -> list[Text]:
@@ -319,7 +355,8 @@ def _trend(
     columns = width - 1
     step = TREND_SPAN / columns
     rows = trend(_columns(view, index, columns, step), high, columns, height - 1)
-    lines = [rule(title, width, f"0..{high:g} {parameter.unit}, 60 s")]
+    span = f"0..{high:g} {parameter.unit}" + (", 60 s" if width > 30 else "")
+    lines = [rule(title, width, span)]
     return lines + [Text.assemble(("│", LINE), row) for row in rows]
 
 
