@@ -226,6 +226,7 @@ class TcpPeer(Peer):
         try:
             if self._client is None:
                 self._client, _ = self._listener.accept()
+                self._client.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
                 self._client.settimeout(0.05)
             data = self._client.recv(4096)
         except TimeoutError:

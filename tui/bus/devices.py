@@ -19,6 +19,8 @@ MARGIN = 4
 LATE_MARGIN = 2.0
 """Late replies are awaited so many times longer than the worst lateness seen."""
 LONGEST_WAIT = 10.0
+PILED_UP = 0.5
+"""How much longer a reply is awaited for each other request without an answer."""
 QUIET_LONGEST = 0.3
 """Longest that the whole line keeps quiet for one late device."""
 FORGET = 0.99
@@ -29,9 +31,10 @@ CALM = 200
 
 @dataclass(frozen=True, slots=True)
 class Outstanding:
-    """A reply that may still come until `expires`; it was due at `due`."""
+    """A reply that may still come until `expires`; asked for at `sent`, it was due at `due`."""
 
     expectation: Expectation
+    sent: float
     due: float
     expires: float
 
@@ -150,9 +153,7 @@ class Devices:
         record.answers = record.ever_answered = True
         record.failures = 0
         record.silent_since = record.next_try = None
-        recent = record.recent.setdefault(expectation.function, deque(maxlen=RECENT))
-        recent.append(turnaround)
-        record.turnaround = max(recent)
+        _remember(record, expectation.function, turnaround)
         record.last, record.last_time = expectation, now
         record.lateness *= FORGET
         if record.settle and self._mistakable:
@@ -160,7 +161,8 @@ class Devices:
             if record.calm > CALM:
                 record.settle = 0.0
             else:
-                self._expect_late(record, expectation, now, now + record.settle)
+                late = Outstanding(expectation, now, now, now + record.settle)
+                record.outstanding.append(late)
 
     def silent(self, device: int, expectation: Expectation, sent: float, now: float) -> None:
         """Nothing came in time: leave the device alone for a while, and await a late reply."""
@@ -179,14 +181,10 @@ class Devices:
             return
         record = self[device]
         wait = min(LATE_MARGIN * record.lateness, LONGEST_WAIT)
-        expires = max(sent + self._timing.late_reply, now + wait)
-        self._expect_late(record, expectation, now, expires)
+        expires = max(sent + self._timing.late_reply, now + self._timing.first_timeout, now + wait)
+        record.outstanding.append(Outstanding(expectation, sent, now, expires))
         if record.lateness:
             self.quiet_until = now + min(LATE_MARGIN * record.lateness, QUIET_LONGEST)
-
-    @staticmethod
-    def _expect_late(record: Device, expectation: Expectation, due: float, expires: float) -> None:
-        record.outstanding.append(Outstanding(expectation, due, expires))
 
     def stray(self, piece: Piece, now: float) -> bool:
         """A whole frame came that was not the awaited one; True if it is a known late reply."""
@@ -199,12 +197,21 @@ class Devices:
                 record.outstanding.remove(late)
                 record.lateness = max(record.lateness, now - late.due)
                 record.answers = record.ever_answered = True
+                # the next time-out allows for it
+                _remember(record, late.expectation.function, now - late.sent)
                 return True
         if record.last is not None and record.last.fits(piece.pdu):
             # the reply before came twice: from now on wait as long before asking the same again
             after = min(LATE_MARGIN * (now - record.last_time), self._timing.late_reply)
             record.settle = max(record.settle, after)
             record.calm = 0
-            self._expect_late(record, record.last, now, now + record.settle)
+            again = Outstanding(record.last, record.last_time, now, now + record.settle)
+            record.outstanding.append(again)
             return True
         return False
+
+
+def _remember(record: Device, function: int, turnaround: float) -> None:
+    recent = record.recent.setdefault(function, deque(maxlen=RECENT))
+    recent.append(turnaround)
+    record.turnaround = max(recent)

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import threading
 from collections.abc import Callable
+from typing import TypeVar
 
 from .connection import Connection
 from .devices import Devices
@@ -19,6 +20,8 @@ from .tally import Tally
 from .trace import Trace
 from .worker import Work, Worker
 
+T = TypeVar("T")
+
 log = logging.getLogger(__name__)
 
 WORKERS_END = 2.0
@@ -28,7 +31,11 @@ HOPELESS = (PortBusy, PortMissing, PortRefused)
 
 
 class Engine:
-    """Runs one line. `_lock` guards the phase, so that nothing enters a loop that has ended."""
+    """Runs one line. `_lock` guards the phase, so that nothing enters a loop that has ended.
+
+    It may be taken twice by one thread: a signal handler may close the line in the midst of a
+    request that its own thread is handing over.
+    """
 
     def __init__(self, link: Link, timing: Timing, clock: Clock) -> None:
         self.trace = Trace(timing.trace_length)
@@ -37,7 +44,7 @@ class Engine:
         self.state = LineState(LineStatus.CLOSED, "", clock())
         self._link = link
         self._clock = clock
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._news = threading.Condition()
         self._error: LineError | None = None
         self._listeners: list[Callable[[LineState], None]] = []
@@ -100,10 +107,17 @@ class Engine:
 
     def submit(self, job: Job) -> None:
         """Hand a job to the loop. Raises LineClosed."""
+        self._enter(self._take, job)
+
+    def _enter(self, action: Callable[[T], None], argument: T) -> None:
+        """Have the loop do something. Raises LineClosed."""
         with self._lock:
             if not self._accepting or self._loop is None:
                 raise LineClosed
-            self._loop.call_soon_threadsafe(self._take, job)
+            try:
+                self._loop.call_soon_threadsafe(action, argument)
+            except RuntimeError:
+                raise LineClosed from None
 
     def _take(self, job: Job) -> None:
         if self._closed:
@@ -115,11 +129,10 @@ class Engine:
 
     def spawn(self, work: Work, name: str) -> Worker:
         """Start a worker in the loop. Raises LineClosed."""
-        with self._lock:
-            if not self._accepting or self._loop is None:
-                raise LineClosed
-            worker = Worker(work, name, self._loop)
-            self._loop.call_soon_threadsafe(self._begin, worker)
+        if self._loop is None:
+            raise LineClosed
+        worker = Worker(work, name, self._loop)
+        self._enter(self._begin, worker)
         return worker
 
     def _begin(self, worker: Worker) -> None:

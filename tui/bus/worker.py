@@ -31,9 +31,13 @@ class Worker:
         if self._cancelled:
             self._ended.set_result(None)
             return None
-        self._task = self._loop.create_task(self._work(), name=self.name)
+        self._task = self._loop.create_task(self._run(), name=self.name)
         self._task.add_done_callback(self._done)
         return self._task
+
+    async def _run(self) -> object:
+        # called here, so that an error in making the coroutine ends the work like any other
+        return await self._work()
 
     def abandon(self) -> None:
         """The line closed before the work could begin."""
