@@ -6,7 +6,8 @@ import functools
 import logging
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from typing import ParamSpec, TypeVar
 
 import click
@@ -32,6 +33,17 @@ class Failure(click.ClickException):
     def show(self, file: object = None) -> None:
         """Print the message on standard error."""
         click.echo(f"drivepanel: {self.message}", err=True)
+
+
+@contextmanager
+def plain_usage() -> Iterator[None]:
+    """Tell a usage error in two lines: what is wrong, and where the right usage stands."""
+    try:
+        yield
+    except click.UsageError as error:
+        path = error.ctx.command_path if error.ctx is not None else "drivepanel"
+        command = path.removesuffix(" panel")
+        raise Failure(f"{error.format_message()}\nTry '{command} --help'.", USAGE) from error
 
 
 def status_of(error: Exception) -> int | None:
@@ -60,7 +72,9 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
     @functools.wraps(command)
     def wrapped(*args: P.args, **kwargs: P.kwargs) -> R:
         try:
-            return command(*args, **kwargs)
+            result = command(*args, **kwargs)
+            sys.stdout.flush()  # here, where a closed pipe can still be told from an error
+            return result
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise
         except BrokenPipeError:

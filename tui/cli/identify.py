@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .errors import told
-from .options import json_option, line_argument, on_line
+from .options import json_option, line_argument, on_line, read_only_option
 
 if TYPE_CHECKING:
     from tui.session.identify import DriveIdentity
@@ -25,9 +25,10 @@ if TYPE_CHECKING:
     metavar="ADDRESS",
     help="Slave address of the drive.",
 )
+@read_only_option
 @json_option
 @told
-def identify(line_text: str, device: int, as_json: bool) -> None:
+def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> None:
     """Ask a drive who it is (function 43)."""
     from tui.session.identify import identify as ask
 
@@ -36,7 +37,7 @@ def identify(line_text: str, device: int, as_json: bool) -> None:
     async def work(opened: OpenLine) -> DriveIdentity:
         return await ask(opened.line, device)
 
-    found = on_line(line_text, work)
+    found = on_line(line_text, work, read_only=read_only)
     if as_json:
         keys = ("device", "vendor", "reference", "version", "name", "profile")
         print_json({key: getattr(found, key) for key in keys})

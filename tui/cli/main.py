@@ -9,6 +9,7 @@ import click
 
 import tui
 
+from .errors import plain_usage
 from .logs import start_logging
 
 COMMANDS = {
@@ -31,6 +32,16 @@ Exit status: 0 done, 2 usage, 3 no answer or line trouble, 4 the drive refused, 
 
 class Commands(click.Group):
     """Subcommands by name; anything else is the LINE on which the panel opens."""
+
+    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
+        """Take the arguments apart; usage errors in two lines."""
+        with plain_usage():
+            return super().make_context(*args, **kwargs)
+
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command; usage errors in two lines."""
+        with plain_usage():
+            return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
         """Names of the subcommands."""

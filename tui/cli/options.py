@@ -23,6 +23,8 @@ CONNECT_WITHIN = 5.0
 line_argument = click.argument("line_text", metavar="LINE")
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
+read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
+
 
 def drive_options(command: Command) -> Command:
     """Which drive on the line, and by which profile."""
@@ -59,11 +61,16 @@ class Target:
     rated_current: float | None = None
 
 
-def on_line(line_text: str, work: Callable[[OpenLine], Coroutine[Any, Any, T]]) -> T:
+def on_line(
+    line_text: str,
+    work: Callable[[OpenLine], Coroutine[Any, Any, T]],
+    *,
+    read_only: bool = False,
+) -> T:
     """Open a line, do the work, close the line whatever happens."""
     from tui.session.lines import open_line
 
-    opened = open_line(line_text, wait=CONNECT_WITHIN)
+    opened = open_line(line_text, read_only=read_only, wait=CONNECT_WITHIN)
     try:
         return asyncio.run(work(opened))
     finally:

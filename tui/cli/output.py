@@ -1,4 +1,4 @@
-"""Readings as JSON, as a table, as CSV."""
+"""Readings as JSON and as a table."""
 
 from __future__ import annotations
 
@@ -7,11 +7,32 @@ import sys
 from collections.abc import Mapping
 from datetime import UTC, datetime
 from decimal import Decimal
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
     from tui.session.drive_session import DriveSession
     from tui.session.readings import Reading
+
+COLUMNS = {
+    "Code": False,
+    "Name": False,
+    "Value": True,
+    "Unit": False,
+    "Raw": True,
+    "Number": False,
+    "Wire address": False,
+    "": False,
+}
+"""Headings of a table of readings, and whether the column is aligned to the right."""
+
+NAME_COLUMN = tuple(COLUMNS).index("Name")
+GAP = 2
+
+PIPE_WIDTH = 200
+"""Width of a table that goes to a file or another program, in characters."""
 
 
 def print_json(data: object, *, compact: bool = False) -> None:
@@ -60,44 +81,77 @@ def iso_time(wall: float) -> str:
     return datetime.fromtimestamp(wall, UTC).astimezone().isoformat(timespec="milliseconds")
 
 
-def print_readings(session: DriveSession, readings: Mapping[str, Reading]) -> None:
-    """A table with the three notations of each address."""
-    from rich.console import Console
-    from rich.table import Table
+def console() -> Console:
+    """A console on standard output, wide where that is no terminal, so that no line is folded.
 
+    Raises BrokenPipeError where its reader went away.
+    """
+    from rich.console import Console
+
+    class Plain(Console):
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
+    return Plain(width=None if sys.stdout.isatty() else PIPE_WIDTH, highlight=False)
+
+
+def print_readings(readings: Mapping[str, Reading]) -> None:
+    """Print a table of readings."""
+    console().print(readings_table(readings))
+
+
+def readings_table(
+    readings: Mapping[str, Reading], title: str = "", *, width: int | None = None
+) -> Table:
+    """A table of readings with the three notations of each address.
+
+    With a `width` in characters every row is one line, and names are cut to fit.
+    """
+    from rich.cells import cell_len
+    from rich.table import Table
+    from rich.text import Text
+
+    rows = [_cells(reading) for reading in readings.values()]
+    widths = [max(map(cell_len, column)) for column in zip(tuple(COLUMNS), *rows, strict=True)]
+    name_width = None
+    if width is not None:
+        others = sum(widths) - widths[NAME_COLUMN] + GAP * (len(widths) - 1)
+        name_width = max(4, min(widths[NAME_COLUMN], width - others))
+    table = Table(box=None, padding=(0, GAP, 0, 0), header_style="dim", title_justify="left")
+    table.title = Text(title, style="bold") if title else None
+    for index, (heading, right) in enumerate(COLUMNS.items()):
+        justify: Literal["left", "right"] = "right" if right else "left"
+        if index == NAME_COLUMN:
+            table.add_column(heading, no_wrap=width is not None, max_width=name_width)
+        else:
+            # a number that lost a digit would be another one
+            table.add_column(heading, justify=justify, no_wrap=True, min_width=widths[index])
+    for cells, reading in zip(rows, readings.values(), strict=True):
+        style = "" if reading.quality == "good" else "dim"
+        table.add_row(*(Text(cell) for cell in cells), style=style)
+    return table
+
+
+def _cells(reading: Reading) -> tuple[str, ...]:
     from tui.drive.profile import is_verified, notations
 
-    table = Table(box=None, pad_edge=False, header_style="dim")
-    for title, justify in (
-        ("Code", "left"),
-        ("Name", "left"),
-        ("Value", "right"),
-        ("Unit", "left"),
-        ("Raw", "right"),
-        ("Number", "left"),
-        ("Wire address", "left"),
-        ("", "left"),
-    ):
-        table.add_column(title, justify=justify, no_wrap=title not in ("Name", ""))  # type: ignore[arg-type]
-    for reading in readings.values():
-        code, number, wire = notations(reading.parameter)
-        mark = "" if is_verified(reading.parameter) else " ?"
-        physical = f"{reading.physical.display}" if reading.physical else ""
-        raw = "" if reading.raw is None else str(reading.raw)
-        table.add_row(
-            code + mark,
-            reading.parameter.name,
-            reading.text,
-            reading.unit,
-            raw,
-            number,
-            wire,
-            physical or _why(reading),
-        )
-    Console(soft_wrap=True).print(table)
+    code, number, wire = notations(reading.parameter)
+    return (
+        code if is_verified(reading.parameter) else f"{code} ?",
+        reading.parameter.name,
+        reading.text,
+        reading.unit,
+        "" if reading.raw is None else str(reading.raw),
+        number,
+        wire,
+        _remark(reading),
+    )
 
 
-def _why(reading: Reading) -> str:
-    if reading.error:
-        return reading.error
-    return "" if reading.quality == "good" else str(reading.quality)
+def _remark(reading: Reading) -> str:
+    """What a table says beside a value: what it is in its rating's unit, or what is wrong."""
+    if reading.raw is None:
+        return "no value"
+    if reading.quality != "good":
+        return str(reading.quality)
+    return reading.physical.display if reading.physical else ""

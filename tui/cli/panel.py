@@ -8,7 +8,7 @@ import sys
 import click
 
 from .errors import USAGE, Failure, told
-from .options import drive_options
+from .options import drive_options, read_only_option
 
 DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 """Profiles of the demo and the frequency in Hz at which each motor runs."""
@@ -34,7 +34,7 @@ def run_panel(
 
 
 @click.command()
-@click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
+@read_only_option
 @told
 def demo(read_only: bool) -> None:
     """Open the panel on one simulated line with five running drives."""
@@ -44,7 +44,7 @@ def demo(read_only: bool) -> None:
 @click.command(hidden=True)
 @click.argument("line_text", required=False, metavar="[LINE]")
 @drive_options
-@click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
+@read_only_option
 @told
 def panel(
     line_text: str | None,

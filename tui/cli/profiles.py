@@ -57,22 +57,23 @@ def _list(as_json: bool) -> None:
 
 
 def _show(profile: Profile, as_json: bool) -> None:
-    from .output import print_json
+    from .output import console, print_json
 
     if as_json:
         import msgspec
 
         print_json(msgspec.to_builtins(profile.data))
         return
-    from rich.console import Console
     from rich.table import Table
 
     from tui.drive.profile import is_verified, notations
     from tui.drive.values import raw_range
 
     link = profile.data.link
-    console = Console(soft_wrap=True)
-    console.print(f"{profile.vendor} {profile.name}, factory line {link.baud} {link.format}")
+    screen = console()
+    screen.print(
+        f"{profile.vendor} {profile.name}, factory line {link.baud} {link.format}", highlight=False
+    )
     for function in profile.data.functions:
         past = "no answer" if function.past_limit == "silence" else "an exception"
         limits = [
@@ -81,7 +82,7 @@ def _show(profile: Profile, as_json: bool) -> None:
             if words
         ]
         most = f", at most {' and '.join(limits)}, past that {past}" if limits else ""
-        console.print(f"  function {function.code:>2}  {function.name}{most}", highlight=False)
+        screen.print(f"  function {function.code:>2}  {function.name}{most}", highlight=False)
     table = Table(box=None, pad_edge=False, header_style="dim")
     for title in ("Code", "Name", "Number", "Wire address", "Unit", "Raw range", "Access", "Group"):
         table.add_column(title)
@@ -98,4 +99,4 @@ def _show(profile: Profile, as_json: bool) -> None:
             parameter.access,
             parameter.group,
         )
-    console.print(table)
+    screen.print(table)

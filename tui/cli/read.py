@@ -7,7 +7,15 @@ from typing import TYPE_CHECKING
 import click
 
 from .errors import DRIVE_REFUSED, told
-from .options import Target, connect, drive_options, json_option, line_argument, on_line
+from .options import (
+    Target,
+    connect,
+    drive_options,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+)
 
 if TYPE_CHECKING:
     from tui.session.drive_session import DriveSession
@@ -19,6 +27,7 @@ if TYPE_CHECKING:
 @line_argument
 @click.argument("codes", nargs=-1, required=True, metavar="CODE...")
 @drive_options
+@read_only_option
 @json_option
 @told
 def read(
@@ -27,6 +36,7 @@ def read(
     device: int,
     profile_id: str | None,
     rated_current: float | None,
+    read_only: bool,
     as_json: bool,
 ) -> None:
     """Read parameters of a drive.
@@ -43,11 +53,11 @@ def read(
         wanted = [session.profile.find(code).code for code in codes]
         return session, await session.read(wanted)
 
-    session, readings = on_line(line_text, work)
+    session, readings = on_line(line_text, work, read_only=read_only)
     if as_json:
         print_json(readings_json(line_text, session, readings))
     else:
-        print_readings(session, readings)
+        print_readings(readings)
     refused = [reading for reading in readings.values() if reading.raw is None]
     for reading in refused:
         click.echo(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)

@@ -3,15 +3,26 @@
 from __future__ import annotations
 
 import asyncio
-import csv
-from contextlib import nullcontext
+import itertools
+from collections.abc import Sequence
+from contextlib import ExitStack, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO
+from typing import TYPE_CHECKING
 
 import click
 
-from .errors import told
-from .options import Target, connect, drive_options, json_option, line_argument, on_line
+from .errors import LINE_TROUBLE, Failure, told
+from .options import (
+    Target,
+    connect,
+    drive_options,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+)
+from .watch_outputs import JsonOutput, Output, csv_output, text_output
 
 if TYPE_CHECKING:
     from tui.session.drive_session import DriveSession
@@ -42,6 +53,7 @@ WAITING_LONGEST = 64
     metavar="FILE",
     help="Also write the engineering values to a CSV file.",
 )
+@read_only_option
 @json_option
 @told
 def watch(
@@ -53,85 +65,45 @@ def watch(
     every: float,
     count: int | None,
     csv_path: Path | None,
+    read_only: bool,
     as_json: bool,
 ) -> None:
     """Watch parameters of a drive, by default its monitoring set.
 
-    Values that could not be read stay with the quality stale; Ctrl-C ends it.
+    What can no longer be read keeps its last value with the quality stale. Ctrl-C ends it.
     """
     target = Target(line_text, device, profile_id, rated_current)
 
     async def work(opened: OpenLine) -> None:
+        from tui.session.monitor import monitoring_codes
+
         session = await connect(opened, target)
         wanted = [session.profile.find(code).code for code in codes] or None
-        with (
-            csv_path.open("w", newline="", encoding="utf-8") if csv_path else nullcontext() as file
-        ):
-            await _follow(session, wanted, every, count, _Output(line_text, session, file, as_json))
+        shown = wanted or monitoring_codes(session.profile)
+        with ExitStack() as stack:
+            outputs = [
+                JsonOutput(line_text, session) if as_json else stack.enter_context(text_output())
+            ]
+            if csv_path is not None:
+                outputs.append(stack.enter_context(csv_output(csv_path, session, shown)))
+            await _follow(session, wanted, shown, every, count, outputs)
 
-    try:
-        on_line(line_text, work)
-    except KeyboardInterrupt:
-        return
-
-
-class _Output:
-    """Where the cycles go: standard output and perhaps a CSV file."""
-
-    def __init__(
-        self, line_text: str, session: DriveSession, file: TextIO | None, as_json: bool
-    ) -> None:
-        self._line_text = line_text
-        self._session = session
-        self._csv = csv.writer(file) if file else None
-        self._file = file
-        self._as_json = as_json
-        self._titled = False
-
-    def take(self, snapshot: Snapshot) -> None:
-        """Print one cycle."""
-        from .output import iso_time, print_json, readings_json
-
-        time = iso_time(snapshot.wall)
-        if self._as_json:
-            data = readings_json(self._line_text, self._session, snapshot.readings)
-            print_json({"time": time, **data}, compact=True)
-        else:
-            print(_sentence(time, snapshot), flush=True)
-        if self._csv is not None:
-            self._write(time, snapshot)
-
-    def _write(self, time: str, snapshot: Snapshot) -> None:
-        assert self._csv is not None
-        assert self._file is not None
-        readings = snapshot.readings
-        if not self._titled and readings:
-            titles = [f"{c} [{r.unit}]" if r.unit else c for c, r in readings.items()]
-            self._csv.writerow(["time", *titles, "error"])
-            self._titled = True
-        good = [r.text if r.quality == "good" else "" for r in readings.values()]
-        self._csv.writerow([time, *good, snapshot.error])
-        self._file.flush()
-
-
-def _sentence(time: str, snapshot: Snapshot) -> str:
-    """One cycle as a line of text; stale values in brackets."""
-    parts = []
-    for code, reading in snapshot.readings.items():
-        shown = f"{reading.text} {reading.unit}".rstrip()
-        parts.append(f"{code} {shown if reading.quality == 'good' else f'({shown}, old)'}")
-    trouble = f"  {snapshot.error}" if snapshot.error else ""
-    return f"{time[11:23]}  {snapshot.state.headline}  " + "  ".join(parts) + trouble
+    with suppress(KeyboardInterrupt):
+        on_line(line_text, work, read_only=read_only)
 
 
 async def _follow(
     session: DriveSession,
     codes: list[str] | None,
+    shown: list[str],
     every: float,
     count: int | None,
-    output: _Output,
+    outputs: Sequence[Output],
 ) -> None:
-    """Print every cycle; raises the first one's error where nothing was ever read."""
+    """Hand every cycle to the outputs; `shown` are all codes that they are to hold.
+
+    Raises Failure where `count` cycles passed and the drive never answered.
+    """
     loop = asyncio.get_running_loop()
     cycles: asyncio.Queue[Snapshot] = asyncio.Queue(WAITING_LONGEST)
 
@@ -145,13 +117,29 @@ async def _follow(
 
     leave = session.monitor.listen(hand_over)
     session.monitor.start(codes, every)
+    first_error = ""
+    answered = False
     try:
-        done = 0
-        while count is None or done < count:
+        for _ in itertools.repeat(None) if count is None else range(count):
             snapshot = await cycles.get()
-            if snapshot.readings or snapshot.error:
-                output.take(snapshot)
-            done += 1
+            answered = answered or bool(snapshot.readings)
+            first_error = first_error or snapshot.error
+            for output in outputs:
+                output.take(_complete(session, snapshot, shown))
     finally:
         leave()
         session.close()
+    if not answered:
+        raise Failure(first_error, LINE_TROUBLE)
+
+
+def _complete(session: DriveSession, snapshot: Snapshot, shown: list[str]) -> Snapshot:
+    """The cycle with all codes in their order; what was never read is bad, and says why."""
+    from tui.session.readings import Reading
+
+    readings = {
+        code: snapshot.readings.get(code)
+        or Reading.bad(session.profile[code], snapshot.time, snapshot.error)
+        for code in shown
+    }
+    return replace(snapshot, readings=readings)

@@ -1,0 +1,144 @@
+"""How commands end: signals, closed pipes, what they leave behind."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import signal
+import socket
+import subprocess
+from pathlib import Path
+
+import pytest
+from programs import DRIVEPANEL, PATIENCE, drivepanel, port_of, served, simulated
+from rich.console import Console
+
+from tui.cli.output import readings_table
+from tui.drive import library
+from tui.drive.values import decode
+from tui.session.monitor import monitoring_codes
+from tui.session.readings import Quality, Reading
+
+WATCH = ("watch", "sim:atv71@2", "-d", "2", "ETA", "--every", "0.1", "--json")
+ENDINGS = [signal.SIGINT, signal.SIGTERM]
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+def test_simulate_ends_cleanly_and_takes_its_link_away(
+    ending: signal.Signals, tmp_path: Path
+) -> None:
+    link = tmp_path / "line"
+    with simulated("atv71@2", "--pty", str(link)) as simulation:
+        assert link.is_symlink()
+        assert f"serial:{link}" in simulation.ready
+        assert simulation.end(ending) == (0, "")
+    assert not link.is_symlink()
+
+
+@pytest.mark.parametrize("way", ["--tcp", "--rtu-tcp"])
+def test_simulate_listens_on_loopback_unless_told_otherwise(way: str) -> None:
+    with simulated("atv71@2", way, "0") as simulation:
+        port = port_of(simulation.ready)
+        scheme = way.removeprefix("--")
+        done = drivepanel("read", f"{scheme}:127.0.0.1:{port}", "ETA", "-d", "2")
+        assert done.returncode == 0, done.stderr
+        assert simulation.end() == (0, "")
+    with pytest.raises(ConnectionRefusedError):
+        socket.create_connection(("127.0.0.1", port), timeout=PATIENCE)
+
+
+def test_simulate_does_not_take_the_place_of_a_file(tmp_path: Path) -> None:
+    taken = tmp_path / "notes.txt"
+    taken.write_text("mine")
+    done = drivepanel("simulate", "atv71", "--pty", str(taken))
+    assert done.returncode == 2
+    assert taken.read_text() == "mine"
+
+
+def test_simulated_line_faults_are_seen_and_repeatable() -> None:
+    def statuses() -> list[int]:
+        faults = ("--line-fault", "lost=0.5", "--seed", "7")
+        with simulated("atv71@2", "--tcp", "127.0.0.1:0", *faults) as simulation:
+            line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+            read = ("read", line, "ETA", "-d", "2", "-p", "atv71")
+            return [drivepanel(*read).returncode for _ in range(4)]
+
+    first = statuses()
+    assert set(first) <= {0, 3}
+    assert statuses() == first
+
+
+def test_ctrl_c_ends_watch_after_a_whole_line() -> None:
+    with served([*DRIVEPANEL, *WATCH], ready="{") as watching:
+        assert set(json.loads(watching.ready)["values"]) == {"ETA"}
+        watching.process.send_signal(signal.SIGINT)
+        rest, said = watching.process.communicate(timeout=PATIENCE)
+    assert (watching.process.returncode, said) == (0, "")
+    assert rest == "" or rest.endswith("\n")
+    for line in rest.splitlines():
+        json.loads(line)
+
+
+@pytest.mark.parametrize("command", [WATCH, ("profiles", "atv71"), ("profiles", "atv71", "--json")])
+def test_a_reader_that_goes_away_is_no_error(command: tuple[str, ...]) -> None:
+    process = subprocess.Popen(
+        [*DRIVEPANEL, *command],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    try:
+        assert process.stdout is not None
+        assert process.stderr is not None
+        assert process.stdout.readline() != ""
+        process.stdout.close()
+        said = process.stderr.read()
+        status = process.wait(timeout=PATIENCE)
+    finally:
+        process.kill()
+        process.wait(timeout=PATIENCE)
+        assert process.stderr is not None
+        process.stderr.close()
+    assert (status, said) == (0, "")
+
+
+def test_watch_writes_a_csv_file_beside(tmp_path: Path) -> None:
+    path = tmp_path / "watch.csv"
+    watch = ("watch", "sim:atv71@2", "-d", "2", "RFR", "ETA", "--every", "0.1", "--count", "3")
+    done = drivepanel(*watch, "--csv", str(path), "--json")
+    assert done.returncode == 0, done.stderr
+    with path.open(newline="", encoding="utf-8") as file:
+        titles, *rows = csv.reader(file)
+    assert titles == ["time", "RFR [Hz]", "ETA", "error"]
+    printed = [json.loads(line) for line in done.stdout.splitlines()]
+    assert [row[0] for row in rows] == [cycle["time"] for cycle in printed]
+    assert [row[1] for row in rows] == [cycle["values"]["RFR"]["text"] for cycle in printed]
+
+
+def test_the_table_shows_the_three_notations() -> None:
+    done = drivepanel("read", "sim:atv71@2", "-d", "2", "acc", "rfr")
+    assert done.returncode == 0, done.stderr
+    row = next(line for line in done.stdout.splitlines() if line.startswith("ACC"))
+    for part in ("ACC", "W9001", "9001 (16#2329)", " s "):
+        assert part in row
+
+
+@pytest.mark.parametrize("width", [72, 80, 120])
+def test_a_narrow_terminal_cuts_names_and_never_a_number(width: int) -> None:
+    profile = library.load("atv71")
+    codes = monitoring_codes(profile)
+    readings = {
+        code: Reading(profile[code], raw, decode(profile[code], raw, {}, None), Quality.GOOD, 0.0)
+        for raw, code in enumerate(codes, start=64000)
+    }
+    screen = Console(width=width, file=io.StringIO(), color_system=None)
+    screen.print(readings_table(readings, "title", width=width))
+    assert isinstance(screen.file, io.StringIO)
+    lines = screen.file.getvalue().splitlines()
+    assert len(lines) == len(codes) + 2
+    for code, line in zip(codes, lines[2:], strict=True):
+        reading = readings[code]
+        for part in (code, str(reading.raw), reading.text, f"(16#{reading.parameter.address:04X})"):
+            assert f" {part} " in f" {line} "

@@ -1,0 +1,105 @@
+"""What `--json` prints: the shape that scripts rely on, and nothing beside it."""
+
+from __future__ import annotations
+
+import json
+from datetime import datetime
+from typing import Any
+
+import pytest
+from programs import drivepanel, port_of, simulated
+
+from tui.drive import library
+from tui.session.monitor import monitoring_codes
+
+LINE = ("sim:atv71@2", "-d", "2")
+VALUE_KEYS = {"address", "raw", "value", "unit", "text", "quality"}
+
+
+def told(*arguments: str, status: int = 0) -> Any:
+    """The one JSON document on standard output."""
+    done = drivepanel(*arguments, "--json")
+    assert done.returncode == status, done.stderr
+    if status == 0:
+        assert done.stderr == ""
+    return json.loads(done.stdout)
+
+
+def test_read() -> None:
+    read = told("read", *LINE, "ETA", "ACC", "LFT")
+    assert set(read) == {"line", "device", "profile", "values"}
+    assert (read["line"], read["device"], read["profile"]) == ("sim:atv71@2", 2, "atv71")
+    assert list(read["values"]) == ["ETA", "ACC", "LFT"]
+    for value in read["values"].values():
+        assert set(value) == VALUE_KEYS
+        assert value["quality"] == "good"
+        assert type(value["raw"]) is int
+        assert type(value["value"]) in (int, float)
+    profile = library.load("atv71")
+    acceleration = read["values"]["ACC"]
+    assert acceleration["address"] == profile["ACC"].address
+    assert acceleration["unit"] == "s"
+    assert acceleration["value"] == pytest.approx(acceleration["raw"] / 10)
+
+
+@pytest.mark.parametrize("typed", ["acc", "Acc", "w9001", "W9001", "16#2329", "0x2329", "9001"])
+def test_read_takes_any_notation_in_any_case(typed: str) -> None:
+    assert list(told("read", *LINE, typed)["values"]) == ["ACC"]
+
+
+def test_a_parameter_that_the_drive_refuses_is_null_and_the_others_are_not_hurt() -> None:
+    with simulated("atv71@2", "--tcp", "127.0.0.1:0", "--protect", "ACC") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        read = told("read", line, "-d", "2", "ETA", "ACC", status=4)
+    refused = read["values"]["ACC"]
+    assert (refused["raw"], refused["value"], refused["quality"]) == (None, None, "bad")
+    assert read["values"]["ETA"]["quality"] == "good"
+
+
+def test_watch_prints_one_object_a_cycle() -> None:
+    done = drivepanel("watch", *LINE, "RFR", "ETA", "--every", "0.1", "--count", "3", "--json")
+    assert (done.returncode, done.stderr) == (0, "")
+    cycles = [json.loads(line) for line in done.stdout.splitlines()]
+    assert len(cycles) == 3
+    for cycle in cycles:
+        assert set(cycle) == {"time", "line", "device", "profile", "values"}
+        assert list(cycle["values"]) == ["RFR", "ETA"]
+        assert all(set(value) == VALUE_KEYS for value in cycle["values"].values())
+    times = [datetime.fromisoformat(cycle["time"]) for cycle in cycles]
+    assert all(time.tzinfo is not None for time in times)
+    assert times == sorted(times)
+    assert len(set(times)) == 3
+
+
+def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
+    done = drivepanel("watch", *LINE, "--every", "0.1", "--count", "1", "--json")
+    assert done.returncode == 0, done.stderr
+    watched = json.loads(done.stdout)["values"]
+    assert set(watched) == set(monitoring_codes(library.load("atv71")))
+
+
+def test_identify() -> None:
+    who = told("identify", *LINE)
+    assert set(who) == {"device", "vendor", "reference", "version", "name", "profile"}
+    assert (who["device"], who["profile"]) == (2, "atv71")
+    assert who["reference"].startswith("ATV71")
+
+
+def test_profiles() -> None:
+    listed = told("profiles")
+    assert [set(one) for one in listed] == [{"id", "name", "vendor", "parameters"}] * len(listed)
+    packaged = {path.stem for path in library.packaged_folder().glob("*.toml")}
+    assert {one["id"] for one in listed} == packaged
+    for one in listed:
+        assert one["parameters"] == len(library.load(one["id"]).parameters)
+
+
+def test_one_profile() -> None:
+    shown = told("profiles", "atv71")
+    assert shown["profile"]["id"] == "atv71"
+    assert {p["code"] for p in shown["parameters"]} >= {"ETA", "ACC"}
+
+
+def test_ports() -> None:
+    for port in told("ports"):
+        assert set(port) >= {"path", "description"}

@@ -1,0 +1,152 @@
+"""Exit statuses, and errors in one or two lines on standard error."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+import pytest
+from click.testing import CliRunner
+from programs import drivepanel, free_port, port_of, simulated
+
+from tui.bus.errors import RequestRefused
+from tui.cli.errors import told
+from tui.cli.logs import log_file, start_logging
+from tui.drive.errors import ValueRefused
+
+SIM = "sim:atv71@2"
+
+USAGE = {
+    "no such LINE": ("read", "foo:", "ETA"),
+    "no such device path": ("read", "./nosuch", "ETA"),
+    "a baud rate that is none": ("read", "serial:/dev/ttyS0,fast", "ETA"),
+    "no such simulated profile": ("read", "sim:nosuch", "ETA"),
+    "an address past the last": ("read", "sim:atv71@300", "ETA"),
+    "no such parameter": ("read", SIM, "-d", "2", "NOSUCH"),
+    "no such profile": ("read", SIM, "-d", "2", "-p", "nosuch", "ETA"),
+    "no LINE": ("read",),
+    "no CODE": ("read", SIM),
+    "device 0": ("read", SIM, "-d", "0", "ETA"),
+    "no such option": ("read", SIM, "--nosuch"),
+    "no such option of the panel": ("--nosuch",),
+    "the panel without a terminal": (SIM,),
+    "the demo without a terminal": ("demo",),
+    "no such profile to show": ("profiles", "nosuch"),
+    "a profile file that is none": ("profiles", "--check", __file__),
+    "a profile file that is not there": ("profiles", "--check", "nosuch.toml"),
+    "watching into a folder that is not there": (
+        "watch", SIM, "-d", "2", "ETA", "--count", "1", "--csv", "nosuch/watch.csv",
+    ),
+    "a simulation nowhere": ("simulate", "atv71"),
+    "a simulation in two places": ("simulate", "atv71", "--pty", "p", "--tcp", "127.0.0.1:0"),
+    "a TCP place that is none": ("simulate", "atv71", "--tcp", "x"),
+    "two simulated drives with one address": (
+        "simulate", "atv71@2", "atv71@2", "--tcp", "127.0.0.1:0",
+    ),
+    "a set word without a value": ("simulate", "atv71", "--tcp", "127.0.0.1:0", "--set", "ACC"),
+    "a set word too large": ("simulate", "atv71", "--tcp", "127.0.0.1:0", "--set", "ACC=70000"),
+    "a set word that is none": ("simulate", "atv71", "--tcp", "127.0.0.1:0", "--set", "NOSUCH=1"),
+    "a set word of a drive that is not there": (
+        "simulate", "atv71@2", "--tcp", "127.0.0.1:0", "--set", "9:ACC=1",
+    ),
+    "a line fault that is none": (
+        "simulate", "atv71", "--tcp", "127.0.0.1:0", "--line-fault", "fire=1",
+    ),
+    "a rate past 1": ("simulate", "atv71", "--tcp", "127.0.0.1:0", "--line-fault", "late=2"),
+    "a format that is none": ("simulate", "atv71", "--tcp", "127.0.0.1:0", "--format", "9Z9"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("arguments", USAGE.values(), ids=USAGE.keys())
+def test_2_usage(arguments: tuple[str, ...]) -> None:
+    expect(2, *arguments)
+
+
+@pytest.mark.parametrize("command", [("read", "ETA"), ("watch", "ETA"), ("identify",)])
+def test_3_nobody_has_the_address(command: tuple[str, ...]) -> None:
+    expect(3, command[0], SIM, *command[1:], "-d", "9")
+
+
+def test_3_nobody_answers_though_the_profile_is_named() -> None:
+    expect(3, "read", SIM, "ETA", "-d", "9", "-p", "atv71")
+
+
+@pytest.mark.parametrize("extra", [(), ("--json",)])
+def test_3_nothing_was_ever_watched(extra: tuple[str, ...]) -> None:
+    watch = ("watch", SIM, "ETA", "-d", "9", "-p", "atv71", "--count", "2", "--every", "0.1")
+    done = drivepanel(*watch, *extra)
+    assert done.returncode == 3, done.stdout
+    assert done.stderr.startswith("drivepanel: Device 9 did not answer")
+
+
+def test_3_nothing_listens() -> None:
+    expect(3, "identify", f"tcp:127.0.0.1:{free_port()}")
+
+
+def test_3_no_such_port() -> None:
+    expect(3, "identify", "/dev/ttyNOSUCH9")
+
+
+def test_4_the_drive_refused() -> None:
+    with simulated("atv71@2", "--tcp", "127.0.0.1:0", "--protect", "ACC") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        done = drivepanel("read", line, "ACC", "-d", "2")
+        assert done.returncode == 4
+        assert "ACC" in done.stderr
+        assert "exception 2" in done.stderr
+        # the drive answers, so watching it is no failure of the line
+        watch = ("watch", line, "ETA", "ACC", "-d", "2", "--count", "1", "--json")
+        assert drivepanel(*watch).returncode == 0
+
+
+@pytest.mark.parametrize("refusal", [RequestRefused, ValueRefused])
+def test_5_refused_here(refusal: type[Exception]) -> None:
+    @click.command()
+    @told
+    def command() -> None:
+        raise refusal("ACC: 9999 is above 999.9 s.")
+
+    result = CliRunner().invoke(command)
+    assert (result.exit_code, result.stdout) == (5, "")
+    assert result.stderr == "drivepanel: ACC: 9999 is above 999.9 s.\n"
+
+
+def test_an_unforeseen_error_goes_to_the_log() -> None:
+    @click.command()
+    @told
+    def command() -> None:
+        raise KeyError("nobody thought of this")
+
+    start_logging(0)
+    result = CliRunner().invoke(command)
+    assert result.exit_code == 1
+    assert "Traceback" not in result.output
+    assert str(log_file()) in result.stderr
+    assert "nobody thought of this" in log_file().read_text()
+    assert "Traceback" in log_file().read_text()
+
+
+def test_a_log_that_cannot_be_written_stops_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "file").write_text("")
+    monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "file"))
+    assert drivepanel("profiles").returncode == 0
+    assert drivepanel("profiles", "nosuch").returncode == 2
+
+
+def test_read_only_lines_can_be_read() -> None:
+    for command in (("read", SIM, "ETA"), ("identify", SIM), ("watch", SIM, "ETA", "--count", "1")):
+        done = drivepanel(*command, "-d", "2", "--read-only", "--json")
+        assert done.returncode == 0, done.stderr
+
+
+def expect(status: int, *arguments: str) -> None:
+    """The command ends so, says why in one or two lines, and prints nothing else."""
+    done = drivepanel(*arguments)
+    assert done.returncode == status, done.stdout + done.stderr
+    assert done.stdout == ""
+    lines = done.stderr.splitlines()
+    assert 1 <= len(lines) <= 2, done.stderr
+    assert lines[0].startswith("drivepanel: ")
+    assert "Traceback" not in done.stderr
