@@ -189,7 +189,8 @@ def _measurement(view: View, value: MonitoringValue, width: int, label_width: in
     mark = "" if is_verified(parameter) else " ?"
     label = LABELS.get(parameter.quantity) if parameter.quantity else None
     name = label or f"{parameter.code} {parameter.name}"
-    text.append(" " + cut(name, label_width - len(mark)) + mark, FAINT)
+    short = cut(name, min(len(name), label_width - len(mark)))
+    text.append(f" {short + mark:<{label_width}}", FAINT)
     _append_value(text, parameter, reading, view.now)
     rest = width - text.cell_len - 1
     if rest >= 8:

@@ -1,0 +1,170 @@
+"""Pictures of every screen in its main states, at 80 x 24 and at 120 x 40."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from textual.pilot import Pilot
+from textual.widgets import OptionList
+
+from tui.bus.errors import PortBusy
+from tui.bus.line import LineState
+from tui.drive import library
+from tui.screens.connection import ConnectionScreen, FoundDrive
+from tui.screens.monitor import MonitorScreen
+from tui.session.identify import DriveIdentity
+
+from . import fakes
+
+SIZES = pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
+Compare = Callable[..., bool]
+STATES: dict[str, tuple[Any, LineState]] = {
+    "connecting": (None, fakes.CONNECTING),
+    "running": ({"raws": fakes.RUNNING}, fakes.CONNECTED),
+    "ready": ({"raws": fakes.READY}, fakes.CONNECTED),
+    "fault": ({"raws": fakes.FAULT}, fakes.CONNECTED),
+    "alarm": ({"raws": fakes.ALARM}, fakes.CONNECTED),
+    "stale": (
+        {"raws": fakes.RUNNING, "age": 14.0, "error": "Device 2 did not answer (function 3)."},
+        fakes.CONNECTED,
+    ),
+    "lost": ({"raws": fakes.RUNNING, "age": 12.0, "error": "The line is lost."}, fakes.LOST),
+}
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same serial ports on every machine."""
+    found = [("/dev/ttyUSB0", "USB-RS485 adapter"), ("/dev/ttyS0", "")]
+    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: found)
+    monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
+
+
+@SIZES
+@pytest.mark.parametrize("state", STATES)
+def test_monitor(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+    how, line = STATES[state]
+    profile = library.load("atv71")
+    snapshot = fakes.snapshot_of(profile, line=line, **how) if how else None
+    app = fakes.app_of()
+    app.opened = fakes.opened(line)
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(MonitorScreen(fakes.session_of(snapshot, line)))
+        await pilot.pause()
+        app.screen.look()  # type: ignore[attr-defined]
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+def found_drives() -> dict[int, FoundDrive]:
+    profile = library.load("atv71")
+    named = FoundDrive(fakes.ATV71, fakes.session_of(None), "running forward", "running")
+    assert named.session is not None
+    assert named.session.profile is profile
+    unknown = DriveIdentity(5, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
+    faulty = DriveIdentity(7, "Telemecanique", "ATV71HU22N4", "0304", "", "atv71", ("atv71",))
+    return {
+        2: named,
+        5: FoundDrive(unknown, None, "no profile", "unknown"),
+        7: FoundDrive(faulty, fakes.session_of(None), "fault ObF", "fault"),
+    }
+
+
+def connection(app: Any) -> ConnectionScreen:
+    screen = app.screen
+    assert isinstance(screen, ConnectionScreen)
+    return screen
+
+
+async def empty(_: Any, pilot: Pilot[None]) -> None:
+    await pilot.pause()
+
+
+async def scanning(app: Any, pilot: Pilot[None]) -> None:
+    app.opened = fakes.opened()
+    connection(app).say("Asking address 3, 3 of 10", "Esc stops.")
+    connection(app).show_heads()
+    await pilot.pause()
+
+
+async def drives_found(app: Any, pilot: Pilot[None]) -> None:
+    app.opened = fakes.opened()
+    screen = connection(app)
+    screen.found = found_drives()
+    screen.show_drives()
+    screen.show_heads()
+    screen._sum_up(range(1, 11))
+    screen.query_one("#drives", OptionList).focus()
+    await pilot.pause()
+
+
+async def port_busy(app: Any, pilot: Pilot[None]) -> None:
+    connection(app).fail(PortBusy("/dev/ttyUSB0", "mbpoll (pid 4711)"))
+    await pilot.pause()
+
+
+async def no_answer(app: Any, pilot: Pilot[None]) -> None:
+    app.opened = fakes.opened()
+    screen = connection(app)
+    screen.show_heads()
+    screen._sum_up(range(1, 11))
+    await pilot.pause()
+
+
+async def line_lost(app: Any, pilot: Pilot[None]) -> None:
+    app.opened = fakes.opened(fakes.LOST)
+    screen = connection(app)
+    screen.found = found_drives()
+    screen.show_drives()
+    screen.show_heads()
+    await pilot.pause()
+
+
+async def dialog(_: Any, pilot: Pilot[None]) -> None:
+    await pilot.press("n")
+    await pilot.press(*"modbus", "enter")
+    await pilot.pause()
+
+
+CONNECTION = {
+    "empty": empty,
+    "scanning": scanning,
+    "found": drives_found,
+    "busy": port_busy,
+    "no-answer": no_answer,
+    "lost": line_lost,
+    "dialog": dialog,
+}
+
+
+@SIZES
+@pytest.mark.parametrize("state", CONNECTION)
+def test_connection(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+    app = fakes.app_of()
+
+    async def show(pilot: Pilot[None]) -> None:
+        await pilot.pause()
+        await CONNECTION[state](app, pilot)
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+@SIZES
+@pytest.mark.parametrize("screen", ["help", "frames"])
+def test_over_monitor(snap_compare: Compare, screen: str, size: tuple[int, int]) -> None:
+    snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(MonitorScreen(fakes.session_of(snapshot)))
+        await pilot.pause()
+        app.screen.look()  # type: ignore[attr-defined]
+        await pilot.press("question_mark" if screen == "help" else "l")
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
