@@ -11,9 +11,9 @@ import subprocess
 from pathlib import Path
 
 import pytest
-from programs import DRIVEPANEL, PATIENCE, drivepanel, port_of, served, simulated
 from rich.console import Console
 
+from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, port_of, served, simulated
 from tui.cli.output import readings_table
 from tui.drive import library
 from tui.drive.values import decode

@@ -7,8 +7,8 @@ from datetime import datetime
 from typing import Any
 
 import pytest
-from programs import drivepanel, port_of, simulated
 
+from tests.programs import drivepanel, port_of, simulated
 from tui.drive import library
 from tui.session.monitor import monitoring_codes
 

@@ -7,8 +7,8 @@ from pathlib import Path
 import click
 import pytest
 from click.testing import CliRunner
-from programs import drivepanel, free_port, port_of, simulated
 
+from tests.programs import drivepanel, free_port, port_of, simulated
 from tui.bus.errors import RequestRefused
 from tui.cli.errors import told
 from tui.cli.logs import log_file, start_logging

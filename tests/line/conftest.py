@@ -8,8 +8,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 import pytest
-from conftest import need_peer
-from programs import PATIENCE
+
+from tests.conftest import need_peer
+from tests.programs import PATIENCE
 
 HERE = Path(__file__).parent
 Peer = Callable[[str, str], str]

@@ -10,7 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from programs import PATIENCE, drivepanel, port_of, simulated
+
+from tests.programs import PATIENCE, drivepanel, port_of, simulated
 
 from .conftest import HERE, Peer
 

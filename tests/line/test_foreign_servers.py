@@ -12,7 +12,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from programs import drivepanel, free_port, port_of, pty_pair, served
+
+from tests.programs import drivepanel, free_port, port_of, pty_pair, served
 
 from .conftest import HERE
 
