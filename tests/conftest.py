@@ -19,6 +19,8 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """Configuration and state folders that belong to the test."""
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path / "config"))
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "state"))
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    (tmp_path / "home").mkdir()
     monkeypatch.setenv("LC_ALL", "C.UTF-8")
     monkeypatch.setenv("TZ", "UTC")
     return tmp_path

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .errors import told
-from .options import json_option, line_argument, on_line, read_only_option
+from .options import device_option, json_option, line_argument, on_line, read_only_option
 
 if TYPE_CHECKING:
     from tui.session.identify import DriveIdentity
@@ -16,15 +16,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @line_argument
-@click.option(
-    "-d",
-    "--device",
-    type=click.IntRange(1, 247),
-    default=1,
-    show_default=True,
-    metavar="ADDRESS",
-    help="Slave address of the drive.",
-)
+@device_option
 @read_only_option
 @json_option
 @told

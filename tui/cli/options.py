@@ -26,6 +26,17 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON a
 read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
 
 
+device_option = click.option(
+    "-d",
+    "--device",
+    type=click.IntRange(1, 247),
+    default=1,
+    show_default=True,
+    metavar="ADDRESS",
+    help="Slave address of the drive.",
+)
+
+
 def drive_options(command: Command) -> Command:
     """Which drive on the line, and by which profile."""
     for option in (
@@ -37,15 +48,7 @@ def drive_options(command: Command) -> Command:
             help="Rated current of the drive in A, for families that give currents in %.",
         ),
         click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drive."),
-        click.option(
-            "-d",
-            "--device",
-            type=click.IntRange(1, 247),
-            default=1,
-            show_default=True,
-            metavar="ADDRESS",
-            help="Slave address of the drive.",
-        ),
+        device_option,
     ):
         command = option(command)
     return command

@@ -8,7 +8,7 @@ import sys
 import click
 
 from .errors import USAGE, Failure, told
-from .options import drive_options, read_only_option
+from .options import device_option, read_only_option
 
 DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 """Profiles of the demo and the frequency in Hz at which each motor runs."""
@@ -43,15 +43,9 @@ def demo(read_only: bool) -> None:
 
 @click.command(hidden=True)
 @click.argument("line_text", required=False, metavar="[LINE]")
-@drive_options
+@device_option
 @read_only_option
 @told
-def panel(
-    line_text: str | None,
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
-    read_only: bool,
-) -> None:
+def panel(line_text: str | None, device: int, read_only: bool) -> None:
     """Open the panel."""
     run_panel(line_text, device if line_text else None, read_only=read_only)

@@ -1,0 +1,202 @@
+"""What holds of the whole project: imports, start-up, what is packed, what README promises."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+import subprocess
+import sys
+import zipfile
+from importlib import metadata
+from pathlib import Path
+
+import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+from .programs import PATIENCE
+
+ROOT = Path(__file__).resolve().parent.parent
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+CI = ROOT / ".ci" / "run"
+
+LOADED = """
+import sys
+from tui.__main__ import main
+sys.argv = ["drivepanel", *sys.argv[1:]]
+try:
+    main()
+finally:
+    print(*sorted({name.partition(".")[0] for name in sys.modules}), file=sys.stderr)
+"""
+
+
+def run(*command: str, cwd: Path = ROOT) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(
+        command, cwd=cwd, capture_output=True, text=True, timeout=PATIENCE * 5, check=False
+    )
+
+
+def test_imports_point_downward_only() -> None:
+    done = run(sys.executable, "-c", "from importlinter.cli import lint_imports_command as c; c()")
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert re.search(r"Contracts: [1-9]\d* kept, 0 broken", done.stdout), done.stdout
+
+
+def test_every_contract_of_the_design_is_in_the_configuration() -> None:
+    import tomli
+
+    linter = tomli.loads((ROOT / "pyproject.toml").read_text())["tool"]["importlinter"]
+    layers = next(c["layers"] for c in linter["contracts"] if c["type"] == "layers")
+    present = {f"tui.{p.stem}" for p in (ROOT / "tui").iterdir() if not p.name.startswith("_")}
+    named = {name.strip() for layer in layers for name in layer.split("|")}
+    assert present <= named
+
+
+@pytest.mark.parametrize(
+    ("arguments", "unwanted"),
+    [
+        (["--help"], {"textual", "pymodbus", "serial", "rich", "msgspec", "tomli", "asyncio"}),
+        (["--version"], {"textual", "pymodbus", "serial", "rich", "msgspec", "tomli", "asyncio"}),
+        (["read", "--help"], {"textual", "pymodbus", "serial", "rich", "msgspec"}),
+        (["profiles"], {"textual", "pymodbus", "serial"}),
+        (["ports"], {"textual", "pymodbus"}),
+        (["read", "sim:atv71", "ETA", "--json"], {"textual", "rich"}),
+    ],
+    ids=lambda value: " ".join(value) if isinstance(value, list) else "",
+)
+def test_a_command_imports_what_it_needs_and_no_more(
+    arguments: list[str], unwanted: set[str]
+) -> None:
+    done = run(sys.executable, "-c", LOADED, *arguments)
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stderr.split())
+    assert "tui" in loaded
+    assert not loaded & unwanted
+
+
+def test_the_wheel_holds_tui_alone_and_all_profiles(tmp_path: Path) -> None:
+    build = "import sys; from hatchling.build import build_wheel; build_wheel(sys.argv[1])"
+    done = run(sys.executable, "-c", build, str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    (wheel,) = tmp_path.glob("*.whl")
+    with zipfile.ZipFile(wheel) as packed:
+        names = packed.namelist()
+    tops = {name.partition("/")[0] for name in names}
+    assert {top for top in tops if not top.endswith(".dist-info")} == {"tui"}
+    profiles = {path.name for path in (ROOT / "profiles").glob("*.toml")}
+    assert {Path(n).name for n in names if n.startswith("tui/_profiles/")} >= profiles
+    styles = {path.relative_to(ROOT).as_posix() for path in (ROOT / "tui").rglob("*.tcss")}
+    assert styles <= set(names)
+
+
+def test_the_installed_wheel_works_in_another_folder(tmp_path: Path) -> None:
+    build = "import sys; from hatchling.build import build_wheel; build_wheel(sys.argv[1])"
+    assert run(sys.executable, "-c", build, str(tmp_path)).returncode == 0
+    (wheel,) = tmp_path.glob("*.whl")
+    site = tmp_path / "site"
+    with zipfile.ZipFile(wheel) as packed:
+        packed.extractall(site)
+    show = f"import sys; sys.path.insert(0, {str(site)!r}); import tui.drive.library as l; "
+    done = run(
+        sys.executable,
+        "-c",
+        show + "print(l.packaged_folder()); print(*[i.id for i in l.listings()])",
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    folder, ids = done.stdout.splitlines()
+    assert Path(folder) == site / "tui" / "_profiles"
+    assert set(ids.split()) == {path.stem for path in (ROOT / "profiles").glob("*.toml")}
+
+
+def commands() -> list[str]:
+    """The commands of README that a fresh clone is given, each one line."""
+    return [line for line in README.splitlines() if line.startswith("python3 -m venv ")]
+
+
+def test_readme_gives_one_command_to_start_and_one_to_test() -> None:
+    start, test = commands()
+    assert start.endswith(" && .venv/bin/drivepanel demo")
+    assert ".venv/bin/python -m pytest" in test
+    assert "'.[test]'" in test
+    for command in (start, test):
+        assert "-c constraints.txt" in command
+
+
+def test_the_gate_runs_the_test_command_of_readme() -> None:
+    script = CI.read_text(encoding="utf-8")
+    assert CI.stat().st_mode & stat.S_IXUSR
+    assert "set -euo pipefail" in script
+    (extraction,) = re.findall(r"^command=\$\((.+)\)$", script, re.MULTILINE)
+    done = run("bash", "-c", extraction)
+    assert done.stdout.strip() == commands()[1]
+    for check in ("ruff check", "ruff format --check", "mypy", "lint-imports", "DRIVEPANEL_PEERS"):
+        assert check in script
+
+
+def test_links_of_readme_lead_somewhere() -> None:
+    targets = [t for t in re.findall(r"\]\(([^)]+)\)", README) if "://" not in t]
+    assert targets
+    missing = [t for t in targets if not (ROOT / t).exists()]
+    assert missing == []
+
+
+def test_readme_names_every_profile_and_every_command() -> None:
+    for path in (ROOT / "profiles").glob("*.toml"):
+        assert f"`{path.stem}`" in README
+    from tui.cli.main import COMMANDS
+
+    for command in COMMANDS:
+        assert f"drivepanel {command}" in README
+
+
+def pins() -> dict[str, str]:
+    lines = (ROOT / "constraints.txt").read_text(encoding="utf-8").splitlines()
+    matches = [
+        re.fullmatch(r"([A-Za-z0-9._-]+)==([A-Za-z0-9.!+]+)", line) for line in lines if line
+    ]
+    assert all(matches), "constraints.txt holds NAME==VERSION only"
+    return {canonicalize_name(m[1]): m[2] for m in matches if m}
+
+
+def test_every_package_that_the_project_needs_is_pinned() -> None:
+    import tomli
+
+    project = tomli.loads((ROOT / "pyproject.toml").read_text())["project"]
+    waiting = [*project["dependencies"], *project["optional-dependencies"]["test"]]
+    needed: set[tuple[str, frozenset[str]]] = set()
+    while waiting:
+        requirement = Requirement(waiting.pop())
+        extras = frozenset(requirement.extras)
+        marker = requirement.marker
+        key = (canonicalize_name(requirement.name), extras)
+        if key in needed or (marker and not marker.evaluate({"extra": ""})):
+            continue
+        needed.add(key)
+        for inner in metadata.requires(requirement.name) or []:
+            wanted = Requirement(inner).marker
+            if wanted is None or any(wanted.evaluate({"extra": e}) for e in ("", *extras)):
+                waiting.append(inner.partition(";")[0])
+    assert {name for name, _ in needed} - set(pins()) == set()
+
+
+def test_nothing_in_the_project_names_this_machine() -> None:
+    listed = run("git", "ls-files")
+    if listed.returncode != 0:
+        pytest.skip("not a git checkout")
+    home = re.compile(r"(?<![\w.])/(?:home|root|Users)/\w", re.ASCII)
+    found = []
+    for name in listed.stdout.splitlines():
+        path = ROOT / name
+        if path.suffix in {".svg", ".raw"} or not path.is_file():
+            continue
+        if home.search(path.read_text(encoding="utf-8", errors="replace")):
+            found.append(name)
+    assert found == []
+
+
+def test_the_test_run_keeps_out_of_the_users_folders(tmp_path: Path) -> None:
+    for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
+        assert Path(os.environ[name]).is_relative_to(tmp_path)
