@@ -101,13 +101,9 @@ def _references(data: ProfileData) -> Iterator[Finding]:
 
 
 def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
+    """Every place that names a parameter, with the code it names."""
     for index, parameter in enumerate(data.parameters):
-        for code in (
-            parameter.min_from,
-            parameter.max_from,
-            parameter.rating,
-            parameter.scale_by.parameter if parameter.scale_by else "",
-        ):
+        for code in _named_by(parameter):
             yield ["parameters", index], code
     for index, block in enumerate(data.blocks):
         for code in (*block.slots, *block.values, *(c.parameter for c in block.choices)):
@@ -119,25 +115,41 @@ def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
     for index, reference in enumerate(data.references):
         yield ["references", index], reference.parameter
         yield ["references", index], reference.feedback
-    for value in data.monitoring.values:
-        yield ["monitoring"], value.parameter
-        if value.high and not value.high.replace(".", "").isdecimal():
-            yield ["monitoring"], value.high
-    for code in (data.faults.parameter, *data.faults.history):
-        yield ["faults"], code
-    for setting in data.link.settings:
-        yield ["link"], setting.parameter
-    if watch := data.communication_fault:
-        yield ["communication_fault"], watch.timeout
-        yield ["communication_fault"], watch.reaction
-    identification = data.identification
-    for code in (identification.model_parameter, identification.class_parameter):
-        yield ["identification"], code
-    if speed := data.monitoring.speed_from:
-        for code in (speed.frequency, speed.poles, speed.result):
-            yield ["monitoring"], code
-    for server in data.addresses.servers:
-        yield ["addresses"], server.parameter
+    for table, codes in _named_in_tables(data).items():
+        for code in codes:
+            yield [table], code
+
+
+def _named_by(parameter: Parameter) -> tuple[str, ...]:
+    return (
+        parameter.min_from,
+        parameter.max_from,
+        parameter.rating,
+        parameter.scale_by.parameter if parameter.scale_by else "",
+        parameter.unit_by.parameter if parameter.unit_by else "",
+    )
+
+
+def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
+    """Codes named in the tables of which a profile has one."""
+    values = data.monitoring.values
+    ends = (end for value in values for end in (value.low, value.high))
+    speed, watch = data.monitoring.speed_from, data.communication_fault
+    return {
+        "monitoring": [
+            *(value.parameter for value in values),
+            *(end for end in ends if not end.lstrip("-").replace(".", "").isdecimal()),
+            *((speed.frequency, speed.poles, speed.result) if speed else ()),
+        ],
+        "faults": [data.faults.parameter, *data.faults.history],
+        "link": [setting.parameter for setting in data.link.settings],
+        "communication_fault": [watch.timeout, watch.reaction] if watch else [],
+        "identification": [
+            data.identification.model_parameter,
+            data.identification.class_parameter,
+        ],
+        "addresses": [server.parameter for server in data.addresses.servers],
+    }
 
 
 def _states(data: ProfileData) -> Iterator[Finding]:

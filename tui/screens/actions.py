@@ -32,6 +32,8 @@ class Action:
     """True for an action of the app, False for one of the screen."""
     line: bool = True
     """Whether it stands in the line of keys."""
+    both: str = ""
+    """What the line of keys shows where one entry stands for a pair of keys."""
 
 
 ACTIONS: tuple[Action, ...] = (
@@ -73,15 +75,16 @@ ACTIONS: tuple[Action, ...] = (
     Action(
         "step_drive(1)",
         "right_square_bracket",
-        "[ ]",
+        "]",
         "drive",
         "The next drive on this line.",
         (MONITOR,),
+        both="[ ]",
     ),
     Action(
         "change_rate(1)", "plus,equals_sign", "+", "", "Poll twice as fast.", (MONITOR,), line=False
     ),
-    Action("change_rate(-1)", "minus", "+ -", "rate", "Poll half as fast.", (MONITOR,)),
+    Action("change_rate(-1)", "minus", "-", "rate", "Poll half as fast.", (MONITOR,), both="+ -"),
     Action("next_word", "w", "w", "word", "Show the next word of bits.", (MONITOR,)),
     Action("frames", "l", "l", "frames", "Show the frames on the line.", (MONITOR,)),
     Action("leave", "escape,l", "Esc", "back", "Go back to Monitor.", (FRAMES,)),
@@ -115,4 +118,6 @@ def of_screen(screen: str) -> list[Action]:
 
 def keys_of(screen: str) -> list[tuple[str, str]]:
     """What the line of keys says on a screen."""
-    return [(action.shown, action.label) for action in of_screen(screen) if action.line]
+    return [
+        (action.both or action.shown, action.label) for action in of_screen(screen) if action.line
+    ]

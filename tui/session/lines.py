@@ -32,7 +32,7 @@ class OpenLine:
     def label(self) -> str:
         """How the line is called on a screen."""
         if self.simulation is None:
-            return label(self.line.link)
+            return label(self.line.link).removeprefix("serial:").replace(",", " ")
         count = len(self.devices)
         return self.text if count == 1 else f"{SIMULATED}{count} drives"
 

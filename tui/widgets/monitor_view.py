@@ -14,7 +14,7 @@ from tui.drive.schema import Bit, MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.identify import DriveIdentity
-from tui.session.monitor import STALE_CYCLES, Snapshot, TrendPoint
+from tui.session.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
 from tui.session.readings import Quality, Reading
 
 from .drawing import aligned, bar, cut, pair, rule, trend
@@ -88,8 +88,12 @@ class View:
             return None
         rate = self.snapshot.rate
         cycle = max(self.period, 1 / rate if rate else self.period)
-        slow = any(v.parameter == code and v.rate == "slow" for v in self.values)
-        return reading.aged(self.now, STALE_CYCLES * cycle * (10 if slow or self.rare(code) else 1))
+        often = self.lost or not (self.slow(code) or self.rare(code))
+        return reading.aged(self.now, STALE_CYCLES * cycle * (1 if often else SLOW_FACTOR))
+
+    def slow(self, code: str) -> bool:
+        """Whether the value is one of the slow ones of the monitoring set."""
+        return any(v.parameter == code and v.rate == "slow" for v in self.values)
 
     def rare(self, code: str) -> bool:
         """Whether the value is one of those read seldom beside the monitoring set."""
@@ -145,6 +149,8 @@ def state_lines(view: View, width: int) -> list[Text]:
 
 def _detail(state: DriveState) -> str:
     """What the headline does not say: at reference or not, and the chart's own name."""
+    if state.kind == "fault" and state.fault is not None:
+        return state.fault.name
     parts = []
     if state.reached is not None and state.kind == "running":
         parts.append("at reference" if state.reached else "on the ramp")
@@ -157,7 +163,10 @@ def _channel(view: View, label: str, quantity: Quantity) -> Text:
     parameter = view.profile.quantity(quantity)
     if parameter is None:
         return Text("")
-    text = channel_text(parameter, view.reading(parameter.code))
+    reading = view.reading(parameter.code)
+    text = channel_text(parameter, reading)
+    if reading is not None and reading.quality is not Quality.GOOD:
+        return pair(f"   {label}", f"was {text}", FAINT, 14)
     return pair(f"   {label}", text or NOT_AVAILABLE, PLAIN if text else FAINT, 14)
 
 
@@ -466,9 +475,8 @@ def status_lines(view: View, width: int) -> list[Text]:
     rate = view.snapshot.rate if view.snapshot else 0.0
     counts = view.counters
     bad = counts.timeouts + counts.checksum + counts.wrong
-    text.append(f"  {rate:4.1f} cycles/s of {1 / view.period:.1f} wished", FAINT)
-    text.append(f"  {counts.requests} requests, ", FAINT)
-    text.append(f"{bad} unanswered or damaged", FAINT)
+    text.append(f"  {rate:4.1f} of {1 / view.period:.1f} cycles/s", FAINT)
+    text.append(f"  {counts.requests} requests, {bad} without a good answer", FAINT)
     if view.read_only:
         text.append("  read-only", FAINT)
     text.truncate(width)

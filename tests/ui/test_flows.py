@@ -1,0 +1,172 @@
+"""The panel on simulated drives over a real line, driven by its keys."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+
+import pytest
+from textual.pilot import Pilot
+from textual.widgets import OptionList
+
+from tui.app import DrivePanelApp
+from tui.screens.actions import ACTIONS, EVERYWHERE
+from tui.screens.connection import ConnectionScreen
+from tui.screens.frames import FramesScreen
+from tui.screens.help import HelpScreen
+from tui.screens.line_dialog import LineDialog
+from tui.screens.monitor import MonitorScreen
+from tui.session.lines import OpenLine, demo_line
+from tui.widgets.lines import Lines
+
+DRIVES = {"atv21": 35.0, "atv71": 50.0, "powerdrive": 30.0}
+
+
+def demo(*_: object, **__: object) -> OpenLine:
+    return demo_line(DRIVES)
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+async def until(pilot: Pilot[None], holds: Callable[[], bool], seconds: float = 20.0) -> None:
+    """Wait for a condition of the screen; a slow machine only waits longer."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "the screen did not get there"
+        await pilot.pause(0.05)
+
+
+def shown(app: DrivePanelApp, part: str) -> str:
+    """The text of a part of the screen on top."""
+    return "\n".join(line.plain for line in app.screen.query_one(f"#{part}", Lines).lines)
+
+
+async def to_monitor(app: DrivePanelApp, pilot: Pilot[None], device: int) -> MonitorScreen:
+    await until(pilot, lambda: len(app.connection.found) == len(DRIVES))
+    drives = app.connection.query_one("#drives", OptionList)
+    drives.focus()
+    drives.highlighted = sorted(app.connection.found).index(device)
+    await pilot.press("enter")
+    await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+    screen = app.screen
+    assert isinstance(screen, MonitorScreen)
+    return screen
+
+
+async def test_choose_a_drive_watch_it_and_come_back() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        screen = await to_monitor(app, pilot, 2)
+        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
+        assert "ATV71HU15M3" in shown(app, "header")
+        await until(pilot, lambda: "Hz" in shown(app, "motor"))
+        assert screen.session.monitor.running
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
+        await until(pilot, lambda: not screen.session.monitor.running)
+
+
+async def test_next_and_previous_drive() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        first = await to_monitor(app, pilot, 1)
+        await pilot.press("right_square_bracket")
+        await until(pilot, lambda: "device 2" in shown(app, "header"))
+        assert not first.session.monitor.running
+        await pilot.press("left_square_bracket")
+        await until(pilot, lambda: "device 1" in shown(app, "header"))
+        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
+
+
+async def test_a_lost_line_is_shown_and_comes_back() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await to_monitor(app, pilot, 2)
+        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
+        assert app.opened is not None
+        assert app.opened.simulation is not None
+        app.opened.simulation.unplug()
+        await until(pilot, lambda: "LINE LOST" in shown(app, "message"))
+        assert "NOT KNOWN NOW" in shown(app, "state")
+        app.opened.simulation.replug()
+        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
+
+
+async def test_a_drive_that_watches_the_line_is_asked_on() -> None:
+    """The Altivar 21 trips after 3 s without a request: found once, it is looked after."""
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await to_monitor(app, pilot, 2)
+        await asyncio.sleep(5.0)
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
+        await pilot.pause(1.0)
+        assert app.connection.found[1].state == "running forward"
+
+
+async def test_frames_help_and_palette_open_and_close() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(120, 40)) as pilot:
+        await to_monitor(app, pilot, 2)
+        await pilot.press("l")
+        await until(pilot, lambda: isinstance(app.screen, FramesScreen))
+        await until(pilot, lambda: "out" in shown(app, "frames"))
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        await pilot.press("question_mark")
+        await until(pilot, lambda: isinstance(app.screen, HelpScreen))
+        await pilot.press("escape", "ctrl+p")
+        await pilot.pause(0.2)
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+
+
+async def test_a_line_that_cannot_be_opened_says_what_to_try() -> None:
+    app = DrivePanelApp()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("n")
+        await until(pilot, lambda: isinstance(app.screen, LineDialog))
+        await pilot.press(*"tcp:127.0.0.1:9", "enter")
+        await until(pilot, lambda: "cannot be reached" in shown(app, "message"))
+        assert app.opened is None
+
+
+async def test_an_unknown_simulated_profile_is_no_crash() -> None:
+    app = DrivePanelApp(start="sim:nothing")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: "nothing" in shown(app, "message"))
+
+
+async def test_a_line_and_a_device_on_the_command_line_open_its_monitor() -> None:
+    app = DrivePanelApp(start="sim:atv71@2", device=2)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        await until(pilot, lambda: "SWITCH" in shown(app, "state").upper())
+
+
+def test_every_action_has_a_method_and_words() -> None:
+    owners = {"connection": ConnectionScreen, "monitor": MonitorScreen, "frames": FramesScreen}
+    for action in ACTIONS:
+        name = f"action_{action.id.partition('(')[0]}"
+        for screen in action.screens:
+            owner = DrivePanelApp if action.app else owners[screen]
+            assert hasattr(owner, name), (screen, name)
+        assert action.help.endswith(".")
+        assert set(action.screens) <= set(EVERYWHERE)
+
+
+async def test_only_changed_lines_are_drawn() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        screen = await to_monitor(app, pilot, 2)
+        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
+        word = screen.query_one("#word", Lines)
+        await pilot.pause(1.0)
+        before = word.redrawn
+        screen.look()
+        screen.look()
+        assert word.redrawn == before
