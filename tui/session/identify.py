@@ -44,7 +44,9 @@ class ScanResult:
     error: str = ""
 
 
-async def identify(line: Line, device: int) -> DriveIdentity:
+async def identify(
+    line: Line, device: int, *, priority: Priority = Priority.OPERATOR_READ
+) -> DriveIdentity:
     """Ask a drive who it is by function 43.
 
     A drive that refuses the function is there, but nameless. One that stays silent is asked
@@ -52,11 +54,11 @@ async def identify(line: Line, device: int) -> DriveIdentity:
     answers at all, and the line's other errors.
     """
     try:
-        answer = await line.identify(device, priority=Priority.OPERATOR_READ)
+        answer = await line.identify(device, priority=priority)
     except DeviceException:
         return DriveIdentity(device, "", "", "", "", None, ())
     except NoAnswer:
-        candidates = await _nameless_families(line, device)
+        candidates = await _nameless_families(line, device, priority)
         if not candidates:
             raise
         return DriveIdentity(device, "", "", "", "", None, candidates)
@@ -81,15 +83,13 @@ def _identity(device: int, answer: Identification) -> DriveIdentity:
     )
 
 
-async def _nameless_families(line: Line, device: int) -> tuple[str, ...]:
+async def _nameless_families(line: Line, device: int, priority: Priority) -> tuple[str, ...]:
     """Profiles without function 43 whose status word the device lets be read."""
     probes = await asyncio.to_thread(_status_words_without_identification)
     for address, profiles in probes.items():
         try:
-            await line.read(device, address, 1, priority=Priority.OPERATOR_READ)
-        except DeviceException:
-            continue
-        except NoAnswer:
+            await line.read(device, address, 1, priority=priority)
+        except (DeviceException, NoAnswer):
             continue
         return profiles
     return ()
@@ -108,13 +108,14 @@ def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
 
 
 async def scan(line: Line, devices: Iterable[int], found: Callable[[ScanResult], None]) -> None:
-    """Ask each address in turn; `found` hears of every one that is not silent.
+    """Ask each address in turn, behind everything else; `found` hears of all not silent.
 
     Raises the line's errors that are not one drive's: closed, lost.
     """
     for device in devices:
         try:
-            result = ScanResult(device, await identify(line, device))
+            identity = await identify(line, device, priority=Priority.BACKGROUND)
+            result = ScanResult(device, identity)
         except NoAnswer:
             continue
         except ExchangeError as fault:

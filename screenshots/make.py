@@ -1,0 +1,70 @@
+"""Make the screenshots from simulated drives on a real line: `python screenshots/make.py`."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+SIZES = ((80, 24), (120, 40))
+DRIVES = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
+WATCHED = 4
+TREND_SECONDS = 62.0
+FAULT_CODE = "ObF"
+
+
+async def main() -> None:
+    """One run a size: Connection, Monitor, a fault, help."""
+    with tempfile.TemporaryDirectory() as folder:
+        os.environ["DRIVEPANEL_STATE"] = os.environ["DRIVEPANEL_CONFIG"] = folder
+        for size in SIZES:
+            await _run(size)
+
+
+async def _run(size: tuple[int, int]) -> None:
+    from textual.pilot import Pilot
+
+    from tui.app import DrivePanelApp
+    from tui.screens.monitor import MonitorScreen
+    from tui.session.lines import demo_line
+
+    app = DrivePanelApp(open_line=lambda *_, **__: demo_line(DRIVES), start="demo")
+
+    async def until(pilot: Pilot[None], holds: Callable[[], bool]) -> None:
+        end = time.monotonic() + 60
+        while not holds():
+            if time.monotonic() > end:
+                raise TimeoutError("the screen did not get there")
+            await pilot.pause(0.1)
+
+    def save(name: str) -> None:
+        app.save_screenshot(f"{name}-{size[0]}x{size[1]}.svg", str(HERE))
+
+    async with app.run_test(size=size) as pilot:
+        known = app.connection.found
+        await until(pilot, lambda: len(known) == len(DRIVES))
+        await until(pilot, lambda: all(d.state not in ("", "asking") for d in known.values()))
+        await pilot.pause(1.0)
+        save("connection")
+        await pilot.press(*["down"] * (WATCHED - 1), "enter")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        await pilot.pause(TREND_SECONDS)
+        save("monitor")
+        await pilot.press("question_mark")
+        await pilot.pause(0.5)
+        save("help")
+        await pilot.press("escape")
+        simulation = app.opened.simulation if app.opened else None
+        if simulation is None:
+            raise RuntimeError("the screenshots are made from simulated drives")
+        simulation.drive(WATCHED).provoke(FAULT_CODE)
+        await pilot.pause(4.0)
+        save("monitor-fault")
+
+
+if __name__ == "__main__":
+    asyncio.run(main())
