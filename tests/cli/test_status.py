@@ -30,6 +30,7 @@ USAGE = {
     "no such option": ("read", SIM, "--nosuch"),
     "no such option of the panel": ("--nosuch",),
     "the panel without a terminal": (SIM,),
+    "the panel on a device of no line": ("-d", "2"),
     "the demo without a terminal": ("demo",),
     "no such profile to show": ("profiles", "nosuch"),
     "a profile file that is none": ("profiles", "--check", __file__),

@@ -8,7 +8,7 @@ import sys
 import click
 
 from .errors import USAGE, Failure, told
-from .options import device_option, read_only_option
+from .options import read_only_option
 
 DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 """Profiles of the demo and the frequency in Hz at which each motor runs."""
@@ -43,9 +43,17 @@ def demo(read_only: bool) -> None:
 
 @click.command(hidden=True)
 @click.argument("line_text", required=False, metavar="[LINE]")
-@device_option
+@click.option(
+    "-d",
+    "--device",
+    type=click.IntRange(1, 247),
+    metavar="ADDRESS",
+    help="Watch the drive at this slave address at once; without it, look for drives.",
+)
 @read_only_option
 @told
-def panel(line_text: str | None, device: int, read_only: bool) -> None:
+def panel(line_text: str | None, device: int | None, read_only: bool) -> None:
     """Open the panel."""
-    run_panel(line_text, device if line_text else None, read_only=read_only)
+    if device is not None and line_text is None:
+        raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
+    run_panel(line_text, device, read_only=read_only)

@@ -1,0 +1,299 @@
+"""The panel over a real SSH session in a real terminal, also when that terminal stands still.
+
+A private SSH server on loopback, with keys of its own, serves a client inside a private tmux.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import need_peer
+from tests.programs import PATIENCE, free_port, port_of, simulated, wait_until
+
+from .conftest import Peer
+
+ROOT = Path(__file__).resolve().parents[2]
+STALL = 10.0
+"""Seconds for which the terminal stands still."""
+DRIVE_ROW = re.compile(r" +\d+ (\S+)")
+"""A drive on Connection: its address and its reference."""
+MORE_REQUESTS = 20
+"""Requests that must still come while it stands still."""
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """An 80 x 24 terminal in tmux."""
+
+    tmux: tuple[str, ...]
+
+    def run(self, *arguments: str) -> str:
+        """A tmux command on it; what it printed."""
+        done = subprocess.run(
+            [*self.tmux, *arguments],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=True,
+        )
+        return done.stdout
+
+    def text(self) -> str:
+        """What stands on it."""
+        return self.run("capture-pane", "-p")
+
+    def press(self, *keys: str) -> None:
+        """Press keys, by tmux's names."""
+        self.run("send-keys", *keys)
+
+    def wait_for(self, *words: str) -> None:
+        """Wait until all the words stand on it."""
+        try:
+            wait_until(lambda: all(word in self.text() for word in words), f"{words} on screen")
+        except AssertionError as late:
+            raise AssertionError(f"{late}; the screen:\n{self.text()}") from None
+
+    def client(self) -> int:
+        """Process id of what runs in it: the SSH client."""
+        return int(self.run("display-message", "-p", "#{pane_pid}"))
+
+
+@dataclass(frozen=True, slots=True)
+class SshHost:
+    """A private SSH server and the command that logs in."""
+
+    login: tuple[str, ...]
+
+
+@pytest.fixture
+def ssh_host(peer: Peer, tmp_path: Path) -> Iterator[SshHost]:
+    """An SSH server on loopback that lets in the key made for it, and nobody else."""
+    server = shutil.which("sshd") or shutil.which("sshd", path="/usr/sbin:/usr/local/sbin")
+    if server is None:
+        need_peer("sshd is not here; it comes with the package openssh-server.")
+        raise AssertionError
+    if os.geteuid() == 0 and not Path("/run/sshd").is_dir():
+        need_peer("an SSH server started by root needs the folder /run/sshd; make it first.")
+    ssh, keygen = peer("ssh", "openssh-client"), peer("ssh-keygen", "openssh-client")
+    port = free_port()
+    for name in ("host", "user"):
+        make_key = [keygen, "-q", "-t", "ed25519", "-N", "", "-f", str(tmp_path / name)]
+        subprocess.run(make_key, check=True, timeout=PATIENCE)
+    configuration = tmp_path / "sshd_config"
+    configuration.write_text(
+        f"Port {port}\nListenAddress 127.0.0.1\nHostKey {tmp_path / 'host'}\nPidFile none\n"
+        f"AuthorizedKeysFile {tmp_path / 'user.pub'}\nPasswordAuthentication no\n"
+        "KbdInteractiveAuthentication no\nPermitRootLogin prohibit-password\n"
+        "StrictModes no\nUsePAM no\nPrintMotd no\nPrintLastLog no\n"
+    )
+    host_key = (tmp_path / "host.pub").read_text()
+    known = tmp_path / "known_hosts"
+    known.write_text(f"[127.0.0.1]:{port} {host_key}")
+    log = (tmp_path / "sshd.log").open("w")
+    daemon = subprocess.Popen(
+        [server, "-D", "-e", "-f", str(configuration)], stdin=subprocess.DEVNULL, stderr=log
+    )
+    login = (
+        *(ssh, "-tt", "-F", "none", "-p", str(port), "-i", str(tmp_path / "user")),
+        *("-o", f"UserKnownHostsFile={known}", "-o", "IdentitiesOnly=yes", "-o", "BatchMode=yes"),
+        "127.0.0.1",
+    )
+    try:
+        wait_until(lambda: _listens(port) or daemon.poll() is not None, "the SSH server")
+        assert daemon.poll() is None, (tmp_path / "sshd.log").read_text()
+        yield SshHost(login)
+    finally:
+        daemon.terminate()
+        daemon.wait(timeout=PATIENCE)
+        log.close()
+
+
+@pytest.fixture
+def terminal_with(peer: Peer, tmp_path: Path) -> Iterator[Callable[[list[str]], Terminal]]:
+    """Opens a terminal in which a command runs."""
+    tmux = (peer("tmux", "tmux"), "-S", str(tmp_path / "tmux"), "-f", os.devnull)
+    started: list[Terminal] = []
+
+    def start(command: list[str]) -> Terminal:
+        terminal = Terminal(tmux)
+        started.append(terminal)
+        # what the program said stays readable where it ends at once
+        terminal.run(
+            *("new-session", "-d", "-x", "80", "-y", "24", f"exec {shlex.join(command)}"),
+            *(";", "set-option", "-g", "remain-on-exit", "on"),
+        )
+        return terminal
+
+    yield start
+    for terminal in started:
+        with suppress(subprocess.CalledProcessError):
+            terminal.run("kill-server")
+
+
+def panel_over(host: SshHost, tmp_path: Path, *arguments: str) -> list[str]:
+    """The command that logs in and starts the panel there, which leaves its process id behind."""
+    environment = {
+        name: os.environ[name]
+        for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE", "LC_ALL", "TZ")
+    }
+    panel = shlex.join([sys.executable, "-m", "tui", *arguments])
+    settings = " ".join(f"{name}={shlex.quote(value)}" for name, value in environment.items())
+    remote = (
+        f"cd {shlex.quote(str(ROOT))} && echo $$ > {shlex.quote(str(tmp_path / 'pid'))} && "
+        f"exec env {settings} {panel}"
+    )
+    return [*host.login, f"sh -c {shlex.quote(remote)}"]
+
+
+def test_the_demo_over_ssh(
+    ssh_host: SshHost, terminal_with: Callable[[list[str]], Terminal], tmp_path: Path
+) -> None:
+    terminal = terminal_with(panel_over(ssh_host, tmp_path, "demo"))
+    terminal.wait_for("Connection", "5 found")
+    choose(terminal, "ATV71")
+    terminal.press("Enter")
+    terminal.wait_for("ATV71", "device 4", "RUNNING", "Hz")
+    terminal.press("q")
+    pid = int((tmp_path / "pid").read_text())
+    wait_until(lambda: not _runs(pid), "the panel left on its key")
+
+
+def test_a_terminal_that_stands_still_does_not_stop_the_polling(
+    ssh_host: SshHost, terminal_with: Callable[[list[str]], Terminal], tmp_path: Path
+) -> None:
+    with (
+        simulated("atv71@2", "--tcp", "127.0.0.1:0", "--run", "50") as simulation,
+        Counter(port_of(simulation.ready)).at_work() as counter,
+    ):
+        line = f"tcp:127.0.0.1:{counter.port}"
+        terminal = terminal_with(panel_over(ssh_host, tmp_path, line, "-d", "2"))
+        terminal.wait_for("RUNNING", "Hz")
+        panel = int((tmp_path / "pid").read_text())
+        assert not _stands_still(panel)
+        with stopped(terminal.client(), _parent(panel)):
+            # neither end of the session reads now; what the panel writes piles up until it
+            # can write no more
+            began = time.monotonic()
+            wait_until(lambda: _stands_still(panel), "the panel cannot write any more")
+            time.sleep(max(0.0, STALL - (time.monotonic() - began)))
+            before = counter.requests
+            wait_until(
+                lambda: counter.requests >= before + MORE_REQUESTS,
+                f"{MORE_REQUESTS} more requests while the terminal stands still",
+            )
+            assert _stands_still(panel)
+        terminal.wait_for("RUNNING", "Hz")
+        stale = terminal.text()
+        wait_until(lambda: terminal.text() != stale, "the screen goes on after the stall")
+        terminal.press("q")
+        wait_until(lambda: not _runs(panel), "the panel left on its key")
+
+
+class Counter:
+    """A TCP relay before a Modbus server that counts the requests passing through."""
+
+    def __init__(self, target: int) -> None:
+        self._target = target
+        self._listener = socket.create_server(("127.0.0.1", 0))
+        self._open: list[socket.socket] = []
+        self.port: int = self._listener.getsockname()[1]
+        self.requests = 0
+        """Chunks that the client sent: one Modbus TCP request each, as it waits for replies."""
+
+    @contextmanager
+    def at_work(self) -> Iterator[Counter]:
+        """Relay until the block ends."""
+        threads = [threading.Thread(target=self._accept, daemon=True)]
+        threads[0].start()
+        try:
+            yield self
+        finally:
+            for one in (self._listener, *self._open):
+                with suppress(OSError):
+                    one.shutdown(socket.SHUT_RDWR)
+                one.close()
+            threads[0].join()
+
+    def _accept(self) -> None:
+        while True:
+            try:
+                client, _ = self._listener.accept()
+            except OSError:
+                return
+            server = socket.create_connection(("127.0.0.1", self._target))
+            self._open += [client, server]
+            for source, sink, count in ((client, server, 1), (server, client, 0)):
+                threading.Thread(
+                    target=self._relay, args=(source, sink, count), daemon=True
+                ).start()
+
+    def _relay(self, source: socket.socket, sink: socket.socket, count: int) -> None:
+        with suppress(OSError):
+            while data := source.recv(4096):
+                self.requests += count
+                sink.sendall(data)
+
+
+def choose(terminal: Terminal, name: str) -> None:
+    """Put the mark of Connection on the drive whose reference begins with this name."""
+    lines = terminal.text().splitlines()
+    title = next(i for i, line in enumerate(lines) if "Drives ─" in line)
+    column = lines[title].index("Drives")
+    rows = [match[1] for line in lines[title + 1 :] if (match := DRIVE_ROW.match(line[column:]))]
+    place = next(i for i, reference in enumerate(rows) if reference.startswith(name))
+    terminal.press("Home", *["Down"] * place)
+
+
+@contextmanager
+def stopped(*pids: int) -> Iterator[None]:
+    """Processes that stand still while the block runs."""
+    for pid in pids:
+        os.kill(pid, signal.SIGSTOP)
+    try:
+        yield
+    finally:
+        for pid in pids:
+            os.kill(pid, signal.SIGCONT)
+
+
+def _stands_still(pid: int) -> bool:
+    """Whether a process wrote nothing to files and terminals for two seconds."""
+    before = _written(pid)
+    time.sleep(2)
+    return _written(pid) == before
+
+
+def _written(pid: int) -> int:
+    fields = Path(f"/proc/{pid}/io").read_text().split()
+    return int(fields[fields.index("wchar:") + 1])
+
+
+def _parent(pid: int) -> int:
+    return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
+
+
+def _runs(pid: int) -> bool:
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False
+
+
+def _listens(port: int) -> bool:
+    with suppress(OSError), socket.create_connection(("127.0.0.1", port), timeout=1):
+        return True
+    return False
