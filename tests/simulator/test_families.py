@@ -104,3 +104,23 @@ def test_every_word_of_every_family_can_be_read(profile: str) -> None:
         reply = simulated.answer(2, request)
         assert reply is not None, parameter.code
         assert len(reply) == 4, parameter.code
+
+
+@pytest.mark.parametrize("profile", ["atv31", "atv312", "atv71"])
+@pytest.mark.parametrize(("reaction", "hertz"), [(1, 0.0), (6, 20.0), (7, 0.0)])
+def test_a_silent_line_stops_as_sll_says(profile: str, reaction: int, hertz: float) -> None:
+    """Freewheel, ramp stop and fast stop, half a second after the time-out of 1.0 s."""
+    simulated = drive(profile, sets={"SLL": reaction, "TTO": 10})
+    frequency = simulated.profile.quantity("command_frequency")
+    assert frequency is not None
+    for address, word in ((frequency.address, 300), (8501, 6), (8501, 7), (8501, 15)):
+        body = bytes([6]) + address.to_bytes(2, "big") + word.to_bytes(2, "big")
+        assert simulated.answer(2, body) == body
+    for _ in range(8):
+        run(simulated, 0.5)
+        simulated.answer(2, bytes.fromhex("030C810001"))
+    assert simulated.motor.frequency == pytest.approx(30)
+    run(simulated, 1.6)
+    assert simulated.motor.frequency == pytest.approx(hertz, abs=3)
+    assert simulated.fault is not None
+    assert simulated.fault.raw == 5
