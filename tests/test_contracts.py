@@ -200,3 +200,13 @@ def test_nothing_in_the_project_names_this_machine() -> None:
 def test_the_test_run_keeps_out_of_the_users_folders(tmp_path: Path) -> None:
     for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
         assert Path(os.environ[name]).is_relative_to(tmp_path)
+
+
+def test_readme_tells_every_key() -> None:
+    from tui.screens.actions import ACTIONS
+
+    table = re.findall(r"^\| ([^|]+) \| [^|]+ \|$", README.partition("## Keys")[2], re.MULTILINE)
+    keys = {word for cell in table for word in re.split(r" and | or |, ", cell.strip())}
+    names = {"^p": "Ctrl+P", "[ ]": "]", "+ -": "-"}
+    missing = {names.get(action.shown, action.shown) for action in ACTIONS} - keys
+    assert missing == set()
