@@ -7,6 +7,7 @@ import logging
 from collections.abc import Callable, Iterable
 from typing import ClassVar
 
+from rich.console import RenderableType
 from textual.app import SystemCommand
 from textual.screen import Screen
 
@@ -15,6 +16,7 @@ from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line
 from tui.widgets.clock import Clock
+from tui.widgets.lean import lean
 from tui.widgets.palette import THEME
 
 from .screens.actions import ACTIONS, CONNECTION, bindings
@@ -72,6 +74,10 @@ class DrivePanelApp(Panel):
     def on_unmount(self) -> None:
         """Leave no line open."""
         self.disconnect()
+
+    def _display(self, screen: Screen[object], renderable: RenderableType | None) -> None:
+        """Send what changed, in as few bytes as that takes."""
+        super()._display(screen, lean(renderable))
 
     async def connect(self, text: str) -> None:
         """Open a line in place of the one that is open; raises the line's errors."""

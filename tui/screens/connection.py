@@ -12,6 +12,7 @@ from textual import work
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.screen import Screen
+from textual.timer import Timer
 from textual.widgets import Input, Label, OptionList
 from textual.widgets.option_list import Option
 
@@ -63,6 +64,7 @@ class ConnectionScreen(Screen[None]):
         self._choices: dict[str, LineChoice] = {}
         self._happened: tuple[str, str, str] = ("", "", "")
         self._warned: set[int] = set()
+        self._looking: list[Timer] = []
 
     def compose(self) -> ComposeResult:
         """Two columns and the lines below."""
@@ -93,16 +95,28 @@ class ConnectionScreen(Screen[None]):
         self.query_one("#keys", Lines).show([key_line(keys_of(CONNECTION))])
         self.say("", "Choose a line and press Enter, or n to type one.")
         self.action_refresh_lines()
-        self.set_interval(1.0, self.show_heads)
-        self.set_interval(LOOK, self.look)
+        self._looking = [
+            self.set_interval(1.0, self.show_heads),
+            self.set_interval(LOOK, self.look),
+        ]
         self.call_after_refresh(self.show_heads)
 
     def on_resize(self) -> None:
         """Titles have the width of their columns."""
         self.call_after_refresh(self._redraw)
 
+    def on_screen_suspend(self) -> None:
+        """Stand still while another screen is on top.
+
+        What stirs below a screen makes Textual draw the whole terminal again.
+        """
+        for timer in self._looking:
+            timer.pause()
+
     def on_screen_resume(self) -> None:
         """States may have changed meanwhile."""
+        for timer in self._looking:
+            timer.resume()
         self.call_after_refresh(self._redraw)
 
     def _redraw(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rich.style import Style
 from rich.text import Text
 from textual.geometry import Region, Size
 from textual.strip import Strip
@@ -36,13 +37,20 @@ class Lines(Widget):
             for y in range(max(len(old), len(lines)))
             if y >= len(old) or y >= len(lines) or not same(old[y], lines[y])
         ]
-        for y in changed:
-            self._strips.pop(y, None)
-        if changed and self.size.width:
+        regions = [region for y in changed for region in self._redraw(y)]
+        if regions:
             self.redrawn += len(changed)
-            self.refresh(*(Region(0, y, self.size.width, 1) for y in changed))
+            self.refresh(*regions)
         if len(old) != len(lines) and self.styles.is_auto_height:
             self.refresh(layout=True)
+
+    def _redraw(self, y: int) -> list[Region]:
+        """Draw a line anew; the parts of it that look different now."""
+        before = self._strips.pop(y, None)
+        if not (width := self.size.width):
+            return []
+        self._strips[y] = self._draw(y, width)
+        return [Region(x, y, end - x, 1) for x, end in runs(before, self._strips[y])]
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
         """One row a line."""
@@ -73,7 +81,37 @@ class Lines(Widget):
         for span in line.spans:
             styled.stylize(span.style, span.start, span.end)
         segments = list(styled.render(self.app.console, end=""))
-        return Strip(segments).apply_style(style).adjust_cell_length(width, style)
+        strip = Strip(segments).apply_style(style).adjust_cell_length(width, style)
+        return strip.simplify()
+
+
+def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
+    """Columns, first and behind the last, in which two strips of one row differ.
+
+    Runs with little between them are one: to move costs as much as to write some cells again.
+    """
+    width = after.cell_length
+    old, new = cells(before) if before is not None else [], cells(after)
+    if len(old) != width or len(new) != width:
+        return [(0, width)]
+    found: list[tuple[int, int]] = []
+    for x in range(width):
+        if old[x] == new[x]:
+            continue
+        if found and x - found[-1][1] < MOVE:
+            found[-1] = (found[-1][0], x + 1)
+        else:
+            found.append((x, x + 1))
+    return found
+
+
+MOVE = 8
+"""Bytes that moving the cursor takes."""
+
+
+def cells(strip: Strip) -> list[tuple[str, Style | None]]:
+    """The characters of a strip with their colours; fewer than its cells where some are wide."""
+    return [(character, style) for text, style, _ in strip for character in text]
 
 
 def same(one: Text, other: Text) -> bool:

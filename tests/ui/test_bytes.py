@@ -1,0 +1,167 @@
+"""What the panel sends to its terminal: little, and never something else than it shows."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.console import RenderableType
+from rich.segment import Segment
+from rich.style import Style
+from rich.text import Text
+from textual._compositor import CompositorUpdate
+from textual.app import App, ComposeResult
+from textual.containers import Horizontal
+from textual.screen import Screen
+from textual.strip import Strip
+
+from tui.widgets.lean import lean
+from tui.widgets.lines import Lines, cells, runs
+
+from .bytes_per_second import compare
+
+CONTROL = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])")
+ROWS, COLUMNS = 6, 40
+Cell = tuple[str, str]
+
+
+class Terminal:
+    """As much of a terminal as the panel's updates need: places, colours, characters."""
+
+    def __init__(self) -> None:
+        self.cells: dict[tuple[int, int], Cell] = {}
+        self._x, self._y, self._colour = 0, 0, ""
+
+    def feed(self, data: str) -> None:
+        at = 0
+        for control in CONTROL.finditer(data):
+            self._write(data[at : control.start()])
+            at = control.end()
+            if control[2] == "H":
+                row, column = control[1].split(";")
+                self._x, self._y = int(column) - 1, int(row) - 1
+            elif control[2] == "m":
+                self._colour = re.sub(r"^0;?", "", control[1])
+        self._write(data[at:])
+
+    def _write(self, text: str) -> None:
+        for character in text:
+            if character == "\n":
+                self._x, self._y = 0, self._y + 1
+            elif character != "\r":
+                self.cells[self._y, self._x] = (character, self._colour)
+                self._x += 1
+
+    def text(self) -> list[str]:
+        return [
+            "".join(self.cells.get((y, x), ("?", ""))[0] for x in range(COLUMNS))
+            for y in range(ROWS)
+        ]
+
+
+class Seen(App[None]):
+    """Two columns of lines; every update goes to a terminal that is looked at."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.terminal = Terminal()
+        self.sent = 0
+
+    def compose(self) -> ComposeResult:
+        with Horizontal():
+            yield Lines(id="left")
+            yield Lines(id="right")
+
+    def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
+        update = lean(renderable)
+        if isinstance(update, CompositorUpdate):
+            data = update.render_segments(self.console)
+            self.sent += len(data)
+            self.terminal.feed(data)
+
+
+COLOURS = [Style(color="#112233"), Style(color="#445566", bold=True), Style()]
+PIECES = st.lists(
+    st.tuples(st.text("ab█·é ", max_size=6), st.sampled_from(COLOURS)), max_size=5
+).map(lambda pieces: Text.assemble(*pieces))
+
+
+@pytest.mark.parametrize("seed", range(3))
+async def test_the_terminal_shows_what_the_screen_holds(seed: int) -> None:
+    """However the lines change, cell by cell and in colour."""
+    import random
+
+    chance = random.Random(seed)
+    app = Seen()
+    async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+        for _ in range(25):
+            for side in ("left", "right"):
+                app.query_one(f"#{side}", Lines).show([_line(chance) for _ in range(ROWS)])
+            await pilot.pause()
+            strips = app.screen._compositor.render_strips()
+            fresh = Terminal()
+            fresh.feed("\n".join(strip.render(app.console) for strip in strips))
+            assert app.terminal.text() == [strip.text for strip in strips]
+            for place, (character, colour) in fresh.cells.items():
+                assert app.terminal.cells[place] == (character, colour)
+
+
+def _line(chance: Any) -> Text:
+    line = Text()
+    for _ in range(chance.randrange(1, 5)):
+        length = chance.randrange(1, 6)
+        line.append("".join(chance.choice("ab█·1") for _ in range(length)), chance.choice(COLOURS))
+    return line
+
+
+@given(PIECES, PIECES)
+def test_runs_are_where_two_lines_differ_and_no_more_than_a_move_beyond(
+    one: Text, other: Text
+) -> None:
+    before, after = (strip_of(text) for text in (one, other))
+    found = runs(before, after)
+    old, new = cells(before), cells(after)
+    inside = {x for first, end in found for x in range(first, end)}
+    assert {x for x in range(COLUMNS) if old[x] != new[x]} <= inside
+    for first, end in found:
+        assert old[first] != new[first]
+        assert old[end - 1] != new[end - 1]
+
+
+def strip_of(text: Text) -> Strip:
+    segments = [
+        Segment(text.plain[at], text.get_style_at_offset(_console(), at))
+        for at in range(len(text.plain))
+    ]
+    return Strip(segments).adjust_cell_length(COLUMNS, Style())
+
+
+def _console() -> Any:
+    from rich.console import Console
+
+    return Console()
+
+
+async def test_showing_the_same_again_sends_nothing_and_a_digit_few_bytes() -> None:
+    app = Seen()
+    async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+        left = app.query_one("#left", Lines)
+        left.show([Text("Output   49.9 Hz")])
+        await pilot.pause()
+        app.sent = 0
+        left.show([Text("Output   49.9 Hz")])
+        await pilot.pause()
+        assert app.sent == 0
+        left.show([Text("Output   49.8 Hz")])
+        await pilot.pause()
+        assert 0 < app.sent < 60
+
+
+def test_monitor_sends_a_small_part_of_what_stock_widgets_send() -> None:
+    """Both watch the same running drive; the measure itself is `tests.ui.bytes_per_second`."""
+    ours, plain = compare(4.0)
+    assert ours.size > 0
+    assert ours.rate / plain.rate < 0.1
