@@ -12,6 +12,16 @@ from .errors import ProfileError
 from .schema import ProfileData
 
 _PLACE = re.compile(r" - at `\$(.*)`$")
+_UNKNOWN = re.compile(r"^Object contains unknown field `(.+)`$")
+_IN_WORDS: tuple[tuple[re.Pattern[str], str], ...] = (
+    (_UNKNOWN, r"there is no field `\1` here; see the schema or the guide for the fields"),
+    (re.compile(r"^Object missing required field `(.+)`$"), r"the field `\1` is missing"),
+    (re.compile(r"^Invalid enum value (.+)$"), r"\1 is none of the values allowed here"),
+    (re.compile(r"^Expected `(.+)`, got `(.+)`$"), r"must be of type \1, not \2"),
+    (re.compile(r"^Expected `(?:int|float)` (<=|>=|<|>) (.+)$"), r"must be \1 \2"),
+    (re.compile(r"^Expected `str` matching regex .*0-9.*$"), 'has the wrong form (write "0.1")'),
+    (re.compile(r"^Expected `str` matching regex (.+)$"), r"has not the form \1"),
+)
 _STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+|\.\.\.)\]")
 
 
@@ -38,10 +48,19 @@ def _describe(message: str, tables: dict[str, Any], text: str, file: str) -> str
         step: str | int = int(index) if index else name
         steps.append(step)
         node = _child(node, step)
-    line = line_of(text, steps)
+    unknown = _UNKNOWN.match(fault)
+    line = line_of(text, [*steps, unknown[1]] if unknown else steps)
     label = ".".join(str(s) if isinstance(s, str) else f"#{s + 1}" for s in steps) or "the file"
     owner = _owner(tables, steps)
-    return f"{file}:{line}: {label}{owner}: {fault}."
+    return f"{file}:{line}: {label}{owner}: {_in_words(fault)}."
+
+
+def _in_words(fault: str) -> str:
+    """A decoder's message in the words of somebody who writes a profile."""
+    for pattern, words in _IN_WORDS:
+        if pattern.match(fault):
+            return pattern.sub(words, fault)
+    return fault
 
 
 def _child(node: Any, step: str | int) -> Any:

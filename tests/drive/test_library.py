@@ -1,0 +1,206 @@
+"""Finding profiles, loading them strictly, and saying where a fault is."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tui.drive import json_schema, library
+from tui.drive.errors import ProfileError, UnknownParameter, UnknownProfile
+from tui.drive.profile import notations, parse_address
+
+SMALL = """\
+[profile]
+id = "small"
+name = "Small drive"
+vendor = "Nobody"
+version = "1"
+
+[link]
+baud = 19200
+format = "8E1"
+
+[[sources]]
+id = "manual"
+title = "A manual"
+
+[[functions]]
+code = 3
+name = "Read"
+max_read = 10
+
+[monitoring]
+values = [{ parameter = "FRQ" }]
+
+[[parameters]]
+code = "FRQ"
+name = "Frequency"
+number = "W100"
+address = 100
+unit = "Hz"
+scale = "0.1"
+access = "r"
+group = "All"
+source = "manual 1"
+confidence = "manual"
+"""
+
+
+def write(tmp_path: Path, text: str | bytes) -> Path:
+    file = tmp_path / "small.toml"
+    file.write_bytes(text if isinstance(text, bytes) else text.encode())
+    return file
+
+
+def test_a_small_profile_loads(tmp_path: Path) -> None:
+    profile = library.load_file(write(tmp_path, SMALL))
+    assert profile["FRQ"].address == 100
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ('unit = "Hz"', 'unit = "Hz"\ncolour = "red"', 29, "no field `colour`"),
+        ("address = 100", 'address = "100"', 27, "must be of type int, not str"),
+        ("address = 100", "address = 70000", 27, "must be <= 65535"),
+        ('scale = "0.1"', 'scale = "0,1"', 29, "wrong form"),
+        ('scale = "0.1"', 'scale = "0.0"', 23, "scale is 0"),
+        ('access = "r"', 'access = "x"', 30, "none of the values allowed"),
+        ('source = "manual 1"', 'source = "web"', 23, "does not begin with the id of a source"),
+        ('{ parameter = "FRQ" }', '{ parameter = "CUR" }', 20, "no parameter 'CUR'"),
+        ("code = 3\n", "code = 6\n", 15, "function 3 is missing"),
+        ('vendor = "Nobody"\n', "", 1, "`vendor` is missing"),
+        ('name = "Small drive"', 'name = "Small drive', 3, "not valid TOML"),
+        ('group = "All"', 'group = "All"\nmin = 9\nmax = 3', 23, "above max"),
+        ('group = "All"', 'group = "All"\nenumeration = "no"', 23, "no enumeration 'no'"),
+    ],
+)
+def test_a_fault_is_told_with_file_line_and_words(
+    tmp_path: Path, old: str, new: str, line: int, words: str
+) -> None:
+    assert old in SMALL
+    file = write(tmp_path, SMALL.replace(old, new))
+    with pytest.raises(ProfileError) as caught:
+        library.load_file(file)
+    text = str(caught.value)
+    assert text.startswith(str(file))
+    assert words in text
+    if "TOML" not in words:
+        told = int(text.removeprefix(f"{file}:").split(":")[0])
+        assert told == line, text
+
+
+def test_two_parameters_with_one_address(tmp_path: Path) -> None:
+    again = SMALL[SMALL.index("[[parameters]]") :].replace("FRQ", "FR2")
+    with pytest.raises(ProfileError, match="address 100 is already that of FRQ"):
+        library.load_file(write(tmp_path, SMALL + "\n" + again))
+
+
+def test_a_file_that_is_not_text(tmp_path: Path) -> None:
+    with pytest.raises(ProfileError, match="not UTF-8"):
+        library.load_file(write(tmp_path, b"\xff\xfe\x00"))
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(ProfileError, match="cannot be read"):
+        library.load_file(tmp_path / "none.toml")
+
+
+def test_an_unknown_profile_names_the_known_ones() -> None:
+    with pytest.raises(UnknownProfile, match="atv71"):
+        library.load("atv99")
+
+
+def test_a_listing_reads_the_head_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
+    (tmp_path / "profiles").mkdir()
+    (tmp_path / "profiles" / "broken.toml").write_text(
+        '[profile]\nid = "broken"\nname = "B"\nvendor = "V"\nversion = "1"\n\n[link]\n!!!!\n'
+    )
+    found = {listing.id: listing for listing in library.listings()}
+    assert found["broken"].own
+    assert found["broken"].name == "B"
+    with pytest.raises(ProfileError, match="not valid TOML"):
+        library.load_file(found["broken"].path)
+
+
+def test_a_listing_imports_no_decoder() -> None:
+    code = (
+        "import sys; from tui.drive import library; library.listings();"
+        "print([m for m in ('tomli', 'tomllib', 'tui.drive.decode') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_an_own_profile_takes_the_place_of_a_packaged_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
+    (tmp_path / "profiles").mkdir()
+    text = SMALL.replace('"small"', '"atv31"')
+    (tmp_path / "profiles" / "mine.toml").write_text(text)
+    found = {listing.id: listing for listing in library.listings()}
+    assert (found["atv31"].name, found["atv31"].own) == ("Small drive", True)
+
+
+@pytest.mark.parametrize(
+    ("text", "address"),
+    [("W9001", 9001), ("w 9 001", 9001), ("16#2329", 9001), ("0x2329", 9001), ("9001", 9001),
+     ("W99999", None), ("ACC", None), ("16#", None)],
+)  # fmt: skip
+def test_addresses(text: str, address: int | None) -> None:
+    assert parse_address(text) == address
+
+
+@pytest.mark.parametrize(
+    ("profile_id", "typed", "code"),
+    [
+        ("atv71", "acc", "ACC"),
+        ("atv71", "W9001", "ACC"),
+        ("atv71", "16#2329", "ACC"),
+        ("atv71", "9001", "ACC"),
+        ("atv21", "fd00", "FD00"),
+        ("atv21", "16#fd00", "FD00"),
+        ("atv21", "64768", "FD00"),
+        ("atv21", "f875", "F875"),
+        ("powerdrive", "1.05", "1.05"),
+        ("powerdrive", "104", "1.05"),
+        ("powerdrive", "10.40", "10.40"),
+        ("atv312", "aCc", "ACC"),
+    ],
+)
+def test_three_notations_in_any_case(profile_id: str, typed: str, code: str) -> None:
+    found = library.load(profile_id).find(typed)
+    assert found.code == code
+    assert notations(found)[0] == code
+
+
+def test_an_unknown_code_proposes_near_ones() -> None:
+    with pytest.raises(UnknownParameter, match="ACC"):
+        library.load("atv71").find("ACCC")
+
+
+@pytest.mark.parametrize(
+    ("reference", "profile_id"),
+    [("ATV71HU15M3", "atv71"), ("atv21h075m3x", "atv21"), ("ATV31HU09M3S232", "atv31"),
+     ("ATV312HU09M3", "atv312")],
+)  # fmt: skip
+def test_a_reference_finds_its_profile(reference: str, profile_id: str) -> None:
+    assert library.identify(reference)[0] == profile_id
+
+
+def test_an_unknown_reference_finds_none() -> None:
+    assert library.identify("ACS550") == []
+
+
+def test_the_committed_schema_is_up_to_date() -> None:
+    committed = library.packaged_folder() / "profile.schema.json"
+    assert committed.read_text(encoding="utf-8") == json_schema.schema_text()
+
+
+def test_a_profile_is_not_its_schema() -> None:
+    assert json_schema.profile_schema()["$defs"]["Parameter"]["additionalProperties"] is False

@@ -1,0 +1,193 @@
+"""Raw words and engineering values, both ways, for every parameter of every profile."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import msgspec
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tui.drive import library
+from tui.drive.errors import ValueRefused
+from tui.drive.profile import Profile
+from tui.drive.schema import Parameter
+from tui.drive.values import (
+    decode,
+    encode,
+    from_words,
+    is_enumeration,
+    percent_of,
+    raw_range,
+    set_bits,
+    speed_from_frequency,
+    to_words,
+    type_range,
+)
+
+PROFILES = [listing.id for listing in library.listings()]
+ALL = [(profile, p) for profile in map(library.load, PROFILES) for p in profile.parameters]
+
+
+def parameter(**fields: object) -> Parameter:
+    """A parameter with the fields that a test does not care about filled in."""
+    return msgspec.convert(
+        {
+            "code": "P",
+            "name": "p",
+            "number": "W1",
+            "address": 1,
+            "access": "rw",
+            "group": "All",
+            "source": "manual",
+            "confidence": "manual",
+            **fields,
+        },
+        Parameter,
+    )
+
+
+@settings(max_examples=1500)
+@given(which=st.integers(0, len(ALL) - 1), share=st.floats(0, 1))
+def test_raw_to_text_to_raw(which: int, share: float) -> None:
+    """What the panel shows can be typed back and gives the same raw value."""
+    profile, p = ALL[which]
+    names = profile.names(p)
+    low, high = raw_range(p)
+    raw = low + round((high - low) * share)
+    if is_enumeration(p):
+        raw = sorted(names)[round((len(names) - 1) * share)]
+    for bit in p.reserved:
+        raw &= ~(1 << bit)
+    assert from_words(p, to_words(p, raw)) == raw
+    scale = Decimal(p.scale)
+    value = decode(p, raw, names, scale)
+    same_name = [r for r, text in names.items() if text.casefold() == value.text.casefold()]
+    if len(same_name) > 1:
+        return
+    back = encode(p, value.text, names, scale)
+    assert (back.raw, back.rounded) == (raw, False)
+    if value.number is not None:
+        assert encode(p, value.display, names, scale).raw == raw
+
+
+@given(raw=st.integers(-0x8000, 0x7FFF))
+def test_signed_words(raw: int) -> None:
+    p = parameter(type="int16")
+    (word,) = to_words(p, raw)
+    assert 0 <= word <= 0xFFFF
+    assert from_words(p, [word]) == raw
+
+
+@pytest.mark.parametrize("low_first", [True, False])
+@given(raw=st.integers(-(2**31), 2**31 - 1))
+def test_words_of_32_bits(low_first: bool, raw: int) -> None:
+    p = parameter(type="int32", low_word_first=low_first)
+    words = to_words(p, raw)
+    assert len(words) == 2
+    assert from_words(p, words) == raw
+    assert words[0 if low_first else 1] == raw & 0xFFFF
+
+
+@pytest.mark.parametrize(
+    ("typed", "raw", "rounded"),
+    [("13", 130, False), ("13.05", 131, True), ("13.04 s", 130, True), ("0,5", 5, False),
+     ("1.25s", 13, True), ("999.9", 9999, False)],
+)  # fmt: skip
+def test_rounding_is_half_away_from_zero_and_told(typed: str, raw: int, rounded: bool) -> None:
+    p = parameter(unit="s", scale="0.1", min=1, max=9999)
+    found = encode(p, typed, {}, Decimal("0.1"))
+    assert (found.raw, found.rounded) == (raw, rounded)
+
+
+def test_a_negative_half_is_rounded_away_from_zero() -> None:
+    p = parameter(unit="Hz", scale="0.1", type="int16")
+    assert encode(p, "-0.25", {}, Decimal("0.1")).raw == -3
+
+
+@pytest.mark.parametrize(
+    ("typed", "words"),
+    [("1000", "out of range, 0.1 s to 999.9 s"), ("0", "out of range"), ("fast", "not a number"),
+     ("", "not a number"), ("nan", "not a number"), ("inf", "not a number"),
+     ("16#FFFFF", "does not fit"), ("16#XY", "no hexadecimal")],
+)  # fmt: skip
+def test_refusals_say_why(typed: str, words: str) -> None:
+    p = parameter(unit="s", scale="0.1", min=1, max=9999)
+    with pytest.raises(ValueRefused, match=words):
+        encode(p, typed, {}, Decimal("0.1"))
+
+
+def test_names_are_typed_in_any_case_or_as_numbers() -> None:
+    p = parameter(values={"0": "Terminals", "2": "Serial link"})
+    names = {0: "Terminals", 2: "Serial link"}
+    assert encode(p, "serial LINK", names, Decimal(1)).raw == 2
+    assert encode(p, "0", names, Decimal(1)).raw == 0
+    with pytest.raises(ValueRefused, match="none of its values"):
+        encode(p, "1", names, Decimal(1))
+
+
+def test_a_number_with_a_special_name_is_still_a_number() -> None:
+    p = parameter(values={"0": "Off"}, unit="s", min=0, max=100)
+    assert decode(p, 0, {0: "Off"}, Decimal(1)).text == "Off"
+    assert decode(p, 3, {0: "Off"}, Decimal(1)).display == "3 s"
+    assert encode(p, "off", {0: "Off"}, Decimal(1)).raw == 0
+
+
+def test_reserved_bits_stay_zero() -> None:
+    p = parameter(bits=[{"bit": 0, "name": "run"}], reserved=[3])
+    assert encode(p, "16#0001", {}, Decimal(1)).raw == 1
+    with pytest.raises(ValueRefused, match="reserved bit 3"):
+        encode(p, "16#0008", {}, Decimal(1))
+    assert [bit.name for bit in set_bits(p.bits, 9)] == ["run"]
+
+
+def test_an_unknown_scale_is_shown_raw_and_never_written() -> None:
+    p = parameter(unit="s", scale_by={"parameter": "Inr", "scales": {"1": "0.1"}})
+    value = decode(p, 30, {}, None)
+    assert value.display == "30 raw"
+    with pytest.raises(ValueRefused, match="follows Inr"):
+        encode(p, "3.0", {}, None)
+
+
+@pytest.mark.parametrize(
+    ("raw", "poles", "rpm"), [(5000, 4, 1500), (6000, 2, 3600), (3333, 4, 1000), (0, 4, 0)]
+)
+def test_speed_by_the_formula_of_the_manual(raw: int, poles: int, rpm: int) -> None:
+    assert speed_from_frequency(raw, poles) == rpm
+
+
+def test_no_motor_without_poles() -> None:
+    with pytest.raises(ValueRefused):
+        speed_from_frequency(5000, 0)
+
+
+def test_a_percentage_of_a_rating() -> None:
+    assert percent_of(Decimal("45.66"), Decimal("3.3")) == Decimal("1.5")
+    assert percent_of(Decimal(50), Decimal("0.25")) == Decimal("0.13")
+
+
+def test_every_range_fits_its_type() -> None:
+    for profile, p in ALL:
+        low, high = raw_range(p)
+        assert type_range(p)[0] <= low <= high <= type_range(p)[1], (profile.id, p.code)
+
+
+def test_every_factory_setting_is_one_the_panel_would_take() -> None:
+    for profile, p in ALL:
+        if p.factory is None or p.scale_by or p.forbidden:
+            continue
+        names = profile.names(p)
+        low, high = raw_range(p)
+        inside = low <= p.factory <= high or p.factory in names
+        assert inside, (profile.id, p.code, p.factory)
+
+
+def find_everything(profile: Profile) -> int:
+    return sum(profile.find(p.code) is p for p in profile.parameters)
+
+
+@pytest.mark.parametrize("profile_id", PROFILES)
+def test_every_code_is_found(profile_id: str) -> None:
+    profile = library.load(profile_id)
+    assert find_everything(profile) == len(profile.parameters)
