@@ -4,26 +4,29 @@ from __future__ import annotations
 
 import os
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
+
+from tui.cli.logs import stop_logging
 
 settings.register_profile("drivepanel", deadline=None)
 settings.load_profile("drivepanel")
 
 
 @pytest.fixture(autouse=True)
-def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Configuration and state folders that belong to the test."""
+def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """Home, configuration and state folders that belong to the test, and a log closed after it."""
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path / "config"))
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "state"))
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "home").mkdir()
     monkeypatch.setenv("LC_ALL", "C.UTF-8")
     monkeypatch.setenv("TZ", "UTC")
-    return tmp_path
+    yield tmp_path
+    stop_logging()
 
 
 @pytest.fixture

@@ -29,4 +29,13 @@ def start_logging(verbose: int) -> None:
     except OSError:
         handler = logging.NullHandler()
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
-    logger.handlers = [handler]
+    stop_logging()
+    logger.addHandler(handler)
+
+
+def stop_logging() -> None:
+    """Close the log."""
+    logger = logging.getLogger("drivepanel")
+    for handler in list(logger.handlers):
+        logger.removeHandler(handler)
+        handler.close()
