@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .profile import Profile
-from .schema import Chart, DirectionBit, State, StateKind, StatusBit
+from .schema import ChannelBits, Chart, DirectionBit, State, StateKind, StatusBit
 
 UNKNOWN = State(id="unknown", name="Unknown", kind="unknown", mask=0, value=0)
 Direction = Literal["forward", "reverse"]
@@ -22,6 +22,8 @@ class ChartState:
     reached: bool | None = None
     alarm: bool | None = None
     local: bool | None = None
+    channel: str = ""
+    """Who commands the drive, where the chart tells it."""
 
     @property
     def kind(self) -> StateKind:
@@ -41,6 +43,7 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
         reached=_status_bit(chart.reached, raws),
         alarm=_status_bit(chart.alarm, raws),
         local=_status_bit(chart.local, raws),
+        channel=_channel(chart.channel, raws),
     )
 
 
@@ -53,7 +56,14 @@ def watched_codes(profile: Profile) -> list[str]:
     """Codes of every word that the charts of a profile look at."""
     codes: list[str] = []
     for chart in profile.data.charts:
-        marks = (chart.direction, chart.reached, chart.alarm, chart.local, chart.when)
+        marks = (
+            chart.direction,
+            chart.reached,
+            chart.alarm,
+            chart.local,
+            chart.channel,
+            chart.when,
+        )
         codes += [chart.status, *(mark.parameter for mark in marks if mark)]
     return list(dict.fromkeys(codes))
 
@@ -62,6 +72,12 @@ def _direction(mark: DirectionBit | None, raws: Mapping[str, int]) -> Direction 
     if mark is None or (word := raws.get(mark.parameter)) is None:
         return None
     return "reverse" if word >> mark.bit & 1 == mark.reverse else "forward"
+
+
+def _channel(bits: ChannelBits | None, raws: Mapping[str, int]) -> str:
+    if bits is None or (word := raws.get(bits.parameter)) is None:
+        return ""
+    return bits.names.get(str(word >> bits.shift & bits.mask), "")
 
 
 def _status_bit(mark: StatusBit | None, raws: Mapping[str, int]) -> bool | None:

@@ -109,7 +109,14 @@ def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
         for code in (*block.slots, *block.values, *(c.parameter for c in block.choices)):
             yield ["blocks", index], code
     for index, chart in enumerate(data.charts):
-        marks = (chart.direction, chart.reached, chart.alarm, chart.local, chart.when)
+        marks = (
+            chart.direction,
+            chart.reached,
+            chart.alarm,
+            chart.local,
+            chart.channel,
+            chart.when,
+        )
         for code in (chart.status, chart.command, *(m.parameter for m in marks if m)):
             yield ["charts", index], code
     for index, reference in enumerate(data.references):

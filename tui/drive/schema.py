@@ -441,6 +441,16 @@ class StatusBit(Table, frozen=True, kw_only=True):
     value: Literal[0, 1] = 1
 
 
+class ChannelBits(Table, frozen=True, kw_only=True):
+    """Some bits of a word that tell who commands the drive."""
+
+    parameter: str
+    shift: Annotated[int, Meta(ge=0, le=15)]
+    mask: Annotated[int, Meta(ge=1, le=0xFFFF)]
+    """Mask of the value after it was shifted down."""
+    names: dict[str, str]
+
+
 class Chart(Table, frozen=True, kw_only=True):
     """A state chart: how the status word tells the state, and how commands change it."""
 
@@ -457,6 +467,7 @@ class Chart(Table, frozen=True, kw_only=True):
     reached: StatusBit | None = None
     alarm: StatusBit | None = None
     local: StatusBit | None = None
+    channel: ChannelBits | None = None
     note: str = ""
     source: str = ""
     confidence: Confidence = "manual"

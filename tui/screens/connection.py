@@ -364,17 +364,16 @@ class ConnectionScreen(Screen[None]):
 
     def _warn(self, looks: Mapping[int, Look]) -> None:
         """Say once of a drive that it trips when it is left alone."""
-        for device, look in looks.items():
-            drive = self.found.get(device)
-            if look.timeout is None or drive is None or device in self._warned:
-                continue
-            self._warned.add(device)
-            self.say(
-                f"Device {device} watches the line: left alone for {look.timeout:g} s, it does"
-                " what its communication time-out is set to.",
-                "The panel asks it on while the line is open. Enter on a drive watches it.",
-                ALARM_KIND,
-            )
+        watching = {d: look.timeout for d, look in looks.items() if look.timeout is not None}
+        if not watching or watching.keys() <= self._warned:
+            return
+        self._warned |= watching.keys()
+        which = ", ".join(f"{device} ({timeout:g} s)" for device, timeout in watching.items())
+        self.say(
+            f"Left alone so long, these drives act on their communication time-out: {which}.",
+            "The panel asks them on while the line is open. Enter on a drive watches it.",
+            ALARM_KIND,
+        )
 
     @work(exclusive=True, group="open")
     async def open_drive(self, device: int) -> None:

@@ -24,6 +24,8 @@ class DriveState:
     reached: bool | None
     alarm: bool | None
     local: bool | None
+    channel: str
+    """Who commands the drive, where its chart tells it."""
     fault: FaultCode | None
     """The fault that the drive is in now."""
     fault_raw: int | None
@@ -50,6 +52,7 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
         reached=chart.reached,
         alarm=chart.alarm,
         local=chart.local,
+        channel=chart.channel,
         fault=fault,
         fault_raw=fault_raw,
         alarms=_alarms(profile, raws),

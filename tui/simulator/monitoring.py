@@ -66,6 +66,16 @@ BY_UNIT: Mapping[Quantity, Mapping[str, Converter]] = {
 }
 """Quantities by the units that profiles may give them; the first stands for a missing unit."""
 
+UNCONFIRMED: Mapping[str, Mapping[str, Callable[[MotorState], float]]] = {
+    "leroy-somer": {
+        "4.01": lambda motor: 100 * motor.current,
+        "5.01": lambda motor: 10 * abs(motor.frequency),
+        "5.02": lambda motor: motor.voltage,
+        "5.04": lambda motor: abs(motor.rotor) * 30,
+    }
+}
+"""Words of unknown scale, by kind of chart: they move with the motor and prove nothing."""
+
 COUNTER_UNITS = 1 | 2 << 2 | 2 << 4
 """UNT of the ATV71: energy in kWh, times in h."""
 
@@ -79,6 +89,8 @@ def show_motor(body: Body) -> None:
             converter = converters.get(parameter.unit) or next(iter(converters.values()))
             body.show(quantity, converter(body, motor))
     _show_speed(body)
+    for code, convert in UNCONFIRMED.get(body.traits.kind, {}).items():
+        body.show_code(code, round(convert(motor)) & 0xFFFF)
     if body.traits.power_bit:
         body.show_code("UNT", COUNTER_UNITS)
 

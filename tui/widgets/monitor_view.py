@@ -142,7 +142,9 @@ def state_lines(view: View, width: int) -> list[Text]:
         sign = STATE_SIGNS.get(state.kind, "□")
         lines.append(Text(cut(f" {sign} {state.headline.upper()} ", width), style))
         lines.append(Text(cut(f"   {_detail(state)}", width), PLAIN))
-    lines.append(_channel(view, "Command", "command_channel"))
+    told = "" if view.lost else state.channel
+    command = pair("   Command", told, PLAIN, 14) if told else None
+    lines.append(command or _channel(view, "Command", "command_channel"))
     lines.append(_channel(view, "Reference", "reference_channel"))
     return lines
 
