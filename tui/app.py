@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 from collections.abc import Callable, Iterable
 from typing import ClassVar
 
 from rich.console import RenderableType
+from rich.text import Text
 from textual.app import SystemCommand
 from textual.screen import Screen
 
 from tui.session.drive_session import DriveSession
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
-from tui.session.state import remember_line
+from tui.session.state import remember_line, state_folder
 from tui.widgets.clock import Clock
 from tui.widgets.lean import lean
 from tui.widgets.palette import THEME
@@ -62,6 +64,7 @@ class DrivePanelApp(Panel):
         self._open = open_line
         self._start = start
         self._device = device
+        self._gone = False
 
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
@@ -71,9 +74,19 @@ class DrivePanelApp(Panel):
         if self._start is not None:
             self.call_after_refresh(self.connection.start, self._start, self._device)
 
-    def on_unmount(self) -> None:
+    async def on_unmount(self) -> None:
         """Leave no line open."""
-        self.disconnect()
+        self._gone = True
+        await self.disconnect()
+
+    def _handle_exception(self, error: Exception) -> None:
+        """An error of the panel itself: all of it to the log, one line to the person."""
+        log.error("the panel had to stop", exc_info=error)
+        super()._handle_exception(error)
+        place = state_folder() / "drivepanel.log"
+        self._exit_renderables[:] = [
+            Text(f"The panel had to stop: an error of its own ({error}). More is in {place}.")
+        ]
 
     def _display(self, screen: Screen[object], renderable: RenderableType | None) -> None:
         """Send what changed, in as few bytes as that takes."""
@@ -81,20 +94,30 @@ class DrivePanelApp(Panel):
 
     async def connect(self, text: str) -> None:
         """Open a line in place of the one that is open; raises the line's errors."""
-        self.disconnect()
-        self.opened = await asyncio.to_thread(
-            self._open, text, read_only=self.read_only, wait=CONNECT_WITHIN
-        )
+        await self.disconnect()
+        opening = asyncio.ensure_future(asyncio.to_thread(self._open_here, text))
+        try:
+            self.opened = await asyncio.shield(opening)
+        except asyncio.CancelledError:
+            opening.add_done_callback(_close_unwanted)
+            raise
         self.keeper = Keeper(self.opened.line)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 
-    def disconnect(self) -> None:
+    def _open_here(self, text: str) -> OpenLine:
+        """Open a line in a thread; closed again where the panel was left meanwhile."""
+        opened = self._open(text, read_only=self.read_only, wait=CONNECT_WITHIN)
+        if self._gone:
+            opened.close()
+        return opened
+
+    async def disconnect(self) -> None:
         """Close the open line, if there is one."""
-        if self.opened is not None:
-            log.info("closed %s", self.opened.label)
-            self.opened.close()
-            self.opened = self.keeper = None
+        opened, self.opened, self.keeper = self.opened, None, None
+        if opened is not None:
+            await asyncio.to_thread(opened.close)
+            log.info("closed %s", opened.label)
 
     def show_monitor(self, session: DriveSession) -> None:
         """Show Monitor on a drive."""
@@ -139,3 +162,9 @@ class DrivePanelApp(Panel):
     async def run_named(self, owner: object, action: str) -> None:
         """Run an action of the table on the screen or the app."""
         await self.run_action(action, owner)  # type: ignore[arg-type]
+
+
+def _close_unwanted(opening: asyncio.Future[OpenLine]) -> None:
+    """Close a line that was opened after another one had been chosen."""
+    if not opening.cancelled() and opening.exception() is None:
+        threading.Thread(target=opening.result().close, name="close line", daemon=True).start()

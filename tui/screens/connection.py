@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import ClassVar
@@ -15,8 +16,9 @@ from textual.screen import Screen
 from textual.timer import Timer
 from textual.widgets import Input, Label, OptionList
 from textual.widgets.option_list import Option
+from textual.worker import Worker, WorkerState
 
-from tui.bus.errors import LineError
+from tui.bus.errors import LineError, LinkSyntaxError
 from tui.bus.line import LineStatus
 from tui.drive import library
 from tui.drive.errors import DriveError
@@ -24,6 +26,7 @@ from tui.session.addresses import parse_addresses
 from tui.session.drive_session import DriveSession
 from tui.session.identify import DriveIdentity, ScanResult, scan
 from tui.session.keeper import Look
+from tui.session.lines import check_line
 from tui.session.state import recent_lines
 from tui.widgets.drawing import cut, key_line, rule
 from tui.widgets.lines import Lines
@@ -34,6 +37,14 @@ from .choices import LineChoice, groups
 from .hints import hint_for
 from .panel import Panel
 
+log = logging.getLogger("drivepanel")
+
+LINE_FORMS = (
+    "serial:/dev/ttyUSB0,19200,8E1",
+    "tcp:192.168.0.10:502",
+    "rtu-tcp:192.168.0.10:4001",
+    "sim:atv71@2,atv21",
+)
 LOOK = 0.5
 """Seconds between two looks at the states that the keeper has seen."""
 
@@ -220,15 +231,17 @@ class ConnectionScreen(Screen[None]):
 
     def action_type_line(self) -> None:
         """Type a line."""
-        from .line_dialog import LineDialog
+        from .ask import Ask
 
         def typed(text: str | None) -> None:
             if text:
                 self.open_line(text)
 
-        self.app.push_screen(LineDialog(self.app.line_text), typed)
+        about = "\n".join(LINE_FORMS)
+        dialog = Ask("Line to open", fault_of_line, text=self.app.line_text, about=about)
+        self.app.push_screen(dialog, typed)
 
-    @work(exclusive=True, group="line")
+    @work(exclusive=True, group="line", exit_on_error=False)
     async def open_line(self, text: str) -> None:
         """Open a line and ask for its drives."""
         self._forget_drives()
@@ -242,7 +255,7 @@ class ConnectionScreen(Screen[None]):
         self.show_heads()
         self.action_scan()
 
-    @work(exclusive=True, group="line")
+    @work(exclusive=True, group="line", exit_on_error=False)
     async def start(self, text: str, device: int | None) -> None:
         """Open a line; with a device, watch that drive as soon as it is known."""
         try:
@@ -260,9 +273,21 @@ class ConnectionScreen(Screen[None]):
             self.open_drive(device)
 
     def _forget_drives(self) -> None:
+        self.workers.cancel_group(self, "scan")
+        self.workers.cancel_group(self, "open")
         self.found.clear()
         self._warned.clear()
         self.show_drives()
+
+    def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
+        """An error that nobody foresaw: all of it to the log, one line to the person."""
+        if event.state is WorkerState.ERROR:
+            log.error("%s failed", event.worker.name, exc_info=event.worker.error)
+            self.say(
+                f"The panel failed at this: {event.worker.error}",
+                "Try again; drivepanel.log in the state folder has more.",
+                ERROR_KIND,
+            )
 
     def fail(self, error: Exception) -> None:
         """Show an error with what to try next."""
@@ -285,7 +310,7 @@ class ConnectionScreen(Screen[None]):
             return
         self.scan(wanted)
 
-    @work(exclusive=True, group="scan")
+    @work(exclusive=True, group="scan", exit_on_error=False)
     async def scan(self, devices: Sequence[int]) -> None:
         """Ask each address; drives appear as they answer."""
         opened = self.app.opened
@@ -375,7 +400,7 @@ class ConnectionScreen(Screen[None]):
             ALARM_KIND,
         )
 
-    @work(exclusive=True, group="open")
+    @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:
         """Open Monitor on a drive."""
         drive = self.found.get(device)
@@ -402,14 +427,22 @@ class ConnectionScreen(Screen[None]):
         if stopped:
             self.say("Stopped looking for drives.", "s looks again.")
 
-    def action_disconnect(self) -> None:
+    @work(exclusive=True, group="line", exit_on_error=False)
+    async def action_disconnect(self) -> None:
         """Close the line."""
-        self.workers.cancel_group(self, "scan")
         self._forget_drives()
-        self.app.disconnect()
+        await self.app.disconnect()
         self.say("The line is closed.", "Choose a line and press Enter.")
         self.show_heads()
         self.query_one("#lines", OptionList).focus()
+
+    def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
+        """Say all that the chosen drive says of itself."""
+        drives = event.option_list
+        if drives.id != "drives" or not drives.has_focus or not event.option.id:
+            return
+        if drive := self.found.get(int(event.option.id)):
+            self.say(about_drive(drive), "Enter watches it.")
 
     def action_open_chosen(self) -> None:
         """What Enter does in the lists; a field hands Enter over to the list of lines."""
@@ -422,6 +455,24 @@ class ConnectionScreen(Screen[None]):
 
 ERROR_KIND, ALARM_KIND = "error", "alarm"
 STATE_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
+
+
+def fault_of_line(text: str) -> str:
+    """What is wrong with a typed line, or nothing."""
+    try:
+        check_line(text)
+    except LinkSyntaxError as error:
+        return str(error)
+    return ""
+
+
+def about_drive(drive: FoundDrive) -> str:
+    """Vendor, reference, version, name and profile of a drive."""
+    identity = drive.identity
+    version = f"version {identity.version_text}" if identity.version else ""
+    profile = f"profile {drive.session.profile.name}" if drive.session else "no profile"
+    parts = (identity.vendor, identity.reference, version, identity.name, profile)
+    return f"Device {identity.device}: " + ", ".join(part for part in parts if part)
 
 
 def choice_line(choice: LineChoice, width: int) -> Text:

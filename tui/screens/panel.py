@@ -37,7 +37,7 @@ class Panel(App[None]):
         """Open a line in place of the one that is open; raises the line's errors."""
 
     @abstractmethod
-    def disconnect(self) -> None:
+    async def disconnect(self) -> None:
         """Close the open line, if there is one."""
 
     @abstractmethod

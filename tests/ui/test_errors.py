@@ -1,0 +1,129 @@
+"""What the panel does when something goes wrong that nobody foresaw, or comes too late."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+import time
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from textual.pilot import Pilot
+
+from tui.app import DrivePanelApp
+from tui.session.lines import OpenLine
+from tui.widgets.lines import Lines
+
+from . import fakes
+
+
+class Opener:
+    """Opens fake lines; the one called `slow` only when it is let."""
+
+    def __init__(self) -> None:
+        self.let = threading.Event()
+        self.closed: list[str] = []
+        self.opened: list[str] = []
+
+    def __call__(self, text: str, **_: Any) -> OpenLine:
+        if text == "tcp:slow":
+            assert self.let.wait(30)
+        self.opened.append(text)
+        opened = fakes.opened()
+        opened.text = text
+        opened.line.close = lambda: self.closed.append(text)  # type: ignore[method-assign]
+        return opened
+
+
+async def until(pilot: Pilot[None], holds: Callable[[], bool]) -> None:
+    end = time.monotonic() + 20
+    while not holds():
+        assert time.monotonic() < end, "it never came"
+        await pilot.pause(0.05)
+
+
+def message(app: DrivePanelApp) -> str:
+    return "\n".join(line.plain for line in app.connection.query_one("#message", Lines).lines)
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+async def test_an_unforeseen_error_is_one_line_and_the_panel_goes_on() -> None:
+    def broken(*_: Any, **__: Any) -> OpenLine:
+        raise RuntimeError("the register of lines is upside down")
+
+    app = DrivePanelApp(open_line=broken, start="tcp:anything")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: "upside down" in message(app))
+        assert "The panel failed at this" in message(app)
+        await pilot.press("question_mark", "escape")
+        assert app.screen is app.connection
+
+
+async def test_a_line_that_opens_after_another_was_chosen_is_closed() -> None:
+    opener = Opener()
+    app = DrivePanelApp(open_line=opener, start="tcp:slow")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.pause(0.2)
+        app.connection.open_line("tcp:other")
+        await until(pilot, lambda: app.line_text == "tcp:other")
+        opener.let.set()
+        await until(pilot, lambda: "tcp:slow" in opener.closed)
+        assert app.line_text == "tcp:other"
+        assert opener.closed == ["tcp:slow"]
+    assert opener.closed == ["tcp:slow", "tcp:other"]
+
+
+async def test_a_line_that_opens_after_the_panel_was_left_is_closed() -> None:
+    opener = Opener()
+    app = DrivePanelApp(open_line=opener, start="tcp:slow")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.pause(0.2)
+        await pilot.press("q")
+    opener.let.set()
+    end = time.monotonic() + 20
+    while opener.closed != ["tcp:slow"]:
+        assert time.monotonic() < end
+        await asyncio.sleep(0.05)
+
+
+async def test_an_error_of_the_panel_itself_leaves_one_line_and_no_traceback(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    app = DrivePanelApp(open_line=Opener())
+
+    def fail() -> None:
+        raise RuntimeError("a screw is loose")
+
+    async def run() -> None:
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.call_later(fail)
+            await pilot.pause(0.5)
+
+    with pytest.raises(RuntimeError, match="a screw is loose"):
+        await run()
+    said = capsys.readouterr()
+    assert "Traceback" not in said.out + said.err
+    assert "The panel had to stop" in said.err
+    assert app.return_code == 1
+
+
+@pytest.mark.parametrize("size", [(20, 5), (40, 12), (79, 23), (200, 60)])
+async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int, int]) -> None:
+    from tui.drive import library
+    from tui.screens.monitor import MonitorScreen
+
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+    async with app.run_test(size=size) as pilot:
+        snapshot = fakes.snapshot_of(library.load("atv71"), fakes.FAULT)
+        await app.push_screen(MonitorScreen(fakes.session_of(snapshot)))
+        await pilot.pause(0.4)
+        await pilot.press("w", "l", "escape", "question_mark", "escape")
+        await pilot.resize_terminal(80, 24)
+        await pilot.pause(0.4)
+        assert "FAULT" in str(app.screen.query_one("#state", Lines).lines[1])
