@@ -12,10 +12,10 @@ from textual.widgets import OptionList
 
 from tui.app import DrivePanelApp
 from tui.screens.actions import ACTIONS, EVERYWHERE
+from tui.screens.ask import Ask
 from tui.screens.connection import ConnectionScreen
 from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
-from tui.screens.line_dialog import LineDialog
 from tui.screens.monitor import MonitorScreen
 from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
@@ -41,8 +41,9 @@ async def until(pilot: Pilot[None], holds: Callable[[], bool], seconds: float = 
 
 
 def shown(app: DrivePanelApp, part: str) -> str:
-    """The text of a part of the screen on top."""
-    return "\n".join(line.plain for line in app.screen.query_one(f"#{part}", Lines).lines)
+    """The text of a part of the screen on top; nothing while it is being put together."""
+    found = app.screen.query(f"#{part}").results(Lines)
+    return "\n".join(line.plain for lines in found for line in lines.lines)
 
 
 async def to_monitor(app: DrivePanelApp, pilot: Pilot[None], device: int) -> MonitorScreen:
@@ -129,10 +130,27 @@ async def test_a_line_that_cannot_be_opened_says_what_to_try() -> None:
     app = DrivePanelApp()
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.press("n")
-        await until(pilot, lambda: isinstance(app.screen, LineDialog))
+        await until(pilot, lambda: isinstance(app.screen, Ask))
         await pilot.press(*"tcp:127.0.0.1:9", "enter")
         await until(pilot, lambda: "cannot be reached" in shown(app, "message"))
         assert app.opened is None
+
+
+async def test_percent_becomes_amperes_once_the_rating_is_told() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await to_monitor(app, pilot, 1)
+        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
+        await pilot.press("i")
+        await until(pilot, lambda: isinstance(app.screen, Ask))
+        await pilot.press(*"3x", "enter", "backspace", *".3", "enter")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+
+        def in_amperes() -> bool:
+            rows = shown(app, "motor").split("\n")
+            return any("Current" in row and " A " in row for row in rows)
+
+        await until(pilot, in_amperes)
 
 
 async def test_an_unknown_simulated_profile_is_no_crash() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from decimal import Decimal, InvalidOperation
 from typing import ClassVar
 
 from rich.text import Text
@@ -13,6 +14,7 @@ from textual.timer import Timer
 
 from tui.drive.schema import Parameter
 from tui.session.drive_session import DriveSession
+from tui.session.reader import Rating
 from tui.widgets import monitor_view as draw
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
@@ -213,8 +215,36 @@ class MonitorScreen(Screen[None]):
         self._word += 1
         self.look()
 
+    def action_rating(self) -> None:
+        """Tell the rated current of a drive that gives its current in %."""
+        from .ask import Ask
+
+        current = self.session.profile.quantity("motor_current")
+        if current is None or current.unit != "%":
+            self.app.notify("This drive gives its current in A.", timeout=3)
+            return
+
+        def told(text: str | None) -> None:
+            if text:
+                self.session.rate(current.code, Rating(Decimal(text.replace(",", ".")), "A"))
+                self.look()
+
+        about = f"100 % of {current.code}, from the nameplate of the drive; base: " + (
+            current.base or "not confirmed by a manual"
+        )
+        self.app.push_screen(Ask("Rated current in A", fault_of_rating, about=about), told)
+
     def action_frames(self) -> None:
         """The frames on the line."""
         from .frames import FramesScreen
 
         self.app.push_screen(FramesScreen(self.session.line))
+
+
+def fault_of_rating(text: str) -> str:
+    """What is wrong with a typed rated current, or nothing."""
+    try:
+        number = Decimal(text.strip().replace(",", "."))
+    except InvalidOperation:
+        return f"{text!r} is no number. Write it like 9.1."
+    return "" if 0 < number < 10000 else "A rated current is between 0 and 10 000 A."

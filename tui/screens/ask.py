@@ -1,0 +1,46 @@
+"""A dialog that asks for one text, and does not let go of a wrong one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import ClassVar
+
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.screen import ModalScreen
+from textual.widgets import Input, Label
+
+Check = Callable[[str], str]
+"""What is wrong with a text, or nothing."""
+
+
+class Ask(ModalScreen[str | None]):
+    """Asks a question; gives the answer back once it is right, or None."""
+
+    CSS_PATH = "ask.tcss"
+    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", show=False)]
+
+    def __init__(self, question: str, check: Check, *, text: str = "", about: str = "") -> None:
+        super().__init__()
+        self._question = question
+        self._check = check
+        self._text = text
+        self._about = about
+
+    def compose(self) -> ComposeResult:
+        """A field, room for what is wrong, and what an answer looks like."""
+        with Vertical(id="dialog"):
+            yield Label(self._question, id="question")
+            yield Input(self._text, id="answer", compact=True)
+            yield Label("", id="fault")
+            yield Label(self._about, id="about")
+            yield Label("Enter accept   Esc cancel", id="hint")
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Give the answer back if nothing is wrong with it."""
+        fault = self._check(event.value)
+        if fault:
+            self.query_one("#fault", Label).update(fault)
+        else:
+            self.dismiss(event.value.strip())
