@@ -20,7 +20,6 @@ from tui.session.readings import Quality, Reading
 from .drawing import aligned, bar, cut, pair, rule, trend
 from .palette import (
     ALARM,
-    ATTENTION,
     FAINT,
     FAULT,
     FAULT_BLOCK,
@@ -140,13 +139,19 @@ def state_lines(view: View, width: int) -> list[Text]:
     else:
         style = STATE_STYLES.get(state.kind, STRONG)
         sign = STATE_SIGNS.get(state.kind, "□")
-        lines.append(Text(cut(f" {sign} {state.headline.upper()} ", width), style))
+        lines.append(Text(cut(f" {sign} {_headline(state)} ", width), style))
         lines.append(Text(cut(f"   {_detail(state)}", width), PLAIN))
     told = "" if view.lost else state.channel
     command = pair("   Command", told, PLAIN, 14) if told else None
     lines.append(command or _channel(view, "Command", "command_channel"))
     lines.append(_channel(view, "Reference", "reference_channel"))
     return lines
+
+
+def _headline(state: DriveState) -> str:
+    """The headline in capitals; a fault's code as the drive's keypad writes it."""
+    words = state.headline.upper()
+    return words.replace(state.fault.code.upper(), state.fault.code) if state.fault else words
 
 
 def _detail(state: DriveState) -> str:
@@ -156,7 +161,7 @@ def _detail(state: DriveState) -> str:
     parts = []
     if state.reached is not None and state.kind == "running":
         parts.append("at reference" if state.reached else "on the ramp")
-    if state.name.casefold() not in state.headline.casefold():
+    if not parts and state.name.casefold() not in state.headline.casefold():
         parts.append(state.name)
     return ", ".join(parts)
 
@@ -253,7 +258,8 @@ def _bar(
     if parameter.quantity == "output_frequency":
         reference = view.profile.quantity("frequency_reference")
         target = view.reading(reference.code) if reference else None
-        mark = abs(target.number) if target and target.number is not None else None
+        if target and target.quality is Quality.GOOD and target.number is not None:
+            mark = abs(target.number)
         number = abs(number) if number is not None else None
     ends = f" {high:g}"
     drawn = bar(number, low, high, max(4, width - 6), mark)
@@ -330,7 +336,7 @@ def _bit_words(bit: Bit, on: bool, room: int) -> str:
     if said.casefold() in bit.name.casefold():
         return bit.name
     both = f"{bit.name}: {said}"
-    return both if len(both) <= room else said
+    return both if len(both) <= room else said[:1].upper() + said[1:]
 
 
 def stacked_trends(view: View, width: int, height: int) -> list[Text]:
@@ -361,25 +367,29 @@ def _trend(
 ) -> list[Text]:
     parameter = view.profile.quantity(quantity)
     if parameter is None:
-        nothing = Text(cut(" not known on this drive", width), FAINT)
+        nothing = Text(cut(" not known", width), FAINT)
         return [rule(title, width), nothing, *[Text(" " * width)] * (height - 2)]
     high = _trend_high(view, parameter, index)
     columns = width - 1
     step = TREND_SPAN / columns
-    rows = trend(_columns(view, index, columns, step), high, columns, height - 1)
-    span = f"0..{high:g} {parameter.unit}" + (", 60 s" if width > 30 else "")
-    lines = [rule(title, width, span)]
+    rows = trend(_columns(view, index, columns, step), high or 1.0, columns, height - 1)
+    span = f"0..{high:g} {parameter.unit}" if high else "no values yet"
+    lines = [rule(title, width, span + (", 60 s" if width > 30 else ""))]
     return lines + [Text.assemble(("│", LINE), row) for row in rows]
 
 
-def _trend_high(view: View, parameter: Parameter, index: int) -> float:
-    """The top of a trend: the end of the value's bar, else a round number above the highest."""
+def _trend_high(view: View, parameter: Parameter, index: int) -> float | None:
+    """The top of a trend: the end of the value's bar, else a round number above the highest.
+
+    None while neither is known.
+    """
     for value in view.values:
         if value.parameter == parameter.code and (end := end_of(view, value.high)):
             return end
     seen = [abs(v) for p in view.trend if (v := p.values[index]) is not None]
-    highest = max(seen, default=1.0)
-    return next((top for top in ROUND_TOPS if top >= highest), highest)
+    if not seen:
+        return None
+    return next((top for top in ROUND_TOPS if top >= max(seen)), max(seen))
 
 
 ROUND_TOPS: Sequence[float] = (1, 2, 5, 10, 20, 50, 60, 100, 200, 500, 1000, 2000, 5000, 10000)
@@ -473,7 +483,7 @@ def _line_trouble(view: View, width: int) -> list[Text]:
 def status_lines(view: View, width: int) -> list[Text]:
     """What the panel itself does: monitoring, how fast, how well the line answers."""
     text = Text(no_wrap=True)
-    text.append(" MONITORING", ATTENTION if not view.lost else ALARM)
+    text.append(" MONITORING", STRONG if not view.lost else ALARM)
     rate = view.snapshot.rate if view.snapshot else 0.0
     counts = view.counters
     bad = counts.timeouts + counts.checksum + counts.wrong
