@@ -4,41 +4,61 @@ from __future__ import annotations
 
 import os
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
 from .errors import USAGE, Failure, told
 from .options import read_only_option
 
+if TYPE_CHECKING:
+    from tui.session.lines import OpenLine
+
 DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 """Profiles of the demo and the frequency in Hz at which each motor runs."""
 
 
-def run_panel(
-    start: str | None, device: int | None, *, demo: bool = False, read_only: bool = False
-) -> None:
+DEMO_LINE = "demo"
+"""The LINE of the demo inside the panel; every other text is opened as it is written."""
+
+
+def run_panel(start: str | None, device: int | None, *, read_only: bool = False) -> None:
     """Run the panel until it is left."""
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+    if not _has_terminal():
         raise Failure("The panel needs a terminal. Without one, use read, watch or --help.", USAGE)
     os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
     from tui.app import DrivePanelApp
-    from tui.session.lines import demo_line, open_line
+    from tui.session.lines import open_line
 
     app = DrivePanelApp(
-        open_line=(lambda _text, **_: demo_line(DEMO)) if demo else open_line,
-        start="demo" if demo else start,
+        open_line=_open_with_demo if start == DEMO_LINE else open_line,
+        start=start,
         device=device,
         read_only=read_only,
     )
     app.run()
+    if app.return_code:
+        raise click.exceptions.Exit(app.return_code)  # the panel itself has said why
+
+
+def _open_with_demo(text: str, *, read_only: bool = False, wait: float | None = None) -> OpenLine:
+    """The demo's line, or any other that is chosen in the panel afterwards."""
+    from tui.session.lines import demo_line, open_line
+
+    if text == DEMO_LINE:
+        return demo_line(DEMO)
+    return open_line(text, read_only=read_only, wait=wait)
+
+
+def _has_terminal() -> bool:
+    return sys.stdin.isatty() and sys.stdout.isatty()
 
 
 @click.command()
-@read_only_option
 @told
-def demo(read_only: bool) -> None:
+def demo() -> None:
     """Open the panel on one simulated line with five running drives."""
-    run_panel(None, None, demo=True, read_only=read_only)
+    run_panel(DEMO_LINE, None)
 
 
 @click.command(hidden=True)

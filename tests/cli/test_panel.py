@@ -1,0 +1,90 @@
+"""What the command line hands to the panel, and how it ends with it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from tui.cli.main import main
+from tui.session.lines import open_line
+
+
+class FakePanel:
+    """Stands for the panel; remembers what it was given."""
+
+    given: dict[str, Any]
+    ends_with = 0
+
+    def __init__(self, **given: Any) -> None:
+        type(self).given = given
+        self.return_code: int | None = None
+
+    def run(self) -> None:
+        self.return_code = self.ends_with
+
+
+@pytest.fixture
+def panel(monkeypatch: pytest.MonkeyPatch) -> type[FakePanel]:
+    """A panel that is not drawn, on a terminal that is none."""
+    monkeypatch.setattr("tui.cli.panel._has_terminal", lambda: True)
+    monkeypatch.setattr("tui.app.DrivePanelApp", FakePanel)
+    monkeypatch.setattr(FakePanel, "ends_with", 0)
+    return FakePanel
+
+
+@pytest.mark.parametrize(
+    ("arguments", "start", "device", "read_only"),
+    [
+        ((), None, None, False),
+        (("--read-only",), None, None, True),
+        (("-v",), None, None, False),
+        (("tcp:10.0.0.5",), "tcp:10.0.0.5", None, False),
+        (("-v", "tcp:10.0.0.5", "-d", "7"), "tcp:10.0.0.5", 7, False),
+        (("--read-only", "sim:atv71@2", "-d", "2"), "sim:atv71@2", 2, True),
+        (("./read", "-d", "3"), "./read", 3, False),
+    ],
+)
+def test_the_panel_opens_on_what_was_typed(
+    panel: type[FakePanel],
+    arguments: tuple[str, ...],
+    start: str | None,
+    device: int | None,
+    read_only: bool,
+) -> None:
+    result = CliRunner().invoke(main, arguments)
+    assert result.exit_code == 0, result.output
+    given = panel.given
+    assert (given["start"], given["device"], given["read_only"]) == (start, device, read_only)
+    assert given["open_line"] is open_line
+
+
+def test_the_demo_opens_a_line_of_its_own(panel: type[FakePanel]) -> None:
+    assert CliRunner().invoke(main, ["demo"]).exit_code == 0
+    opened = panel.given["open_line"]("demo", read_only=False, wait=4.0)
+    try:
+        profiles = [drive.profile.id for drive in opened.simulation.drives]
+        assert profiles == ["atv21", "atv31", "atv312", "atv71", "powerdrive"]
+        assert opened.devices == (1, 2, 3, 4, 5)
+    finally:
+        opened.close()
+
+
+def test_a_line_chosen_in_the_demo_is_that_line(
+    panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asked: list[tuple[str, dict[str, Any]]] = []
+    monkeypatch.setattr(
+        "tui.session.lines.open_line", lambda text, **how: asked.append((text, how))
+    )
+    assert CliRunner().invoke(main, ["demo"]).exit_code == 0
+    panel.given["open_line"]("/dev/ttyUSB0", read_only=True, wait=4.0)
+    assert asked == [("/dev/ttyUSB0", {"read_only": True, "wait": 4.0})]
+
+
+def test_a_panel_that_had_to_stop_is_no_success(
+    panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(panel, "ends_with", 1)
+    assert CliRunner().invoke(main, []).exit_code == 1
