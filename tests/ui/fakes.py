@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, cast
+from typing import Any, ClassVar, cast
 
 from tui.app import DrivePanelApp
 from tui.bus.line import Counters, Frame, Line, LineState, LineStatus
@@ -134,6 +134,15 @@ class FakeLine:
 
     def close(self) -> None:
         """Nothing to close."""
+
+
+class FakeKeeper:
+    """A keeper that has looked at no drive."""
+
+    looks: ClassVar[dict[int, Any]] = {}
+
+    def stop(self) -> None:
+        """Nothing to stop."""
 
 
 ATV71 = DriveIdentity(2, "Telemecanique", "ATV71HU15M3", "0201", "MACHINE 4", "atv71", ("atv71",))

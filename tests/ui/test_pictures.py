@@ -119,7 +119,8 @@ async def line_lost(app: Any, pilot: Pilot[None]) -> None:
     app.opened = fakes.opened(fakes.LOST)
     screen = connection(app)
     screen.found = found_drives()
-    screen.show_drives()
+    app.keeper = fakes.FakeKeeper()
+    screen.look()
     screen.show_heads()
     await pilot.pause()
 

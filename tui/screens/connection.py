@@ -379,13 +379,20 @@ class ConnectionScreen(Screen[None]):
             return
         looks = keeper.looks
         before = {device: drive.state for device, drive in self.found.items()}
+        connected = self._connected()
         for device, drive in self.found.items():
-            if look := looks.get(device):
+            if not connected:
+                drive.state, drive.kind = "not known", "unknown"
+            elif look := looks.get(device):
                 drive.state = look.state.headline if look.state else "no answer"
                 drive.kind = look.state.kind if look.state else "unknown"
         if before != {device: drive.state for device, drive in self.found.items()}:
             self.show_drives()
         self._warn(looks)
+
+    def _connected(self) -> bool:
+        opened = self.app.opened
+        return opened is not None and opened.line.state.status is LineStatus.CONNECTED
 
     def _warn(self, looks: Mapping[int, Look]) -> None:
         """Say once of a drive that it trips when it is left alone."""

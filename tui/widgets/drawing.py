@@ -15,7 +15,7 @@ EIGHTHS_HIGH = " ▁▂▃▄▅▆▇█"
 
 def rule(title: str, width: int, right: str = "") -> Text:
     """The heading of a part: its title on a thin line."""
-    tail = f" {right} " if right else ""
+    tail = f" {right} " if right and len(title) + len(right) + 5 <= width else ""
     text = Text(no_wrap=True)
     text.append(f"{title} ", TITLE)
     text.append("─" * max(0, width - len(title) - 1 - len(tail) - (1 if tail else 0)), LINE)
