@@ -108,3 +108,7 @@ def test_a_channel_word_is_told_by_its_bits() -> None:
     reading = readings(profile, CCC=8)["CCC"]
     assert channel_text(profile["CCC"], reading) == "Modbus"
     assert channel_text(profile["CCC"], None) == ""
+
+
+def test_values_without_the_status_word_tell_no_state() -> None:
+    assert drive_state(drive(), readings(drive(), LFT=18)).headline == ""

@@ -32,6 +32,7 @@ class DriveState:
     """The raw fault code as read, the last fault where the family keeps it."""
     alarms: tuple[Bit, ...]
     headline: str
+    """The state in a word or two; empty where its words were not asked for."""
 
 
 def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState:
@@ -56,8 +57,13 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
         fault=fault,
         fault_raw=fault_raw,
         alarms=_alarms(profile, raws),
-        headline=_headline(chart, fault),
+        headline=_headline(chart, fault) if _asked(profile, readings) else "",
     )
+
+
+def _asked(profile: Profile, readings: Mapping[str, Reading]) -> bool:
+    """Whether the words that tell the state are among those read at all."""
+    return any(chart.status in readings for chart in profile.data.charts)
 
 
 def _present_fault(profile: Profile, chart: ChartState, raw: int | None) -> FaultCode | None:

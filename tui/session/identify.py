@@ -54,7 +54,7 @@ async def identify(
     answers at all, and the line's other errors.
     """
     try:
-        answer = await line.identify(device, priority=priority)
+        answer = await _ask(line, device, priority)
     except DeviceException:
         return DriveIdentity(device, "", "", "", "", None, ())
     except NoAnswer:
@@ -63,6 +63,16 @@ async def identify(
             raise
         return DriveIdentity(device, "", "", "", "", None, candidates)
     return await asyncio.to_thread(_identity, device, answer)
+
+
+async def _ask(line: Line, device: int, priority: Priority) -> Identification:
+    """Function 43; a person's question is asked again once, a lost reply is no absent drive."""
+    try:
+        return await line.identify(device, priority=priority)
+    except NoAnswer:
+        if priority >= Priority.BACKGROUND:
+            raise
+        return await line.identify(device, priority=priority)
 
 
 def _identity(device: int, answer: Identification) -> DriveIdentity:
