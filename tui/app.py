@@ -44,6 +44,7 @@ class DrivePanelApp(Panel):
     BINDINGS: ClassVar = bindings(None)
     ENABLE_COMMAND_PALETTE = True
     COMMAND_PALETTE_BINDING = "ctrl+p"
+    CSS = "SearchIcon { display: none; }"
 
     def __init__(
         self,

@@ -62,7 +62,16 @@ ACTIONS: tuple[Action, ...] = (
         (CONNECTION,),
         line=False,
     ),
-    Action("leave", "escape", "Esc", "lines", "Go back to Connection.", (MONITOR,)),
+    Action(
+        "watch_chosen",
+        "2",
+        "2",
+        "",
+        "Go to Monitor of the chosen drive.",
+        (CONNECTION,),
+        line=False,
+    ),
+    Action("leave", "escape,1", "Esc", "lines", "Go back to Connection.", (MONITOR,)),
     Action(
         "step_drive(-1)",
         "left_square_bracket",
@@ -96,7 +105,7 @@ ACTIONS: tuple[Action, ...] = (
         line=False,
     ),
     Action("frames", "l", "l", "frames", "Show the frames on the line.", (MONITOR,)),
-    Action("leave", "escape,l", "Esc", "back", "Go back to Monitor.", (FRAMES,)),
+    Action("leave", "escape,l,2", "Esc", "back", "Go back to Monitor.", (FRAMES,)),
     Action("hold", "h", "h", "hold", "Hold the list still, or let it run.", (FRAMES,)),
     Action("command_palette", "ctrl+p", "^p", "actions", "Find any action by its name.", app=True),
     Action("help", "question_mark,f1", "?", "help", "Show every key.", app=True),
@@ -112,10 +121,10 @@ def bindings(screen: str | None) -> list[BindingType]:
             action.id,
             action.label or action.help,
             show=False,
-            id=f"{screen or 'app'}.{action.id.partition('(')[0]}.{index}",
+            id=f"{screen or 'app'}.{action.id}",
             tooltip=action.help,
         )
-        for index, action in enumerate(ACTIONS)
+        for action in ACTIONS
         if action.app == (screen is None) and (screen is None or screen in action.screens)
     ]
 

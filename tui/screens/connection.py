@@ -456,6 +456,14 @@ class ConnectionScreen(Screen[None]):
         focused = self.focused
         (focused if isinstance(focused, OptionList) else self._lines()).action_select()
 
+    def action_watch_chosen(self) -> None:
+        """Watch the drive that is chosen in the list of drives."""
+        drives = self.query_one("#drives", OptionList)
+        if drives.highlighted is None:
+            self.say("No drive is found yet.", "Enter on a line opens it and looks.", ALARM_KIND)
+        else:
+            drives.action_select()
+
     def _lines(self) -> OptionList:
         return self.query_one("#lines", OptionList)
 

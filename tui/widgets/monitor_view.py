@@ -325,6 +325,8 @@ def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
     return text
 
 
+SHORTEST_NAME = 6
+"""Characters of a bit's name that still tell which one it is."""
 PLAIN_ANSWERS = frozenset({"", "yes", "no", "on", "off", "none", "normal", "0", "1"})
 
 
@@ -336,7 +338,12 @@ def _bit_words(bit: Bit, on: bool, room: int) -> str:
     if said.casefold() in bit.name.casefold():
         return bit.name
     both = f"{bit.name}: {said}"
-    return both if len(both) <= room else said[:1].upper() + said[1:]
+    if len(both) <= room:
+        return both
+    left = room - len(said) - 3
+    if left < SHORTEST_NAME:
+        return said[:1].upper() + said[1:]
+    return f"{bit.name[:left].rstrip()}…: {said}"
 
 
 def stacked_trends(view: View, width: int, height: int) -> list[Text]:
