@@ -48,7 +48,8 @@ class HelpScreen(ModalScreen[None]):
 def help_text(screen: str) -> Text:
     """Keys and signs of a screen."""
     text = Text()
-    text.append(f"Keys on {screen}\n", TITLE)
+    text.append(f"Keys on {screen.capitalize()}", TITLE)
+    text.append("   Esc closes\n", FAINT)
     for action in of_screen(screen):
         text.append(f"  {action.shown:<7}", KEY)
         text.append(f"{action.help}\n", PLAIN)
@@ -56,5 +57,5 @@ def help_text(screen: str) -> Text:
     for sign, colour, meaning in SIGNS:
         text.append(f"  {sign:<7}", STYLES[colour])
         text.append(f"{meaning}\n", PLAIN)
-    text.append("\nEsc closes.", FAINT)
+    text.rstrip()
     return text

@@ -6,7 +6,7 @@ from tui.bus import errors as line
 from tui.drive import errors as drive
 
 HINTS: tuple[tuple[type[Exception], str], ...] = (
-    (line.PortBusy, "Close the program that holds the port, then press Enter again."),
+    (line.PortBusy, "Enter tries again."),
     (line.PortMissing, "Plug in the adapter and press r, or choose another line."),
     (line.PortRefused, "Ask for the right to use the port (group dialout), or choose another."),
     (line.LinkSyntaxError, "n types the line again."),

@@ -341,7 +341,7 @@ def _bit_words(bit: Bit, on: bool, room: int) -> str:
     if len(both) <= room:
         return both
     left = room - len(said) - 3
-    if left < SHORTEST_NAME:
+    if " " in said or left < SHORTEST_NAME:
         return said[:1].upper() + said[1:]
     return f"{bit.name[:left].rstrip()}…: {said}"
 
