@@ -1,0 +1,249 @@
+"""Sessions on simulated drives over a real line: pseudo-terminal, pyserial, the line's thread."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tui.bus.errors import LineLost, LinkSyntaxError, NoAnswer, RequestRefused
+from tui.bus.line import Line
+from tui.drive import library
+from tui.session.addresses import parse_addresses
+from tui.session.drive_session import DriveSession
+from tui.session.identify import ScanResult, identify, scan
+from tui.session.keeper import Keeper
+from tui.session.lines import OpenLine, check_line, demo_line, open_line
+from tui.session.monitor import Snapshot
+from tui.session.readings import Quality
+from tui.session.state import recent_lines, remember_line, state_folder
+
+DRIVES = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
+ADDRESSES = {profile: address for address, profile in enumerate(DRIVES, start=1)}
+
+
+@pytest.fixture
+def five() -> Iterator[OpenLine]:
+    """One line with a running drive of each of five families."""
+    opened = demo_line(DRIVES)
+    yield opened
+    opened.close()
+
+
+def session(opened: OpenLine, profile: str) -> DriveSession:
+    return DriveSession(opened.line, ADDRESSES[profile], library.load(profile))
+
+
+async def until(holds: Callable[[], bool], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not come to that"
+        await asyncio.sleep(0.02)
+
+
+@pytest.mark.parametrize(
+    ("profile", "vendor", "reference", "name"),
+    [
+        ("atv21", "Telemecanique", "ATV21", ""),
+        ("atv31", "TELEMECANIQUE", "ATV31", ""),
+        ("atv312", "TELEMECANIQUE", "ATV312", ""),
+        ("atv71", "Telemecanique", "ATV71", "MACHINE 4"),
+    ],
+)
+async def test_identify(
+    five: OpenLine, profile: str, vendor: str, reference: str, name: str
+) -> None:
+    found = await identify(five.line, ADDRESSES[profile])
+    assert (found.vendor, found.name, found.profile) == (vendor, name, profile)
+    assert found.reference.startswith(reference)
+    assert found.version_text == "2.1"
+
+
+async def test_a_drive_without_function_43_is_found_by_its_status_word(five: OpenLine) -> None:
+    found = await identify(five.line, ADDRESSES["powerdrive"])
+    assert found.profile is None
+    assert set(found.candidates) == {"powerdrive", "proxidrive", "varmeca"}
+
+
+async def test_a_scan_finds_every_drive_and_no_other(five: OpenLine) -> None:
+    results: list[ScanResult] = []
+    await scan(five.line, range(1, 8), results.append)
+    assert [result.device for result in results] == [1, 2, 3, 4, 5]
+
+
+async def test_nobody_there(five: OpenLine) -> None:
+    with pytest.raises(NoAnswer):
+        await identify(five.line, 99)
+
+
+@pytest.mark.parametrize("profile", DRIVES)
+async def test_the_monitor_tells_what_the_motor_does(five: OpenLine, profile: str) -> None:
+    drive = session(five, profile)
+    drive.monitor.start(period=0.1)
+    await until(lambda: drive.monitor.latest is not None and drive.monitor.latest.cycle > 2)
+    latest = drive.monitor.latest
+    assert latest is not None
+    assert latest.error == ""
+    assert latest.state.kind == "running"
+    frequency = drive.profile.quantity("output_frequency")
+    if frequency is not None:
+        code = frequency.code
+        first = latest.readings[code].number or 0.0
+
+        def faster() -> bool:
+            now = drive.monitor.latest
+            return now is not None and (now.readings[code].number or 0.0) > first + 1
+
+        await until(faster)
+        assert latest.readings[code].quality is Quality.GOOD
+        assert latest.readings[code].unit == "Hz"
+    drive.close()
+    assert not drive.monitor.running
+
+
+async def test_a_lost_line_makes_values_old_and_comes_back(five: OpenLine) -> None:
+    drive = session(five, "atv71")
+    drive.monitor.start(period=0.1)
+    await until(lambda: drive.monitor.latest is not None and not drive.monitor.latest.error)
+    assert five.simulation is not None
+    five.simulation.unplug()
+
+    def all_old() -> bool:
+        latest = drive.monitor.latest
+        if latest is None or not latest.error:
+            return False
+        return latest.readings["RFR"].quality is Quality.STALE
+
+    await until(all_old)
+    latest = drive.monitor.latest
+    assert latest is not None
+    assert latest.state.kind == "unknown"
+    assert latest.rate == 0.0
+    assert drive.monitor.trend[-1].values == (None, None)
+    with pytest.raises(LineLost):
+        await drive.read(["ACC"])
+    five.simulation.replug()
+    await until(lambda: drive.monitor.latest is not None and not drive.monitor.latest.error)
+    drive.close()
+
+
+async def test_polling_goes_on_while_the_screen_stands_still(five: OpenLine) -> None:
+    drive = session(five, "atv71")
+    drive.monitor.start(period=0.1)
+    await until(lambda: drive.monitor.latest is not None)
+    assert drive.monitor.latest is not None
+    before = drive.monitor.latest.cycle
+    time.sleep(2.0)  # noqa: ASYNC251 - this loop stands still, as a stalled terminal makes it
+    assert drive.monitor.latest.cycle - before >= 10
+    drive.close()
+
+
+async def test_listeners_hear_every_cycle_until_they_leave(five: OpenLine) -> None:
+    drive = session(five, "atv312")
+    heard: list[Snapshot] = []
+    leave = drive.monitor.listen(heard.append)
+    drive.monitor.start(["LCr"], 0.05)
+    await until(lambda: len(heard) >= 5)
+    leave()
+    count = len(heard)
+    assert [s.cycle for s in heard] == list(range(1, count + 1))
+    assert list(heard[-1].readings) == ["LCr"]
+    drive.close()
+
+
+async def test_a_drive_left_alone_trips_and_a_kept_one_does_not() -> None:
+    """The Altivar 21 watches the line from the first request on, for 3 s."""
+    alone, kept = demo_line({"atv21": 35.0}), demo_line({"atv21": 35.0})
+    keeper = Keeper(kept.line)
+    keeper.keep(session(kept, "atv21"))
+    await session(alone, "atv21").read(["FD01"])
+    await asyncio.sleep(5.0)
+    try:
+        assert (await session(alone, "atv21").read(["FC90"]))["FC90"].raw == 24
+        assert (await session(kept, "atv21").read(["FC90"]))["FC90"].raw == 0
+        look = keeper.looks[1]
+        assert look.timeout == 3.0
+        assert look.state is not None
+        assert look.state.kind == "running"
+    finally:
+        keeper.stop()
+        alone.close()
+        kept.close()
+
+
+@pytest.mark.parametrize(
+    ("profile", "address", "count"),
+    [("atv31", 3102, 30), ("atv71", 3102, 64), ("atv21", 0xFD00, 2), ("atv21", 0x1876, 2),
+     ("atv21", 0x1875, 6), ("powerdrive", 1000, 21)],
+)  # fmt: skip
+async def test_no_caller_gets_past_the_limits_of_a_profile(
+    five: OpenLine, profile: str, address: int, count: int
+) -> None:
+    drive = session(five, profile)
+    before = five.line.counters.requests
+    with pytest.raises(RequestRefused):
+        await five.line.read(drive.device, address, count)
+    assert five.line.counters.requests == before
+
+
+async def test_the_indirect_block_is_a_read_the_limits_allow(five: OpenLine) -> None:
+    drive = session(five, "atv21")
+    reply = await five.line.read(drive.device, 0x1875, 5)
+    assert len(reply.words) == 5
+
+
+async def test_silence_at_an_unconfirmed_word_is_no_dead_drive() -> None:
+    from tui.simulator import DriveSpec, Simulation
+
+    simulation = Simulation([DriveSpec("powerdrive", 1, protects=frozenset({"5.01"}))])
+    with simulation:
+        opened = open_line(f"serial:{simulation.serve_pty()}", wait=3)
+        drive = DriveSession(opened.line, 1, library.load("powerdrive"))
+        readings = await drive.read(["10.40", "5.01"])
+        assert readings["10.40"].quality is Quality.GOOD
+        assert readings["5.01"].quality is Quality.BAD
+        assert "no such word" in readings["5.01"].error
+        opened.close()
+
+
+def test_lines_that_are_none() -> None:
+    for text in ("modbus", "tcp:", "rtu-tcp:host", "sim:", "sim:nothing@1,"):
+        with pytest.raises(LinkSyntaxError):
+            check_line(text)
+
+
+@pytest.mark.parametrize(
+    ("text", "addresses"), [("1-3", [1, 2, 3]), ("5,1,5", [5, 1]), (" 2 - 3 , 9", [2, 3, 9])]
+)
+def test_addresses(text: str, addresses: list[int]) -> None:
+    assert parse_addresses(text) == addresses
+
+
+@pytest.mark.parametrize("text", ["", "0", "248", "3-1", "a", "1-", "1,,2"])
+def test_addresses_that_are_none(text: str) -> None:
+    with pytest.raises(LinkSyntaxError):
+        parse_addresses(text)
+
+
+def test_recent_lines_survive_a_damaged_file() -> None:
+    remember_line("tcp:one:502")
+    remember_line("tcp:two:502")
+    remember_line("tcp:one:502")
+    assert recent_lines() == ["tcp:one:502", "tcp:two:502"]
+    file: Path = state_folder() / "recent-lines.json"
+    file.write_text("{broken", encoding="utf-8")
+    assert recent_lines() == []
+    remember_line("tcp:three:502")
+    assert recent_lines() == ["tcp:three:502"]
+
+
+async def test_a_closed_line_ends_its_thread() -> None:
+    opened = demo_line({"atv71": 10.0})
+    line: Line = opened.line
+    opened.close()
+    opened.close()
+    with pytest.raises(Exception, match="closed"):
+        await line.read(1, 3201)
