@@ -19,6 +19,9 @@ FAULT_CODE = "ObF"
 
 async def main() -> None:
     """One run a size: Connection, Monitor, a fault, help."""
+    import tui.session.lines
+
+    tui.session.lines.serial_ports = list  # the same on every machine: no port
     with tempfile.TemporaryDirectory() as folder:
         os.environ["DRIVEPANEL_STATE"] = os.environ["DRIVEPANEL_CONFIG"] = folder
         for size in SIZES:
