@@ -22,6 +22,7 @@ from tui.widgets.lean import lean
 from tui.widgets.palette import THEME
 
 from .screens.actions import ACTIONS, CONNECTION, bindings
+from .screens.confirm import Confirm
 from .screens.connection import ConnectionScreen
 from .screens.help import HelpScreen
 from .screens.panel import Panel
@@ -138,6 +139,24 @@ class DrivePanelApp(Panel):
         found = self.connection.found[drives[(drives.index(device) + step) % len(drives)]]
         if found.session is not None:
             self.switch_screen(MonitorScreen(found.session))
+
+    async def action_quit(self) -> None:
+        """Leave; where that trips a running drive, only after saying so."""
+        alone = self.keeper.left_alone() if self.keeper else {}
+        if not alone or isinstance(self.screen, Confirm):
+            self.exit()
+            return
+        which = ", ".join(f"device {device} after {time:g} s" for device, time in alone.items())
+        follows = (
+            "These motors run, and their drives watch the line. Once nobody asks them any more,"
+            f" they act on their communication time-out: {which}."
+        )
+        keys = "q or Enter leaves   Esc stays"
+        self.push_screen(Confirm("Leave the panel?", follows, keys), self._leave)
+
+    def _leave(self, sure: bool | None) -> None:
+        if sure:
+            self.exit()
 
     def action_help(self) -> None:
         """Every key of the screen on top."""

@@ -13,6 +13,7 @@ from textual.widgets import OptionList
 from tui.app import DrivePanelApp
 from tui.screens.actions import ACTIONS, EVERYWHERE
 from tui.screens.ask import Ask
+from tui.screens.confirm import Confirm
 from tui.screens.connection import ConnectionScreen
 from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
@@ -151,6 +152,22 @@ async def test_percent_becomes_amperes_once_the_rating_is_told() -> None:
             return any("Current" in row and " A " in row for row in rows)
 
         await until(pilot, in_amperes)
+
+
+async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await to_monitor(app, pilot, 2)
+        keeper = app.keeper
+        assert keeper is not None
+        await until(pilot, lambda: keeper.left_alone() == {1: 3.0})
+        await pilot.press("q")
+        await until(pilot, lambda: isinstance(app.screen, Confirm))
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        assert app.is_running
+        await pilot.press("q", "q")
+        await until(pilot, lambda: not app.is_running)
 
 
 async def test_an_unknown_simulated_profile_is_no_crash() -> None:

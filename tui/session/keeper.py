@@ -63,6 +63,17 @@ class Keeper:
         """The last look at each drive, by device."""
         return dict(self._looks)
 
+    def left_alone(self) -> dict[int, float]:
+        """Running drives that act on their communication time-out once nobody asks them.
+
+        By device, with the time-out in seconds.
+        """
+        return {
+            device: look.timeout
+            for device, look in self.looks.items()
+            if look.timeout is not None and look.state and look.state.kind == "running"
+        }
+
     def keep(self, session: DriveSession) -> None:
         """Look after a drive from now on."""
         reader = Reader(self._line, session.device, session.profile)
