@@ -15,6 +15,7 @@ from tui.drive.values import decode
 from tui.session.drive_session import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.identify import DriveIdentity
+from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine
 from tui.session.monitor import Snapshot, TrendPoint
 from tui.session.readings import Quality, Reading
@@ -141,8 +142,19 @@ class FakeKeeper:
 
     looks: ClassVar[dict[int, Any]] = {}
 
+    def left_alone(self) -> dict[int, float]:
+        """No drive trips."""
+        return {}
+
     def stop(self) -> None:
         """Nothing to stop."""
+
+
+def keeper_of(timeouts: dict[int, float]) -> Keeper:
+    """A keeper of running drives that watch the line."""
+    keeper = FakeKeeper()
+    keeper.left_alone = lambda: timeouts  # type: ignore[method-assign]
+    return cast("Keeper", keeper)
 
 
 ATV71 = DriveIdentity(2, "Telemecanique", "ATV71HU15M3", "0201", "MACHINE 4", "atv71", ("atv71",))

@@ -154,18 +154,22 @@ def test_connection(snap_compare: Compare, state: str, size: tuple[int, int]) ->
     assert snap_compare(app, terminal_size=size, run_before=show)
 
 
+OVER_MONITOR = {"help": "question_mark", "frames": "l", "leave": "q"}
+
+
 @SIZES
-@pytest.mark.parametrize("screen", ["help", "frames"])
+@pytest.mark.parametrize("screen", OVER_MONITOR)
 def test_over_monitor(snap_compare: Compare, screen: str, size: tuple[int, int]) -> None:
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
     app = fakes.app_of()
     app.opened = fakes.opened()
+    app.keeper = fakes.keeper_of({1: 3.0, 3: 10.0})
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(MonitorScreen(fakes.session_of(snapshot)))
         await pilot.pause()
         app.screen.look()  # type: ignore[attr-defined]
-        await pilot.press("question_mark" if screen == "help" else "l")
+        await pilot.press(OVER_MONITOR[screen])
         await pilot.pause()
 
     assert snap_compare(app, terminal_size=size, run_before=show)
