@@ -188,9 +188,10 @@ def test_a_terminal_that_stands_still_does_not_stop_the_polling(
         panel = int((tmp_path / "pid").read_text())
         assert not _stands_still(panel)
         with stopped(terminal.client(), _parent(panel)):
-            # neither end of the session reads now; what the panel writes piles up until it
-            # can write no more
+            # neither end of the session reads now; the panel sends so little that it would take
+            # a minute until it could write no more, so the terminal is filled beforehand
             began = time.monotonic()
+            _fill_terminal_of(panel)
             wait_until(lambda: _stands_still(panel), "the panel cannot write any more")
             time.sleep(max(0.0, STALL - (time.monotonic() - began)))
             before = counter.requests
@@ -271,6 +272,17 @@ def stopped(*pids: int) -> Iterator[None]:
     finally:
         for pid in pids:
             os.kill(pid, signal.SIGCONT)
+
+
+def _fill_terminal_of(pid: int) -> None:
+    """Fill what a process's terminal holds for its reader, with bytes that no terminal shows."""
+    terminal = os.open(f"/proc/{pid}/fd/1", os.O_WRONLY | os.O_NONBLOCK | os.O_NOCTTY)
+    try:
+        with suppress(BlockingIOError):
+            while True:
+                os.write(terminal, bytes(256))
+    finally:
+        os.close(terminal)
 
 
 def _stands_still(pid: int) -> bool:
