@@ -13,6 +13,7 @@ from rich.text import Text
 from textual.app import SystemCommand
 from textual.screen import Screen
 
+from tui.bus.errors import LineClosed
 from tui.session.drive_session import DriveSession
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
@@ -112,6 +113,7 @@ class DrivePanelApp(Panel):
         opened = self._open(text, read_only=self.read_only, wait=CONNECT_WITHIN)
         if self._gone:
             opened.close()
+            raise LineClosed
         return opened
 
     async def disconnect(self) -> None:

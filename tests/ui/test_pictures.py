@@ -12,7 +12,8 @@ from textual.widgets import OptionList
 from tui.bus.errors import PortBusy
 from tui.bus.line import LineState
 from tui.drive import library
-from tui.screens.connection import ConnectionScreen, FoundDrive
+from tui.screens.connection import ConnectionScreen
+from tui.screens.found import FoundDrive
 from tui.screens.monitor import MonitorScreen
 from tui.session.identify import DriveIdentity
 

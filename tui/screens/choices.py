@@ -4,6 +4,20 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from rich.text import Text
+
+from tui.bus.errors import LinkSyntaxError
+from tui.session.lines import check_line
+from tui.widgets.drawing import cut
+from tui.widgets.palette import FAINT, PLAIN
+
+LINE_FORMS = (
+    "serial:/dev/ttyUSB0,19200,8E1",
+    "tcp:192.168.0.10:502",
+    "rtu-tcp:192.168.0.10:4001",
+    "sim:atv71@2,atv21",
+)
+
 SIMULATED = (
     ("sim:atv21,atv31,atv312,atv71,powerdrive", "five drives on one line"),
     ("sim:atv71@2", "an Altivar 71 at address 2"),
@@ -37,3 +51,21 @@ def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
         Group("Recent", lately, "none yet: n types a line"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in SIMULATED)),
     ]
+
+
+def fault_of_line(text: str) -> str:
+    """What is wrong with a typed line, or nothing."""
+    try:
+        check_line(text)
+    except LinkSyntaxError as error:
+        return str(error)
+    return ""
+
+
+def choice_line(choice: LineChoice, width: int) -> Text:
+    """A line that can be opened, with as much of its description as there is room for."""
+    text = Text(" " + cut(choice.text, min(len(choice.text), width - 1)), PLAIN)
+    room = width - text.cell_len - 2
+    if choice.description and room >= 6:
+        text.append("  " + cut(choice.description, min(len(choice.description), room)), FAINT)
+    return text

@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import ClassVar
 
 from rich.text import Text
@@ -18,45 +17,31 @@ from textual.widgets import Input, Label, OptionList
 from textual.widgets.option_list import Option
 from textual.worker import Worker, WorkerState
 
-from tui.bus.errors import LineError, LinkSyntaxError
+from tui.bus.errors import LineError
 from tui.bus.line import LineStatus
 from tui.drive import library
 from tui.drive.errors import DriveError
 from tui.session.addresses import parse_addresses
 from tui.session.drive_session import DriveSession
-from tui.session.identify import DriveIdentity, ScanResult, scan
+from tui.session.identify import ScanResult, scan
 from tui.session.keeper import Look
-from tui.session.lines import check_line
 from tui.session.state import recent_lines
-from tui.widgets.drawing import cut, key_line, rule
+from tui.widgets.drawing import cut, key_line, rule, wrapped
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, RUNNING, STRONG
+from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
 
 from .actions import CONNECTION, bindings, keys_of
-from .choices import LineChoice, groups
+from .choices import LINE_FORMS, LineChoice, choice_line, fault_of_line, groups
+from .found import FoundDrive, about_drive, drive_line, next_step
 from .hints import hint_for
 from .panel import Panel
 
 log = logging.getLogger("drivepanel")
 
-LINE_FORMS = (
-    "serial:/dev/ttyUSB0,19200,8E1",
-    "tcp:192.168.0.10:502",
-    "rtu-tcp:192.168.0.10:4001",
-    "sim:atv71@2,atv21",
-)
+ERROR_KIND, ALARM_KIND = "error", "alarm"
+
 LOOK = 0.5
 """Seconds between two looks at the states that the keeper has seen."""
-
-
-@dataclass(slots=True)
-class FoundDrive:
-    """A drive that answered, with what is known of it."""
-
-    identity: DriveIdentity
-    session: DriveSession | None = None
-    state: str = "no profile"
-    kind: str = ""
 
 
 class ConnectionScreen(Screen[None]):
@@ -172,9 +157,9 @@ class ConnectionScreen(Screen[None]):
         happened, next_step, kind = self._happened
         width = max(10, self.size.width - 2)
         style = {ERROR_KIND: FAULT, ALARM_KIND: ALARM}.get(kind, PLAIN)
-        parts = _wrapped(happened, width, 2)
+        parts = wrapped(happened, width, 2)
         lines = [Text(f" {part}", style) for part in parts]
-        lines += [Text(f" {part}", FAINT) for part in _wrapped(next_step, width, 3 - len(lines))]
+        lines += [Text(f" {part}", FAINT) for part in wrapped(next_step, width, 3 - len(lines))]
         lines += [Text("")] * (3 - len(lines))
         self.query_one("#message", Lines).show(lines)
 
@@ -368,6 +353,7 @@ class ConnectionScreen(Screen[None]):
             self.fail(error)
             return
         drive.session = DriveSession(opened.line, identity.device, profile, identity)
+        drive.guessed = not typed and identity.profile is None
         drive.state = "asking"
         if self.app.keeper is not None:
             self.app.keeper.keep(drive.session)
@@ -449,7 +435,7 @@ class ConnectionScreen(Screen[None]):
         if drives.id != "drives" or not drives.has_focus or not event.option.id:
             return
         if drive := self.found.get(int(event.option.id)):
-            self.say(about_drive(drive), "Enter watches it.")
+            self.say(about_drive(drive), next_step(drive))
 
     def action_open_chosen(self) -> None:
         """What Enter does in the lists; a field hands Enter over to the list of lines."""
@@ -466,58 +452,3 @@ class ConnectionScreen(Screen[None]):
 
     def _lines(self) -> OptionList:
         return self.query_one("#lines", OptionList)
-
-
-ERROR_KIND, ALARM_KIND = "error", "alarm"
-STATE_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
-
-
-def fault_of_line(text: str) -> str:
-    """What is wrong with a typed line, or nothing."""
-    try:
-        check_line(text)
-    except LinkSyntaxError as error:
-        return str(error)
-    return ""
-
-
-def about_drive(drive: FoundDrive) -> str:
-    """Vendor, reference, version, name and profile of a drive."""
-    identity = drive.identity
-    version = f"version {identity.version_text}" if identity.version else ""
-    profile = f"profile {drive.session.profile.name}" if drive.session else "no profile"
-    parts = (identity.vendor, identity.reference, version, identity.name, profile)
-    return f"Device {identity.device}: " + ", ".join(part for part in parts if part)
-
-
-def choice_line(choice: LineChoice, width: int) -> Text:
-    """A line that can be opened, with as much of its description as there is room for."""
-    text = Text(" " + cut(choice.text, min(len(choice.text), width - 1)), PLAIN)
-    room = width - text.cell_len - 2
-    if choice.description and room >= 6:
-        text.append("  " + cut(choice.description, min(len(choice.description), room)), FAINT)
-    return text
-
-
-def drive_line(drive: FoundDrive, width: int) -> Text:
-    """A drive in one line: address, reference, name, version, state."""
-    identity = drive.identity
-    profile = drive.session.profile.name if drive.session else ""
-    who = identity.reference or profile or "unknown drive"
-    about = " ".join(part for part in (identity.name, identity.version_text) if part)
-    state = drive.state
-    text = Text(no_wrap=True, overflow="ellipsis")
-    text.append(f" {identity.device:>3} ", FAINT)
-    room = max(10, width - 5 - len(state) - 1)
-    text.append(cut(who, min(15, room)), STRONG)
-    text.append(f" {cut(about, max(0, room - 17))} " if room > 19 else " ", FAINT)
-    text.append(state, STATE_STYLES.get(drive.kind, PLAIN))
-    return text
-
-
-def _wrapped(text: str, width: int, most: int) -> list[str]:
-    import textwrap
-
-    if not text or most < 1:
-        return []
-    return textwrap.wrap(text, width, max_lines=most, placeholder=" …")

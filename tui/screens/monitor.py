@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from typing import ClassVar
 
@@ -12,6 +13,7 @@ from textual.events import Resize
 from textual.screen import Screen
 from textual.timer import Timer
 
+from tui.bus.line import LineState, LineStatus
 from tui.drive.schema import Parameter
 from tui.session.drive_session import DriveSession
 from tui.session.reader import Rating
@@ -50,6 +52,8 @@ class MonitorScreen(Screen[None]):
         self._timer: Timer | None = None
         self._busy: tuple[float, float] | None = None
         self._load = 0.0
+        self._was = ""
+        self._lost_since: float | None = None
 
     def compose(self) -> ComposeResult:
         """Fixed places, filled by lines."""
@@ -105,16 +109,18 @@ class MonitorScreen(Screen[None]):
     def _view(self) -> draw.View:
         now = self.app.clock.monotonic()
         monitor = self.session.monitor
-        line = self.session.line
-        counters = line.counters
+        counters = self.session.line.counters
         self._measure_load(now, counters.busy_seconds)
+        snapshot = monitor.latest
+        if snapshot is not None and not snapshot.error and snapshot.state.kind != "unknown":
+            self._was = snapshot.state.headline
         return draw.View(
             profile=self.session.profile,
             identity=self.session.identity,
             device=self.session.device,
             line_label=self.app.line_label,
-            snapshot=monitor.latest,
-            line=line.state,
+            snapshot=snapshot,
+            line=self._line_state(),
             counters=counters,
             load=self._load,
             trend=monitor.trend,
@@ -122,7 +128,18 @@ class MonitorScreen(Screen[None]):
             now=now,
             clock=self.app.clock.time_of_day(),
             read_only=self.app.read_only,
+            was=self._was,
         )
+
+    def _line_state(self) -> LineState:
+        """The state of the line; lost since it went, however often it was tried since."""
+        state = self.session.line.state
+        if state.status is not LineStatus.LOST:
+            self._lost_since = None
+            return state
+        if self._lost_since is None:
+            self._lost_since = state.since
+        return replace(state, since=self._lost_since)
 
     def _measure_load(self, now: float, busy: float) -> None:
         """Share of the last seconds in which the line was busy."""

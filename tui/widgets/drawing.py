@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections.abc import Sequence
 from decimal import Decimal
 
@@ -28,6 +29,13 @@ def rule(title: str, width: int, right: str = "") -> Text:
 def cut(text: str, width: int) -> str:
     """The text in exactly so many cells, with an ellipsis where it is too long."""
     return f"{text[: width - 1]}…" if len(text) > width else f"{text:<{width}}"
+
+
+def wrapped(text: str, width: int, most: int) -> list[str]:
+    """The text in lines of that width, at most so many."""
+    if not text or most < 1:
+        return []
+    return textwrap.wrap(text, width, max_lines=most, placeholder=" …")
 
 
 def aligned(text: str, whole: int, decimals: int) -> str:

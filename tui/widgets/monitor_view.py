@@ -80,6 +80,8 @@ class View:
     now: float
     clock: str
     read_only: bool = False
+    was: str = ""
+    """What the drive did when it was last known."""
 
     def reading(self, code: str) -> Reading | None:
         """A reading as good as it is now, not as it was when it came."""
@@ -135,7 +137,7 @@ def state_lines(view: View, width: int) -> list[Text]:
     state = snapshot.state
     if view.lost:
         lines.append(Text(cut(" ? NOT KNOWN NOW", width), ALARM))
-        lines.append(Text(cut(f"   was: {state.headline}", width), FAINT))
+        lines.append(Text(cut(f"   was: {view.was or state.headline}", width), FAINT))
     else:
         style = STATE_STYLES.get(state.kind, STRONG)
         sign = STATE_SIGNS.get(state.kind, "□")

@@ -1,0 +1,53 @@
+"""What the Connection screen says of a drive that answered."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.drive import library
+from tui.screens.found import FoundDrive, about_drive, drive_line, next_step
+from tui.session.identify import DriveIdentity
+
+from . import fakes
+
+NAMELESS = DriveIdentity(7, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
+
+
+def found(identity: DriveIdentity, profile: str | None = "atv71", *, guessed: bool) -> FoundDrive:
+    session = fakes.session_of(None)
+    if profile is not None:
+        session.profile = library.load(profile)
+    return FoundDrive(identity, session if profile else None, guessed=guessed)
+
+
+@given(st.integers(44, 120), st.text("abcABC123 ", max_size=40), st.text("abc ", max_size=16))
+def test_a_drive_fills_its_line_and_its_state_stands_at_the_end(
+    width: int, name: str, state: str
+) -> None:
+    drive = FoundDrive(replace(fakes.ATV71, name=name), None, state or "ready")
+    line = drive_line(drive, width)
+    assert line.cell_len == width
+    assert line.plain.endswith(f" {drive.state}")
+    assert "ATV71HU15M3" in line.plain
+
+
+def test_a_profile_that_is_a_guess_says_so_and_names_the_others() -> None:
+    drive = found(NAMELESS, "powerdrive", guessed=True)
+    assert "Powerdrive ?" in drive_line(drive, 48).plain
+    assert "profile Powerdrive ?" in about_drive(drive)
+    assert "proxidrive or varmeca" in next_step(drive)
+
+
+@pytest.mark.parametrize("width", [48, 80])
+def test_a_drive_that_named_itself_has_no_sign(width: int) -> None:
+    drive = found(fakes.ATV71, guessed=False)
+    assert "?" not in drive_line(drive, width).plain + about_drive(drive)
+    assert next_step(drive) == "Enter watches it."
+
+
+def test_a_drive_without_profile_says_so() -> None:
+    assert "no profile" in about_drive(found(NAMELESS, None, guessed=False))
