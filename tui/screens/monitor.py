@@ -17,9 +17,20 @@ from tui.bus.line import LineState, LineStatus
 from tui.drive.schema import Parameter
 from tui.session.drive_session import DriveSession
 from tui.session.reader import Rating
-from tui.widgets import monitor_view as draw
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
+from tui.widgets.monitor_motor import motor_lines
+from tui.widgets.monitor_state import (
+    header,
+    history_lines,
+    line_lines,
+    message_lines,
+    state_lines,
+    status_lines,
+)
+from tui.widgets.monitor_trends import stacked_trends, trend_lines
+from tui.widgets.monitor_view import View
+from tui.widgets.monitor_words import word_lines, word_pages
 
 from .actions import MONITOR, bindings, keys_of
 from .panel import Panel
@@ -106,7 +117,7 @@ class MonitorScreen(Screen[None]):
         for id, lines in self._parts(view).items():
             self.query_one(f"#{id}", Lines).show(lines)
 
-    def _view(self) -> draw.View:
+    def _view(self) -> View:
         now = self.app.clock.monotonic()
         monitor = self.session.monitor
         counters = self.session.line.counters
@@ -114,7 +125,7 @@ class MonitorScreen(Screen[None]):
         snapshot = monitor.latest
         if snapshot is not None and not snapshot.error and snapshot.state.kind != "unknown":
             self._was = snapshot.state.headline
-        return draw.View(
+        return View(
             profile=self.session.profile,
             identity=self.session.identity,
             device=self.session.device,
@@ -151,42 +162,42 @@ class MonitorScreen(Screen[None]):
             self._load = min(1.0, max(0.0, (busy - before) / (now - since)))
             self._busy = (now, busy)
 
-    def _parts(self, view: draw.View) -> dict[str, list[Text]]:
+    def _parts(self, view: View) -> dict[str, list[Text]]:
         width, height = self.size
         left = WIDE_LEFT if self.wide else SMALL_LEFT
         right = max(20, width - left - 1)
         parts = {
-            "header": draw.header(view, width),
-            "state": draw.state_lines(view, left),
-            "message": draw.message_lines(view, width),
-            "status": draw.status_lines(view, width),
+            "header": header(view, width),
+            "state": state_lines(view, left),
+            "message": message_lines(view, width),
+            "status": status_lines(view, width),
         }
         body = height - (WORDS_HEIGHT if self.wide else 0) - 5
         rest = body - len(parts["state"])
         if self.wide:
-            parts["motor"] = draw.motor_lines(view, WIDE_MOTOR, body)
-            parts["trend"] = draw.stacked_trends(view, right - WIDE_MOTOR - 1, body)
-            parts["history"] = draw.history_lines(view, left, rest)
+            parts["motor"] = motor_lines(view, WIDE_MOTOR, body)
+            parts["trend"] = stacked_trends(view, right - WIDE_MOTOR - 1, body)
+            parts["history"] = history_lines(view, left, rest)
             parts["word"] = []
             return parts | self._wide_words(view, WORDS_HEIGHT)
-        motor = draw.motor_lines(view, right, body - 4)
+        motor = motor_lines(view, right, body - 4)
         parts["motor"] = [*motor, Text("")]
-        parts["trend"] = draw.trend_lines(view, right, max(3, body - len(motor) - 1))
+        parts["trend"] = trend_lines(view, right, max(3, body - len(motor) - 1))
         parts["history"] = []
-        pages = draw.word_pages(self._words(), rest - 1)
+        pages = word_pages(self._words(), rest - 1)
         page = pages[self._word % len(pages)] if pages else None
-        parts["word"] = draw.word_lines(view, page, left) if page else []
+        parts["word"] = word_lines(view, page, left) if page else []
         return parts
 
-    def _wide_words(self, view: draw.View, height: int) -> dict[str, list[Text]]:
+    def _wide_words(self, view: View, height: int) -> dict[str, list[Text]]:
         """Three words from the chosen one on, and the counters of the line."""
         parts: dict[str, list[Text]] = {}
-        pages = draw.word_pages(self._words(), height - 1)
+        pages = word_pages(self._words(), height - 1)
         for index in range(3):
             shown = index < len(pages)
             page = pages[(self._word + index) % len(pages)] if shown else None
-            parts[f"word{index}"] = draw.word_lines(view, page, WORD_WIDTH - 1) if page else []
-        parts["word3"] = draw.line_lines(view, WORD_WIDTH - 1, height)
+            parts[f"word{index}"] = word_lines(view, page, WORD_WIDTH - 1) if page else []
+        parts["word3"] = line_lines(view, WORD_WIDTH - 1, height)
         return parts
 
     def _words(self) -> list[Parameter]:

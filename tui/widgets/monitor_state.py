@@ -1,0 +1,215 @@
+"""What the drive does, in words: state, faults, alarms, the line; pure functions."""
+
+from __future__ import annotations
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.bus.line import LineStatus
+from tui.drive.schema import Quantity
+from tui.drive.values import NOT_AVAILABLE
+from tui.session.drive_state import DriveState, channel_text
+from tui.session.readings import Quality
+
+from .drawing import cut, pair, rule
+from .monitor_view import View, age_text
+from .palette import (
+    ALARM,
+    FAINT,
+    FAULT,
+    FAULT_BLOCK,
+    LINE,
+    PLAIN,
+    RUNNING,
+    STALE,
+    STRONG,
+)
+
+STATE_STYLES: dict[str, Style] = {
+    "running": RUNNING,
+    "fault": FAULT_BLOCK,
+    "unknown": ALARM,
+    "stopping": PLAIN,
+}
+STATE_SIGNS = {"running": "▶", "fault": "■", "unknown": "?"}
+
+
+def header(view: View, width: int) -> list[Text]:
+    """Which drive, on which line, how busy it is, and the time."""
+    name = view.identity.name if view.identity else ""
+    reference = view.identity.reference if view.identity else ""
+    who = " ".join(part for part in (reference or view.profile.name, name) if part)
+    left = f" {who} · device {view.device} · {view.line_label}"
+    right = f"load {view.load * 100:3.0f} %  {view.clock} "
+    text = Text(no_wrap=True)
+    text.append(cut(left, max(0, width - len(right) - 1)), STRONG)
+    text.append(" " + right, FAINT)
+    return [text]
+
+
+def state_lines(view: View, width: int) -> list[Text]:
+    """What the motor does, in words, and who tells it to."""
+    lines = [rule("State", width)]
+    snapshot = view.snapshot
+    if snapshot is None:
+        lines.append(Text(" waiting for the first values", ALARM))
+        lines += [Text("")] * 3
+        return lines
+    state = snapshot.state
+    if view.lost:
+        lines.append(Text(cut(" ? NOT KNOWN NOW", width), ALARM))
+        lines.append(Text(cut(f"   was: {view.was or state.headline}", width), FAINT))
+    else:
+        style = STATE_STYLES.get(state.kind, STRONG)
+        sign = STATE_SIGNS.get(state.kind, "□")
+        lines.append(Text(cut(f" {sign} {_headline(state)} ", width), style))
+        lines.append(Text(cut(f"   {_detail(state)}", width), PLAIN))
+    told = "" if view.lost else state.channel
+    command = pair("   Command", told, PLAIN, 14) if told else None
+    lines.append(command or _channel(view, "Command", "command_channel"))
+    lines.append(_channel(view, "Reference", "reference_channel"))
+    return lines
+
+
+def _headline(state: DriveState) -> str:
+    """The headline in capitals; a fault's code as the drive's keypad writes it."""
+    words = state.headline.upper()
+    return words.replace(state.fault.code.upper(), state.fault.code) if state.fault else words
+
+
+def _detail(state: DriveState) -> str:
+    """What the headline does not say: at reference or not, and the chart's own name."""
+    if state.kind == "fault" and state.fault is not None:
+        return state.fault.name
+    parts = []
+    if state.reached is not None and state.kind == "running":
+        parts.append("at reference" if state.reached else "on the ramp")
+    if not parts and state.name.casefold() not in state.headline.casefold():
+        parts.append(state.name)
+    return ", ".join(parts)
+
+
+def _channel(view: View, label: str, quantity: Quantity) -> Text:
+    parameter = view.profile.quantity(quantity)
+    if parameter is None:
+        return Text("")
+    reading = view.reading(parameter.code)
+    text = channel_text(parameter, reading)
+    if reading is not None and reading.quality is not Quality.GOOD:
+        return pair(f"   {label}", f"was {text}", FAINT, 14)
+    return pair(f"   {label}", text or NOT_AVAILABLE, PLAIN if text else FAINT, 14)
+
+
+def message_lines(view: View, width: int) -> list[Text]:
+    """Two lines: what is wrong, or that nothing is."""
+    return [Text(" ") + line if line.plain else line for line in _messages(view, width - 2)]
+
+
+def _messages(view: View, width: int) -> list[Text]:
+    if view.line.status is not LineStatus.CONNECTED:
+        return _line_trouble(view, width)
+    snapshot = view.snapshot
+    if snapshot is None:
+        return [Text("connecting to the drive", FAINT), Text("")]
+    if snapshot.error:
+        return [
+            Text(cut("NO VALUES: what is shown is old", width), ALARM),
+            Text(cut(snapshot.error, width), STALE),
+        ]
+    state = snapshot.state
+    if state.fault is not None:
+        fault = state.fault
+        cause = fault.cause or "The profile gives no cause; see the drive's manual."
+        remedy = f" Do: {fault.remedy}" if fault.remedy else ""
+        return [
+            Text(cut(f"FAULT {fault.code} ({fault.raw}) {fault.name}", width), FAULT),
+            Text(cut(cause + remedy, width), PLAIN),
+        ]
+    return [_alarm_line(view, state, width), _last_fault(view, width)]
+
+
+def _alarm_line(view: View, state: DriveState, width: int) -> Text:
+    if state.kind == "fault":
+        return Text(cut("FAULT, code not read", width), FAULT)
+    if state.alarms:
+        names = ", ".join(bit.name for bit in state.alarms)
+        return Text(cut(f"ALARM {names}", width), ALARM)
+    if state.alarm:
+        return Text(cut("ALARM shown by the status word", width), ALARM)
+    return Text("no fault · no alarm", FAINT)
+
+
+def _last_fault(view: View, width: int) -> Text:
+    faults = view.profile.data.faults
+    reading = view.reading(faults.parameter) if faults.parameter else None
+    if reading is None or reading.raw in (None, faults.none):
+        return Text("")
+    known = view.profile.fault(reading.raw or 0)
+    name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
+    return Text(cut(f"last fault: {name}", width), FAINT)
+
+
+def _line_trouble(view: View, width: int) -> list[Text]:
+    line = view.line
+    since = age_text(max(0.0, view.now - line.since))
+    if line.status is LineStatus.CONNECTING:
+        head = Text(cut(f"CONNECTING for {since}", width), ALARM)
+    else:
+        again = ""
+        if line.next_try is not None:
+            again = f", trying again in {max(0.0, line.next_try - view.now):.0f} s"
+        word = "LINE LOST" if line.status is LineStatus.LOST else "LINE CLOSED"
+        head = Text(cut(f"{word} for {since}{again}", width), ALARM)
+    return [head, Text(cut(line.reason, width), STALE)]
+
+
+def status_lines(view: View, width: int) -> list[Text]:
+    """What the panel itself does: monitoring, how fast, how well the line answers."""
+    text = Text(no_wrap=True)
+    text.append(" MONITORING", STRONG if not view.lost else ALARM)
+    rate = view.snapshot.rate if view.snapshot else 0.0
+    counts = view.counters
+    bad = counts.timeouts + counts.checksum + counts.wrong
+    text.append(f"  {rate:4.1f} of {1 / view.period:.1f} cycles/s", FAINT)
+    text.append(f"  {counts.requests} requests, {bad} without a good answer", FAINT)
+    if view.read_only:
+        text.append("  read-only", FAINT)
+    text.truncate(width)
+    return [text]
+
+
+def history_lines(view: View, width: int, height: int) -> list[Text]:
+    """The drive's fault history, the newest first."""
+    lines = [rule("Fault history", width)]
+    for number, code in enumerate(view.profile.data.faults.history, start=1):
+        reading = view.reading(code)
+        text = Text(no_wrap=True)
+        text.append(f" {number} ", LINE)
+        text.append(cut(code, 6), FAINT)
+        if reading is None or reading.raw is None:
+            text.append(NOT_AVAILABLE, FAINT)
+        else:
+            fault = view.profile.fault(reading.raw)
+            name = f"{fault.code} {fault.name}" if fault else f"code {reading.raw}"
+            text.append(cut(name, max(0, width - 9)), PLAIN)
+        lines.append(text)
+    if len(lines) == 1:
+        lines.append(Text(" not known on this drive", FAINT))
+    return lines[:height]
+
+
+def line_lines(view: View, width: int, height: int) -> list[Text]:
+    """The counters of the line."""
+    c = view.counters
+    rows = (
+        ("Requests", str(c.requests)),
+        ("Replies", str(c.replies)),
+        ("No answer", str(c.timeouts)),
+        ("Damaged", str(c.checksum)),
+        ("Wrong", str(c.wrong)),
+        ("Refused", str(c.exceptions)),
+        ("Thrown away", str(c.stale)),
+        ("Bytes out, in", f"{c.bytes_out} {c.bytes_in}"),
+    )
+    lines = [rule("Line", width)]
+    return (lines + [pair(f" {label}", value, PLAIN, 16) for label, value in rows])[:height]
