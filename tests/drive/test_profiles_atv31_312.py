@@ -9,6 +9,7 @@ import pytest
 from tui.drive import library
 from tui.drive.chart import state_of
 from tui.drive.profile import Profile
+from tui.drive.values import encode
 
 
 @pytest.fixture(params=["atv31", "atv312"])
@@ -123,3 +124,18 @@ def test_confidence() -> None:
 def test_the_access_code_is_never_offered(profile: Profile) -> None:
     assert profile["COd"].forbidden
     assert 14 in profile["CMI"].reserved
+
+
+@pytest.mark.parametrize(
+    ("code", "typed"),
+    [("UnS", "400 V"), ("nCr", "22.5 A"), ("ItH", "22.5 A"), ("Ctd", "22.5 A"), ("SdC1", "9.0 A"),
+     ("CLI", "30.0 A"), ("HSP", "60.0 Hz"), ("tdC1", "0.5 s")],
+)  # fmt: skip
+def test_what_a_large_drive_needs_can_be_typed(profile: Profile, code: str, typed: str) -> None:
+    parameter = profile[code]
+    scale = profile.scale(parameter, {})
+    assert encode(parameter, typed, profile.names(parameter), scale).rounded is False
+
+
+def test_the_access_level_warns(profile: Profile) -> None:
+    assert "starts the motor at once" in profile["LAC"].note
