@@ -139,3 +139,14 @@ def test_what_a_large_drive_needs_can_be_typed(profile: Profile, code: str, type
 
 def test_the_access_level_warns(profile: Profile) -> None:
     assert "starts the motor at once" in profile["LAC"].note
+
+
+def test_names_of_values_are_this_family_s_own() -> None:
+    """Sister families name other things with the same raw values."""
+    profile = library.load("atv312")
+    names = {code: profile.names(profile[code]) for code in ("NCV", "VCAL", "dO", "LAC", "IPL")}
+    assert (names["NCV"][1], names["NCV"][13]) == ("0.18 kW", "15 kW")
+    assert names["VCAL"][3] == "380-500 V, 3 phases"
+    assert (names["dO"][129], names["dO"][1]) == ("Motor current", "Drive fault")
+    assert list(names["LAC"].values()) == ["L1", "L2", "L3"]
+    assert names["IPL"][1] == "Fast stop"
