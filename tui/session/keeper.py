@@ -8,6 +8,7 @@ as long as the line is open. The same requests tell the state of the drives in a
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -21,6 +22,8 @@ from .drive_session import DriveSession
 from .drive_state import DriveState, drive_state
 from .reader import Reader
 from .readings import Reading
+
+log = logging.getLogger("drivepanel")
 
 GLANCE = 3.0
 """Seconds between two looks at a drive that does not watch the line."""
@@ -96,8 +99,16 @@ class Keeper:
             now = time.monotonic()
             for kept in list(self._kept.values()):
                 if kept.due <= now and not _watched_enough(kept):
-                    await self._look_at(kept)
+                    await self._guarded(kept)
             await asyncio.sleep(STEP)
+
+    async def _guarded(self, kept: _Kept) -> None:
+        """Look at a drive; what goes wrong with one must not leave the others alone."""
+        try:
+            await self._look_at(kept)
+        except Exception:
+            log.exception("looking after device %s failed", kept.session.device)
+            kept.due = time.monotonic() + GLANCE
 
     async def _look_at(self, kept: _Kept) -> None:
         profile = kept.session.profile

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from tui.bus.errors import LineError
 from tui.bus.line import Line, LineState, Priority, Worker
 from tui.drive.chart import watched_codes
+from tui.drive.errors import DriveError
 from tui.drive.profile import Profile
 from tui.drive.schema import Quantity
 
@@ -147,7 +148,7 @@ class Monitor:
             error = ""
             try:
                 readings.update(await self.reader.read(due or slow, priority=Priority.POLL))
-            except LineError as fault:
+            except (LineError, DriveError) as fault:
                 error = str(fault)
                 self.reader.forget()  # what answers next may be another drive
             else:
