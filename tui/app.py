@@ -144,21 +144,44 @@ class DrivePanelApp(Panel):
 
     async def action_quit(self) -> None:
         """Leave; where that trips a running drive, only after saying so."""
-        alone = self.keeper.left_alone() if self.keeper else {}
-        if not alone or isinstance(self.screen, Confirm):
+        asked = self._question("Leave the panel?", "q or Enter leaves   Esc stays")
+        if asked is None or isinstance(self.screen, Confirm):
             self.exit()
-            return
+        else:
+            self.push_screen(asked, self._leave)
+
+    def _leave(self, sure: bool | None) -> None:
+        if sure:
+            self.exit()
+
+    async def may_let_go(self, question: str, keys: str) -> bool:
+        """Whether the drives of the line may be left alone; asks where that trips one that runs.
+
+        Belongs into a worker: it waits for the answer.
+        """
+        asked = self._question(question, keys)
+        if asked is None:
+            return True
+        answer: asyncio.Future[bool | None] = asyncio.get_running_loop().create_future()
+
+        def told(sure: bool | None) -> None:
+            if not answer.done():  # who asked may have given up meanwhile
+                answer.set_result(sure)
+
+        self.push_screen(asked, told)
+        return bool(await answer)
+
+    def _question(self, question: str, keys: str) -> Confirm | None:
+        """What to ask before the drives are left alone; None where that trips none."""
+        alone = self.keeper.left_alone() if self.keeper else {}
+        if not alone:
+            return None
         which = ", ".join(f"device {device} after {time:g} s" for device, time in alone.items())
         follows = (
             "These motors run, and their drives watch the line. Once nobody asks them any more,"
             f" they act on their communication time-out: {which}."
         )
-        keys = "q or Enter leaves   Esc stays"
-        self.push_screen(Confirm("Leave the panel?", follows, keys), self._leave)
-
-    def _leave(self, sure: bool | None) -> None:
-        if sure:
-            self.exit()
+        return Confirm(question, follows, keys)
 
     def action_help(self) -> None:
         """Every key of the screen on top."""

@@ -12,7 +12,8 @@ import pytest
 from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
-from tui.session.lines import OpenLine
+from tui.screens.confirm import Confirm
+from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
 
 from . import fakes
@@ -127,3 +128,16 @@ async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int,
         await pilot.resize_terminal(80, 24)
         await pilot.pause(0.4)
         assert "FAULT" in str(app.screen.query_one("#state", Lines).lines[1])
+
+
+async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:
+    app = DrivePanelApp(open_line=lambda *_, **__: demo_line({"atv21": 35.0}), start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.keeper is not None and app.keeper.left_alone() == {1: 3.0})
+        for answer in ("escape", "y"):
+            assert app.opened is not None
+            await pilot.press("x")
+            await until(pilot, lambda: isinstance(app.screen, Confirm))
+            await pilot.press(answer)
+            await until(pilot, lambda: app.screen is app.connection)
+        await until(pilot, lambda: app.opened is None)

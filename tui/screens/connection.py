@@ -39,6 +39,7 @@ from .panel import Panel
 log = logging.getLogger("drivepanel")
 
 ERROR_KIND, ALARM_KIND = "error", "alarm"
+CLOSE_KEYS = "y or Enter closes it   Esc keeps it"
 
 LOOK = 0.5
 """Seconds between two looks at the states that the keeper has seen."""
@@ -229,6 +230,8 @@ class ConnectionScreen(Screen[None]):
     @work(exclusive=True, group="line", exit_on_error=False)
     async def open_line(self, text: str) -> None:
         """Open a line and ask for its drives."""
+        if not await self.app.may_let_go("Close the line for another?", CLOSE_KEYS):
+            return
         self._forget_drives()
         self.say(f"Opening {text}", "")
         try:
@@ -422,7 +425,9 @@ class ConnectionScreen(Screen[None]):
 
     @work(exclusive=True, group="line", exit_on_error=False)
     async def action_disconnect(self) -> None:
-        """Close the line."""
+        """Close the line; where that trips a running drive, only after saying so."""
+        if not await self.app.may_let_go("Close the line?", CLOSE_KEYS):
+            return
         self._forget_drives()
         await self.app.disconnect()
         self.say("The line is closed.", "Choose a line and press Enter.")

@@ -41,6 +41,13 @@ class Panel(App[None]):
         """Close the open line, if there is one."""
 
     @abstractmethod
+    async def may_let_go(self, question: str, keys: str) -> bool:
+        """Whether the drives of the line may be left alone; asks where that trips one that runs.
+
+        Belongs into a worker: it waits for the answer.
+        """
+
+    @abstractmethod
     def show_monitor(self, session: DriveSession) -> None:
         """Show Monitor on a drive."""
 
