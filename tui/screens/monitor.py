@@ -40,7 +40,7 @@ REFRESH = 0.25
 WIDE = (110, 36)
 """Columns and rows from which all words stand side by side."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-SMALL_LEFT = 31
+SMALL_LEFT = 32
 WIDE_LEFT = 34
 WORD_WIDTH = 30
 WORDS_HEIGHT = 16

@@ -130,7 +130,7 @@ def key_line(keys: Sequence[tuple[str, str]]) -> Text:
 
 
 def pair(label: str, value: str, style: Style = PLAIN, width: int = 12) -> Text:
-    """A dim label and its value."""
+    """A dim label and its value, behind a label of `width`."""
     text = Text(no_wrap=True)
     text.append(f"{label:<{width}}", FAINT)
     text.append(value, style)

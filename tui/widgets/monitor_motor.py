@@ -50,7 +50,10 @@ def motor_lines(view: View, width: int, height: int) -> list[Text]:
     barred = any(value.high for value in shown)
     label = LABEL_WIDTH if barred else max(LABEL_WIDTH, width - NUMBER_WIDTH - UNIT_WIDTH - 3)
     lines += [_measurement(view, value, width, min(label, 40)) for value in shown]
-    return lines[:height]
+    if len(lines) > (height := max(1, height)):
+        hidden = len(lines) - height + 1
+        lines[height - 1 :] = [Text(f" {hidden} more values in a taller terminal", FAINT)]
+    return lines
 
 
 def _is_measurement(profile: Profile, value: MonitoringValue) -> bool:
@@ -83,9 +86,8 @@ def _measurement(view: View, value: MonitoringValue, width: int, label_width: in
 
 def _append_value(text: Text, parameter: Parameter, reading: Reading | None, now: float) -> None:
     if reading is None or reading.raw is None:
-        text.append(
-            f"{NOT_AVAILABLE:>{NUMBER_WIDTH}} {cut(parameter.unit or 'raw', UNIT_WIDTH)}", FAINT
-        )
+        text.append(f"{NOT_AVAILABLE:>{NUMBER_WIDTH}}", FAINT)
+        text.append(f" {cut(parameter.unit or 'raw', UNIT_WIDTH)}", FAINT)
         return
     shown, unit = reading.text, reading.unit or "raw"
     if reading.physical is not None:

@@ -65,9 +65,9 @@ def state_lines(view: View, width: int) -> list[Text]:
         lines.append(Text(cut(f" {sign} {_headline(state)} ", width), style))
         lines.append(Text(cut(f"   {_detail(state)}", width), PLAIN))
     told = "" if view.lost else state.channel
-    command = pair("   Command", told, PLAIN, 14) if told else None
-    lines.append(command or _channel(view, "Command", "command_channel"))
-    lines.append(_channel(view, "Reference", "reference_channel"))
+    command = _who("Command", told, PLAIN, width) if told else None
+    lines.append(command or _channel(view, "Command", "command_channel", width))
+    lines.append(_channel(view, "Reference", "reference_channel", width))
     return lines
 
 
@@ -89,15 +89,24 @@ def _detail(state: DriveState) -> str:
     return ", ".join(parts)
 
 
-def _channel(view: View, label: str, quantity: Quantity) -> Text:
+def _who(label: str, who: str, style: Style, width: int) -> Text:
+    """Who gives the command or the reference."""
+    room = max(1, width - WHO_AT)
+    return pair(f"   {label}", cut(who, min(len(who), room)), style, WHO_AT)
+
+
+WHO_AT = 13
+
+
+def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
     parameter = view.profile.quantity(quantity)
     if parameter is None:
         return Text("")
     reading = view.reading(parameter.code)
     text = channel_text(parameter, reading)
     if reading is not None and reading.quality is not Quality.GOOD:
-        return pair(f"   {label}", f"was {text}", FAINT, 14)
-    return pair(f"   {label}", text or NOT_AVAILABLE, PLAIN if text else FAINT, 14)
+        return _who(label, f"was {text}", FAINT, width)
+    return _who(label, text or NOT_AVAILABLE, PLAIN if text else FAINT, width)
 
 
 def message_lines(view: View, width: int) -> list[Text]:

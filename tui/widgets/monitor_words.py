@@ -82,10 +82,13 @@ def _bit_words(bit: Bit, on: bool, room: int) -> str:
         return bit.name
     if said.casefold() in bit.name.casefold():
         return bit.name
+    alone = said[:1].upper() + said[1:]
+    if bit.name.casefold() in said.casefold():
+        return alone
     both = f"{bit.name}: {said}"
     if len(both) <= room:
         return both
     left = room - len(said) - 3
     if " " in said or left < SHORTEST_NAME:
-        return said[:1].upper() + said[1:]
+        return alone
     return f"{bit.name[:left].rstrip()}…: {said}"
