@@ -150,3 +150,15 @@ def test_names_of_values_are_this_family_s_own() -> None:
     assert (names["dO"][129], names["dO"][1]) == ("Motor current", "Drive fault")
     assert list(names["LAC"].values()) == ["L1", "L2", "L3"]
     assert names["IPL"][1] == "Fast stop"
+
+
+def test_reactions_have_the_names_of_the_keypad(profile: Profile) -> None:
+    watch = profile.data.communication_fault
+    assert watch is not None
+    found = {r.raw: (r.code, r.name) for r in watch.reactions}
+    assert found == {
+        0: ("nO", "Ignored"),
+        1: ("YES", "Freewheel"),
+        6: ("rMP", "Ramp stop"),
+        7: ("FSt", "Fast stop"),
+    }
