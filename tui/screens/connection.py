@@ -234,31 +234,31 @@ class ConnectionScreen(Screen[None]):
             return
         self._forget_drives()
         self.say(f"Opening {text}", "")
-        try:
-            await self.app.connect(text)
-        except (LineError, DriveError) as error:
-            self.fail(error)
-            return
-        self.action_refresh_lines()
-        self.show_heads()
-        self.action_scan()
+        if await self._opens(text):
+            self.action_scan()
 
     @work(exclusive=True, group="line", exit_on_error=False)
     async def start(self, text: str, device: int | None) -> None:
         """Open a line; with a device, watch that drive as soon as it is known."""
-        try:
-            await self.app.connect(text)
-        except (LineError, DriveError) as error:
-            self.fail(error)
+        if not await self._opens(text):
             return
-        self.action_refresh_lines()
-        self.show_heads()
         if device is None:
             self.action_scan()
             return
         await self.scan([device]).wait()
         if device in self.found:
             self.open_drive(device)
+
+    async def _opens(self, text: str) -> bool:
+        """Whether the line could be opened; if not, why is shown."""
+        try:
+            await self.app.connect(text)
+        except (LineError, DriveError) as error:
+            self.fail(error)
+            return False
+        self.action_refresh_lines()
+        self.show_heads()
+        return True
 
     def _forget_drives(self) -> None:
         self.workers.cancel_group(self, "scan")
@@ -435,8 +435,12 @@ class ConnectionScreen(Screen[None]):
         self.query_one("#lines", OptionList).focus()
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
-        """Say all that the chosen drive says of itself."""
+        """Say all that the chosen drive says of itself; a line that is no port has no settings."""
         drives = event.option_list
+        if drives.id == "lines":
+            choice = self._choices.get(event.option.id or "")
+            for setting in ("#baud", "#format"):
+                self.query_one(setting, Input).disabled = not (choice and choice.path)
         if drives.id != "drives" or not drives.has_focus or not event.option.id:
             return
         if drive := self.found.get(int(event.option.id)):
