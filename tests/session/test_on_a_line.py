@@ -174,6 +174,23 @@ async def test_a_drive_left_alone_trips_and_a_kept_one_does_not() -> None:
         kept.close()
 
 
+async def test_a_drive_watched_from_the_start_is_judged_by_its_monitor() -> None:
+    """The keeper learns the time-out though a monitor is at work, and takes its newer state."""
+    opened = demo_line({"atv21": 35.0})
+    drive = session(opened, "atv21")
+    drive.monitor.start(period=0.2)
+    keeper = Keeper(opened.line)
+    keeper.keep(drive)
+    try:
+        await until(lambda: keeper.left_alone() == {1: 3.0})
+        assert opened.simulation is not None
+        opened.simulation.drive(1).halt()
+        await until(lambda: keeper.left_alone() == {})
+    finally:
+        keeper.stop()
+        opened.close()
+
+
 @pytest.mark.parametrize(
     ("profile", "address", "count"),
     [("atv31", 3102, 30), ("atv71", 3102, 64), ("atv21", 0xFD00, 2), ("atv21", 0x1876, 2),

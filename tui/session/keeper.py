@@ -74,8 +74,16 @@ class Keeper:
         return {
             device: look.timeout
             for device, look in self.looks.items()
-            if look.timeout is not None and look.state and look.state.kind == "running"
+            if look.timeout is not None and self._runs(device, look)
         }
+
+    def _runs(self, device: int, look: Look) -> bool:
+        """Whether a motor runs, by its drive's own monitor where that is the newer."""
+        kept = self._kept.get(device)
+        latest = kept.session.monitor.latest if kept and kept.session.monitor.running else None
+        newer = latest is not None and latest.time > look.time and not latest.error
+        state = latest.state if latest is not None and newer else look.state
+        return state is not None and state.kind == "running"
 
     def keep(self, session: DriveSession) -> None:
         """Look after a drive from now on."""
@@ -149,9 +157,12 @@ def _seconds(reading: Reading, off: int | None) -> float | None:
 
 
 def _watched_enough(kept: _Kept) -> bool:
-    """Whether the drive's own monitor asks it often enough already."""
+    """Whether the drive's own monitor asks it often enough already.
+
+    Not before the drive's time-out is known: until then the keeper asks for itself.
+    """
     monitor = kept.session.monitor
-    return monitor.running and monitor.period <= (kept.period or GLANCE)
+    return kept.period is not None and monitor.running and monitor.period <= kept.period
 
 
 def _state_codes(profile: Profile) -> list[str]:
