@@ -6,7 +6,7 @@ import pytest
 
 from tui.bus.backoff import pause
 from tui.bus.devices import CALM, Devices
-from tui.bus.errors import LineBusy, LineClosed
+from tui.bus.errors import LineBusy, LineClosed, Superseded
 from tui.bus.jobs import Job, JobQueue
 from tui.bus.line import Priority, Timing
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
@@ -225,3 +225,65 @@ def test_trace_is_bounded() -> None:
     for time in range(5):
         trace.add(time, "out", bytes([time]))
     assert [frame_.data for frame_ in trace.frames()] == [b"\2", b"\3", b"\4"]
+
+
+def write(value: int, register: int = 8502, *, replaceable: bool = True) -> Job:
+    request = WriteOne(1, register, value)
+    return Job(request, Priority.OPERATOR_WRITE, WIDE, replaceable=replaceable)
+
+
+def test_a_newer_reference_takes_the_place_of_one_that_waits() -> None:
+    queue = JobQueue(20)
+    other, first, second = job(Priority.OPERATOR_WRITE), write(300), write(500)
+    for each in (first, other, second):
+        queue.put(each)
+    with pytest.raises(Superseded, match="8502 of device 1"):
+        first.answer.result(0)
+    assert [queue.take(now, 0.0)[0] for _ in range(3)] == [second, other, None]
+
+
+@pytest.mark.parametrize(
+    ("older", "between", "newer"),
+    [
+        (write(6, 8501, replaceable=False), None, write(7, 8501, replaceable=False)),
+        (write(6, 8501, replaceable=False), None, write(7, 8501)),
+        (write(300), write(15, 8501, replaceable=False), write(500)),
+        (write(300), None, write(500, 8602)),
+    ],
+    ids=["commands", "a reference after a command", "a command between", "another register"],
+)
+def test_nothing_else_is_ever_replaced(older: Job, between: Job | None, newer: Job) -> None:
+    queue = JobQueue(20)
+    jobs = [each for each in (older, between, newer) if each is not None]
+    for each in jobs:
+        queue.put(each)
+    assert [queue.take(now, 0.0)[0] for _ in jobs] == jobs
+
+
+def test_a_reference_under_way_is_not_replaced() -> None:
+    queue = JobQueue(20)
+    first, second = write(300), write(500)
+    queue.put(first)
+    assert queue.take(now, 0.0)[0] is first
+    first.begun = True
+    queue.put(second)
+    assert not first.answer.done()
+
+
+def test_a_feed_is_not_held_back_but_skips_what_may_come_late() -> None:
+    devices = Devices(Timing(), mistakable=True)
+    request = Read(1, 3201, 1)
+    devices.silent(1, request.expectation(), 10.0, 11.0)
+    assert devices.not_before(1, request.expectation(), Priority.POLL, 11.0) > 11.0
+    assert devices.not_before(1, request.expectation(), Priority.FEED, 11.0) == 0.0
+    assert devices.backed_off(1, Priority.FEED, 11.0) is None
+    assert devices.doubts(1, request.expectation(), 11.0) == (False, 1)
+
+
+def test_when_a_device_was_last_heard() -> None:
+    devices = Devices(Timing(), mistakable=True)
+    expectation = Read(1, 3201, 1).expectation()
+    assert devices.state(1).heard is None
+    devices.answered(1, expectation, 0.005, 5.0)
+    devices.silent(1, expectation, 6.0, 7.0)
+    assert devices.state(1).heard == 5.0

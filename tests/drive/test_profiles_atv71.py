@@ -523,5 +523,6 @@ def test_errata_are_carried_along(atv71: Profile) -> None:
 def test_monitoring_set(atv71: Profile) -> None:
     rates = {value.parameter: value.rate for value in atv71.data.monitoring.values}
     assert [code for code, rate in rates.items() if rate == "fast"][:3] == ["RFR", "FRH", "RFRD"]
-    assert {"LCR", "OTR", "UOP", "ETA", "LFT"} <= {c for c, r in rates.items() if r == "fast"}
+    assert {"LCR", "OTR", "UOP", "ETA"} <= {c for c, r in rates.items() if r == "fast"}
     assert {"THD", "THR", "ULN", "APH", "RTH"} <= {c for c, r in rates.items() if r == "slow"}
+    assert {c for c, r in rates.items() if r == "on-change"} == {"LFT", "LRS6"}

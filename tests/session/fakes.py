@@ -10,7 +10,7 @@ import msgspec
 
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.limits import Limits
-from tui.bus.line import Line, Priority, Reply
+from tui.bus.line import DeviceState, Line, Priority, Reply
 from tui.bus.link import SerialLink
 from tui.drive.profile import Profile
 from tui.drive.schema import ProfileData
@@ -27,6 +27,10 @@ class FakeLine:
         self.silent = False
         self.requests: list[tuple[int, int]] = []
         self.limits: dict[int, Limits] = {}
+        self.turnaround: float | None = None
+
+    def device_state(self, device: int) -> DeviceState:
+        return DeviceState(None, 0, None, None, self.turnaround, None)
 
     def describe(self, device: int, limits: Limits) -> None:
         self.limits[device] = limits

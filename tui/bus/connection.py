@@ -67,6 +67,7 @@ class Connection:
         self._dispatcher = dispatcher
         self._changed = changed
         self._failures = 0
+        self._lost_since: float | None = None
         self.refusal: LineError | None = None
         """Why requests are failed at once; None while they are taken."""
 
@@ -121,4 +122,9 @@ class Connection:
     ) -> None:
         now = self._around.clock()
         next_try = None if delay is None else now + delay
-        self._changed(LineState(status, reason, now, next_try), error)
+        if status is not LineStatus.LOST:
+            self._lost_since = None
+        elif self._lost_since is None:
+            self._lost_since = now
+        since = now if self._lost_since is None else self._lost_since
+        self._changed(LineState(status, reason, since, next_try), error)

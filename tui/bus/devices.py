@@ -57,6 +57,7 @@ class Device:
     settle: float = 0.0
     """Quiet time after each reply of a device that repeats its replies later."""
     calm: int = 0
+    heard: float | None = None
     last: Expectation | None = None
     last_time: float = 0.0
 
@@ -89,6 +90,7 @@ class Devices:
             record.silent_since,
             record.next_try,
             record.turnaround,
+            record.heard,
         )
 
     def time_out(self, device: int, function: int, priority: Priority) -> float:
@@ -117,9 +119,10 @@ class Devices:
         """When a request may go out at the earliest.
 
         Held back while an earlier request's reply could be taken for its own, and while the
-        line is left quiet for a late reply. A stop is never held back.
+        line is left quiet for a late reply. A stop is never held back, nor is a read that keeps
+        a drive from tripping: replies that may come first are skipped instead.
         """
-        if priority is Priority.STOP:
+        if priority <= Priority.FEED:
             return 0.0
         expires = [
             late.expires
@@ -151,6 +154,7 @@ class Devices:
         """A reply came, or a refusal."""
         record = self[device]
         record.answers = record.ever_answered = True
+        record.heard = now
         record.failures = 0
         record.silent_since = record.next_try = None
         _remember(record, expectation.function, turnaround)

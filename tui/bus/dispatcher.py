@@ -27,7 +27,7 @@ from .tally import Tally
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""
 UNKNOWN_FATE = " Whether it was taken is not known; read the register back before trying again."
-REPEATED_WHEN_SILENT = frozenset({Priority.STOP, Priority.OPERATOR_WRITE, Priority.OPERATOR_READ})
+REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL))
 
 
 class Dispatcher:

@@ -56,6 +56,16 @@ class LineBusy(LineError):
     """Too many requests wait for the line; this one was not queued."""
 
 
+class Superseded(LineError):
+    """A write that was never sent, because a newer one of the same register took its place."""
+
+    def __init__(self, device: int, register: int) -> None:
+        super().__init__(
+            f"A newer value for register {register} of device {device} took the place of this"
+            " one, which was not sent."
+        )
+
+
 class RequestRefused(LineError):
     """A request that was never sent: past the device's limits, or the line is read-only."""
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from .errors import LineBusy, LineError
+from .errors import LineBusy, LineError, Superseded
 from .expectation import Expectation
 from .limits import Limits
 from .model import Priority
@@ -38,6 +38,8 @@ class Job:
     expectation: Expectation | None = None
     order: int = 0
     """Place among the jobs of its priority; kept when it is sent again."""
+    replaceable: bool = False
+    """Whether a newer write of the same register may take its place while it waits."""
 
     def __post_init__(self) -> None:
         # made now, in the thread of the one who asks: the line's own has a silence to keep
@@ -72,11 +74,35 @@ class JobQueue:
 
         A stop always finds room; polls and background work leave half of it to the operator.
         """
+        if job.replaceable and (older := self._replaced_by(job)) is not None:
+            self._jobs.remove(older)
+            older.fail(Superseded(job.request.device, job.request.register))
+            job.order = older.order
+            self._jobs.append(job)
+            return
         room = self._length if job.priority < Priority.POLL else self._length // 2
         if job.priority is not Priority.STOP and len(self._jobs) >= room:
             raise LineBusy(f"{len(self._jobs)} requests wait for the line already; try again.")
         job.order = next(self._orders)
         self._jobs.append(job)
+
+    def _replaced_by(self, job: Job) -> Job | None:
+        """A waiting write whose place this one may take.
+
+        Only where nothing else that changes the device waits behind it, so that no command
+        ever meets another reference than those before and after it.
+        """
+        request = job.request
+        behind = [
+            other
+            for other in sorted(self._jobs, key=lambda other: (other.priority, other.order))
+            if other.request.device in (request.device, BROADCAST) and other.request.changes
+        ]
+        older = behind[-1] if behind else None
+        if older is None or older.begun or not older.replaceable:
+            return None
+        same = (older.priority, type(older.request), older.request.register)
+        return older if same == (job.priority, type(request), request.register) else None
 
     def put_back(self, job: Job) -> None:
         """Queue a job that is sent again, at its old place."""

@@ -23,6 +23,7 @@ from .model import (
     Reply,
     Timing,
 )
+from .pace import Pace
 from .requests import (
     BROADCAST,
     Diagnose,
@@ -78,6 +79,8 @@ class Line:
         self.link = link
         self.read_only = read_only
         self.timing = timing or Timing()
+        self.pace = Pace()
+        """Shares the line's time out among regular polls."""
         self._engine = Engine(link, self.timing, clock)
 
     def open(self, *, wait: float | None = None) -> None:
@@ -134,15 +137,18 @@ class Line:
         *,
         priority: Priority = Priority.OPERATOR_WRITE,
         multiple: bool | None = None,
+        replaceable: bool = False,
     ) -> float:
         """Write registers, once; returns when the answer came (line's clock, seconds).
 
         One word goes by function 6 and more by 16, unless `multiple` says which; a device with
-        only one of them gets that. The answer alone proves little: read back.
+        only one of them gets that. The answer alone proves little: read back. A `replaceable`
+        write (a reference, never a command) raises Superseded without having been sent when a
+        newer one of the same register came while it waited.
         """
         limits = self._devices[device].limits
         request = _write(device, address, values, multiple, limits.functions)
-        return (await self._ask(request, priority)).time
+        return (await self._ask(request, priority, replaceable=replaceable)).time
 
     async def read_write(
         self,
@@ -214,14 +220,19 @@ class Line:
         return self._engine.on_state(listener)
 
     async def _ask(
-        self, request: Request, priority: Priority, limits: Limits | None = None
+        self,
+        request: Request,
+        priority: Priority,
+        limits: Limits | None = None,
+        *,
+        replaceable: bool = False,
     ) -> Answer:
         """Check a request, queue it, await its answer."""
         limits = limits or self._devices[request.device].limits
         reason = refusal(request, limits, read_only=self.read_only)
         if reason:
             raise RequestRefused(reason)
-        job = Job(request, priority, limits)
+        job = Job(request, priority, limits, replaceable=replaceable)
         self._engine.submit(job)
         return await asyncio.wrap_future(job.answer)
 

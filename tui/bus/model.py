@@ -11,10 +11,12 @@ class Priority(IntEnum):
     """What goes out first; within one priority, first come first served."""
 
     STOP = 0
-    OPERATOR_WRITE = 1
-    OPERATOR_READ = 2
-    POLL = 3
-    BACKGROUND = 4
+    FEED = 1
+    """A read without which a drive would trip on its communication time-out."""
+    OPERATOR_WRITE = 2
+    OPERATOR_READ = 3
+    POLL = 4
+    BACKGROUND = 5
 
 
 class LineStatus(Enum):
@@ -51,6 +53,8 @@ class DeviceState:
     """When polls are sent again; None when they are sent now."""
     turnaround: float | None
     """Seconds from the end of a request to the start of its reply, longest of the recent ones."""
+    heard: float | None
+    """When its last reply ended, on the line's clock; None before the first."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -60,6 +60,11 @@ class ReadPlan:
     requests: tuple[ReadRequest, ...]
     seconds: float
 
+    @property
+    def microseconds(self) -> int:
+        """The same time in whole microseconds."""
+        return round(self.seconds * 1e6)
+
 
 def plan_reads(
     profile: Profile,

@@ -521,7 +521,8 @@ class MonitoringValue(Table, frozen=True, kw_only=True):
     """One value of the monitoring set."""
 
     parameter: str
-    rate: Literal["fast", "slow"] = "fast"
+    rate: Literal["fast", "slow", "on-change"] = "fast"
+    """When it is read: in every cycle, in every tenth, or when the state has changed."""
     low: str = ""
     """Lower end of its bar, in its unit."""
     high: str = ""

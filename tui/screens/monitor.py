@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from typing import ClassVar
 
@@ -13,7 +12,6 @@ from textual.events import Resize
 from textual.screen import Screen
 from textual.timer import Timer
 
-from tui.bus.line import LineState, LineStatus
 from tui.drive.schema import Parameter
 from tui.session.drive_session import DriveSession
 from tui.session.reader import Rating
@@ -64,7 +62,6 @@ class MonitorScreen(Screen[None]):
         self._busy: tuple[float, float] | None = None
         self._load = 0.0
         self._was = ""
-        self._lost_since: float | None = None
 
     def compose(self) -> ComposeResult:
         """Fixed places, filled by lines."""
@@ -131,7 +128,7 @@ class MonitorScreen(Screen[None]):
             device=self.session.device,
             line_label=self.app.line_label,
             snapshot=snapshot,
-            line=self._line_state(),
+            line=self.session.line.state,
             counters=counters,
             load=self._load,
             trend=monitor.trend,
@@ -141,16 +138,6 @@ class MonitorScreen(Screen[None]):
             read_only=self.app.read_only,
             was=self._was,
         )
-
-    def _line_state(self) -> LineState:
-        """The state of the line; lost since it went, however often it was tried since."""
-        state = self.session.line.state
-        if state.status is not LineStatus.LOST:
-            self._lost_since = None
-            return state
-        if self._lost_since is None:
-            self._lost_since = state.since
-        return replace(state, since=self._lost_since)
 
     def _measure_load(self, now: float, busy: float) -> None:
         """Share of the last seconds in which the line was busy."""

@@ -26,6 +26,8 @@ class DriveSession:
         self.device = device
         self.profile = profile
         self.identity = identity
+        self.commanded = False
+        """Whether a command or reference was sent to the drive from here."""
         self.monitor = Monitor(line, device, profile)
         self._reader = Reader(line, device, profile)
 

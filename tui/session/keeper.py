@@ -1,8 +1,8 @@
 """Looking after every drive found on a line, watched or not.
 
-Some drives watch the line from the first request on and trip when it falls silent
-(communication time-out): once asked, they are asked on, at least three times in each time-out,
-as long as the line is open. The same requests tell the state of the drives in a list.
+Some drives watch the line and trip when it falls silent (communication time-out): they are
+asked on as long as the line is open, at least three times in each time-out, before polls and
+before an operator's own requests. Other requests tell the state of the drives in a list.
 """
 
 from __future__ import annotations
@@ -10,26 +10,41 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Awaitable, Callable, Mapping
+from dataclasses import dataclass, field
 
 from tui.bus.errors import LineError
 from tui.bus.line import Line, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.profile import Profile
+from tui.drive.schema import Reaction
 
 from .drive_session import DriveSession
 from .drive_state import DriveState, drive_state
+from .monitor import monitoring_codes
 from .reader import Reader
 from .readings import Reading
 
 log = logging.getLogger("drivepanel")
 
 GLANCE = 3.0
-"""Seconds between two looks at a drive that does not watch the line."""
+"""Seconds between two looks at a drive that no monitor watches."""
 ASKED_PER_TIMEOUT = 4.0
-SHORTEST = 0.2
-STEP = 0.05
+TOLD_AFTER = 0.5
+"""Share of its time-out after which a drive that was not heard is told of."""
+LEARN_AGAIN = 20.0
+"""Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
+SHORTEST = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """A drive's watch over the line: seconds to its time-out, and what it does then."""
+
+    timeout: float
+    reaction: Reaction | None
+    active: bool
+    """False where it begins only with a first command, and none was sent from here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,28 +58,48 @@ class Look:
     """The drive's communication time-out in seconds, if it is one that runs already."""
 
 
+@dataclass(frozen=True, slots=True)
+class Hunger:
+    """A drive that was not heard for a good part of its time-out; times in seconds."""
+
+    device: int
+    profile: Profile
+    silent: float
+    watch: Watch
+
+    @property
+    def left(self) -> float:
+        """Seconds until the drive acts; below zero it has."""
+        return self.watch.timeout - self.silent
+
+
 @dataclass(slots=True)
 class _Kept:
     session: DriveSession
     reader: Reader
-    period: float | None = None
-    timeout: float | None = None
-    due: float = 0.0
+    since: float = field(default_factory=time.monotonic)
+    watch: Watch | None = None
+    learned: float | None = None
+    workers: tuple[Worker, ...] = ()
 
 
 class Keeper:
-    """Asks each kept drive often enough, in a worker of the line's loop."""
+    """Asks each kept drive often enough, in workers of the line's loop."""
 
     def __init__(self, line: Line) -> None:
         self._line = line
         self._kept: dict[int, _Kept] = {}
         self._looks: dict[int, Look] = {}
-        self._worker: Worker | None = None
 
     @property
     def looks(self) -> Mapping[int, Look]:
         """The last look at each drive, by device."""
         return dict(self._looks)
+
+    def watch(self, device: int) -> Watch | None:
+        """A drive's watch over the line, once it is known and not off."""
+        kept = self._kept.get(device)
+        return kept.watch if kept else None
 
     def left_alone(self) -> dict[int, float]:
         """Running drives that act on their communication time-out once nobody asks them.
@@ -72,97 +107,138 @@ class Keeper:
         By device, with the time-out in seconds.
         """
         return {
-            device: look.timeout
-            for device, look in self.looks.items()
-            if look.timeout is not None and self._runs(device, look)
+            device: kept.watch.timeout
+            for device, kept in self._kept.items()
+            if kept.watch is not None and kept.watch.active and self._runs(device)
         }
 
-    def _runs(self, device: int, look: Look) -> bool:
+    def _runs(self, device: int) -> bool:
         """Whether a motor runs, by its drive's own monitor where that is the newer."""
-        kept = self._kept.get(device)
-        latest = kept.session.monitor.latest if kept and kept.session.monitor.running else None
-        newer = latest is not None and latest.time > look.time and not latest.error
-        state = latest.state if latest is not None and newer else look.state
+        look, monitor = self._looks.get(device), self._kept[device].session.monitor
+        latest = monitor.latest if monitor.running else None
+        state, seen = (look.state, look.time) if look else (None, 0.0)
+        if latest is not None and latest.time > seen and not latest.error:
+            state = latest.state
         return state is not None and state.kind == "running"
+
+    def hungry(self) -> list[Hunger]:
+        """Drives that are about to act on their time-out, or have, for want of an answer."""
+        now = time.monotonic()
+        found = []
+        for device, kept in self._kept.items():
+            if kept.watch is None or not kept.watch.active:
+                continue
+            silent = now - self._heard(kept)
+            if silent > TOLD_AFTER * kept.watch.timeout:
+                found.append(Hunger(device, kept.session.profile, silent, kept.watch))
+        return found
+
+    def _heard(self, kept: _Kept) -> float:
+        return self._line.device_state(kept.session.device).heard or kept.since
 
     def keep(self, session: DriveSession) -> None:
         """Look after a drive from now on."""
-        reader = Reader(self._line, session.device, session.profile)
-        kept = dict(self._kept)
-        kept[session.device] = _Kept(session, reader)
-        self._kept = kept
-        if self._worker is None or self._worker.done():
-            self._worker = self._line.spawn(self._work, "keeper")
+        device, profile = session.device, session.profile
+        kept = _Kept(session, Reader(self._line, device, profile))
+        if device in self._kept:
+            self._let_go(self._kept[device])
+        self._kept = {**self._kept, device: kept}
+        kept.workers = (
+            self._line.spawn(lambda: self._again(kept, self._feed), f"feeder {device}"),
+            self._line.spawn(lambda: self._again(kept, self._glance), f"keeper {device}"),
+        )
 
     def stop(self) -> None:
         """Let every drive go."""
+        for kept in self._kept.values():
+            self._let_go(kept)
         self._kept = {}
         self._looks = {}
-        if self._worker is not None:
-            self._worker.cancel()
-            self._worker = None
 
-    async def _work(self) -> None:
+    def _let_go(self, kept: _Kept) -> None:
+        for worker in kept.workers:
+            worker.cancel()
+
+    async def _again(self, kept: _Kept, step: Callable[[_Kept], Awaitable[float]]) -> None:
+        """Do a step for good; it says how many seconds later it is due again."""
         while True:
-            now = time.monotonic()
-            for kept in list(self._kept.values()):
-                if kept.due <= now and not _watched_enough(kept):
-                    await self._guarded(kept)
-            await asyncio.sleep(STEP)
+            try:
+                rest = await step(kept)
+            except LineError:
+                rest = self._after_failure(kept)
+            except Exception:
+                # what goes wrong with one drive must not leave the others alone
+                log.exception("looking after device %s failed", kept.session.device)
+                rest = GLANCE
+            await asyncio.sleep(max(SHORTEST, rest))
 
-    async def _guarded(self, kept: _Kept) -> None:
-        """Look at a drive; what goes wrong with one must not leave the others alone."""
-        try:
-            await self._look_at(kept)
-        except Exception:
-            log.exception("looking after device %s failed", kept.session.device)
-            kept.due = time.monotonic() + GLANCE
+    @staticmethod
+    def _after_failure(kept: _Kept) -> float:
+        timeout = kept.watch.timeout if kept.watch else 4 * ASKED_PER_TIMEOUT
+        return min(1.0, timeout / ASKED_PER_TIMEOUT / 2)
 
-    async def _look_at(self, kept: _Kept) -> None:
-        profile = kept.session.profile
+    async def _feed(self, kept: _Kept) -> float:
+        """Ask a drive that watches the line, if nobody else does often enough."""
+        now = time.monotonic()
+        if kept.learned is None or now - kept.learned > LEARN_AGAIN:
+            await self._learn(kept)
+        if kept.watch is None:
+            return LEARN_AGAIN
+        period = kept.watch.timeout / ASKED_PER_TIMEOUT
+        silent = time.monotonic() - self._heard(kept)
+        if silent < period:
+            return period - silent
+        # past its time-out it has acted: it need no longer go before the others
+        priority = Priority.FEED if silent < kept.watch.timeout else Priority.POLL
+        await self._line.read(
+            kept.session.device, _any_word(kept.session.profile), 1, priority=priority
+        )
+        return period
+
+    async def _glance(self, kept: _Kept) -> float:
+        """Look at a drive's state, unless its monitor does."""
+        if kept.session.monitor.running:
+            return GLANCE / 10
+        profile, device = kept.session.profile, kept.session.device
         state, error = None, ""
         try:
-            if kept.period is None:
-                await self._learn_period(kept)
             readings = await kept.reader.read(_state_codes(profile), priority=Priority.POLL)
             state = drive_state(profile, readings)
         except LineError as fault:
             error = str(fault)
-        now = time.monotonic()
-        kept.due = now + (kept.period or GLANCE)
-        self._looks[kept.session.device] = Look(state, error, now, kept.timeout)
+        timeout = kept.watch.timeout if kept.watch and kept.watch.active else None
+        if self._kept.get(device) is kept:
+            self._looks = {**self._looks, device: Look(state, error, time.monotonic(), timeout)}
+        return GLANCE if kept.learned is not None else GLANCE / 10
 
-    async def _learn_period(self, kept: _Kept) -> None:
-        watch = kept.session.profile.data.communication_fault
-        if watch is None or watch.needs_write or not watch.timeout:
-            kept.period = GLANCE
+    async def _learn(self, kept: _Kept) -> None:
+        """Read the drive's time-out and its reaction."""
+        rules = kept.session.profile.data.communication_fault
+        if rules is None or not rules.timeout:
+            kept.learned, kept.watch = time.monotonic(), None
             return
-        reading = (await kept.reader.read([watch.timeout], priority=Priority.POLL))[watch.timeout]
-        kept.timeout = _seconds(reading, watch.off)
-        kept.period = (
-            GLANCE
-            if kept.timeout is None
-            else min(GLANCE, max(SHORTEST, kept.timeout / ASKED_PER_TIMEOUT))
-        )
+        codes = [code for code in (rules.timeout, rules.reaction) if code]
+        readings = await kept.reader.read(codes, priority=Priority.POLL)
+        timeout = _seconds(readings[rules.timeout], rules.off)
+        raw = readings[rules.reaction].raw if rules.reaction else None
+        reaction = next((one for one in rules.reactions if one.raw == raw), None)
+        active = not rules.needs_write or kept.session.commanded
+        kept.watch = None if timeout is None else Watch(timeout, reaction, active)
+        kept.learned = time.monotonic()
 
 
 def _seconds(reading: Reading, off: int | None) -> float | None:
     """The time-out in seconds; None where it is off or could not be read."""
-    if reading.raw is None or reading.raw == off:
-        return None
     number = reading.number
-    if number is None:
+    if reading.raw is None or reading.raw == off or not number:
         return None
     return number / 1000 if reading.unit == "ms" else number
 
 
-def _watched_enough(kept: _Kept) -> bool:
-    """Whether the drive's own monitor asks it often enough already.
-
-    Not before the drive's time-out is known: until then the keeper asks for itself.
-    """
-    monitor = kept.session.monitor
-    return kept.period is not None and monitor.running and monitor.period <= kept.period
+def _any_word(profile: Profile) -> int:
+    """A word that every drive of the family has: one that tells its state, if there is one."""
+    codes = _state_codes(profile) or monitoring_codes(profile)
+    return profile[codes[0]].address
 
 
 def _state_codes(profile: Profile) -> list[str]:

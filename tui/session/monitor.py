@@ -10,7 +10,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tui.bus.errors import LineError
 from tui.bus.line import Line, LineState, Priority, Worker
@@ -30,6 +30,8 @@ SLOW_FACTOR = 10
 TREND_SECONDS = 300.0
 TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 SHORTEST_PERIOD = 0.05
+RATE_OVER = 6
+"""Cycles over which the rate is measured."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,10 +46,23 @@ class Snapshot:
     readings: Mapping[str, Reading]
     state: DriveState
     rate: float
-    """Cycles a second that the line holds; 0 while nothing answers."""
+    """Cycles a second as they were; 0 while nothing answers."""
     error: str
     """Why this cycle brought nothing, or empty."""
     line: LineState
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Codes by how often they are read."""
+
+    fast: tuple[str, ...]
+    changing: tuple[str, ...] = ()
+    """Details of the state: read when it changes, in every cycle of a fault or an alarm, and
+    with the slow ones."""
+    slow: tuple[str, ...] = ()
+    key: tuple[str, ...] = ()
+    """Those of the fast ones that tell the state."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,10 +131,12 @@ class Monitor:
         """
         self.stop()
         self.period = period
-        fast, slow = self._rates(codes)
-        slow += [code for code in extra if code not in fast and code not in slow]
+        rates = rates_of(self.profile) if codes is None else Rates(tuple(dict.fromkeys(codes)))
+        known = {*rates.fast, *rates.changing, *rates.slow}
+        more = tuple(code for code in dict.fromkeys(extra) if code not in known)
+        rates = replace(rates, slow=rates.slow + more)
         self._worker = self.line.spawn(
-            lambda: self._watch(fast, slow), f"monitor {self.profile.id} {self.device}"
+            lambda: self._watch(rates), f"monitor {self.profile.id} {self.device}"
         )
 
     def stop(self) -> None:
@@ -128,53 +145,67 @@ class Monitor:
             self._worker.cancel()
             self._worker = None
 
-    def _rates(self, codes: Sequence[str] | None) -> tuple[list[str], list[str]]:
-        """Codes of every cycle and those read less often."""
-        if codes is not None:
-            return list(dict.fromkeys(codes)), []
-        values = self.profile.data.monitoring.values
-        slow = [value.parameter for value in values if value.rate == "slow"]
-        return [c for c in monitoring_codes(self.profile) if c not in slow], slow
-
-    async def _watch(self, fast: list[str], slow: list[str]) -> None:
+    async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
+        begun: deque[float] = deque(maxlen=RATE_OVER)
         slow_due = 0.0
-        spent = 0.0
         cycle = 0
-        while True:
-            started = time.monotonic()
-            cycle += 1
-            due = [*fast, *slow] if started >= slow_due else fast
-            error = ""
-            try:
-                readings.update(await self.reader.read(due or slow, priority=Priority.POLL))
-            except (LineError, DriveError) as fault:
-                error = str(fault)
-                self.reader.forget()  # what answers next may be another drive
-            else:
-                spent = time.monotonic() - started
-                if due is not fast:
-                    slow_due = started + SLOW_FACTOR * self.period
-            self._publish(cycle, readings, set(slow), max(spent, self.period), error)
-            await asyncio.sleep(self._rest(started))
+        try:
+            while True:
+                started = time.monotonic()
+                cycle += 1
+                error = ""
+                period = self._period(rates)
+                seldom = started >= slow_due
+                try:
+                    readings.update(await self._cycle(rates, readings, seldom=seldom))
+                except (LineError, DriveError) as fault:
+                    error = str(fault)
+                    self.reader.forget()  # what answers next may be another drive
+                    begun.clear()
+                    slow_due = 0.0
+                else:
+                    begun.append(started)
+                    if seldom:
+                        slow_due = started + SLOW_FACTOR * period
+                self._publish(cycle, readings, rates, _span(begun, period), error)
+                rest = started + period - time.monotonic()
+                await asyncio.sleep(period if error else max(0.0, rest))
+        finally:
+            self.line.pace.release(self)
 
-    def _rest(self, started: float) -> float:
-        """Time to the next cycle; one that came late is skipped, never caught up."""
-        period = max(self.period, SHORTEST_PERIOD)
-        return period - (time.monotonic() - started) % period
+    def _period(self, rates: Rates) -> float:
+        """The wished time of a cycle, longer where the line cannot keep it for all."""
+        cost = self.reader.seconds(rates.fast)
+        cost += self.reader.seconds((*rates.changing, *rates.slow)) / SLOW_FACTOR
+        return self.line.pace.claim(self, cost, max(self.period, SHORTEST_PERIOD))
+
+    async def _cycle(
+        self, rates: Rates, before: Mapping[str, Reading], *, seldom: bool
+    ) -> dict[str, Reading]:
+        """All readings of one cycle; the state's details as soon as it changes."""
+        due = (*rates.fast, *rates.changing, *rates.slow) if seldom else rates.fast
+        found = await self.reader.read(due or rates.slow, priority=Priority.POLL)
+        if seldom or not rates.changing:
+            return found
+        now = drive_state(self.profile, found)
+        same = all(found[code].raw == before[code].raw for code in rates.key if code in before)
+        if not same or now.alarm or now.kind == "fault":
+            found |= await self.reader.read(rates.changing, priority=Priority.POLL)
+        return found
 
     def _publish(
         self,
         cycle: int,
         readings: Mapping[str, Reading],
-        slow: set[str],
+        rates: Rates,
         span: float,
         error: str,
     ) -> None:
         now = time.monotonic()
         limit = STALE_CYCLES * span
         aged = {
-            code: reading.aged(now, limit * SLOW_FACTOR if code in slow else limit)
+            code: reading.aged(now, limit if code in rates.fast else limit * SLOW_FACTOR)
             for code, reading in readings.items()
         }
         snapshot = Snapshot(
@@ -202,6 +233,28 @@ class Monitor:
         self._trend.append(TrendPoint(snapshot.time, values))
         while self._trend[0].time < snapshot.time - TREND_SECONDS:
             self._trend.popleft()
+
+
+def rates_of(profile: Profile) -> Rates:
+    """How often each value of a profile's monitoring set is read."""
+    rates = {value.parameter: value.rate for value in profile.data.monitoring.values}
+    when = {chart.when.parameter for chart in profile.data.charts if chart.when}
+    changing = {profile.data.faults.parameter, *when} - {""}
+    codes = monitoring_codes(profile)
+    told = {code: rates.get(code, "on-change" if code in changing else "fast") for code in codes}
+    fast, change, slow = (
+        tuple(code for code in codes if told[code] == rate)
+        for rate in ("fast", "on-change", "slow")
+    )
+    watched = set(watched_codes(profile))
+    return Rates(fast, change, slow, tuple(code for code in fast if code in watched))
+
+
+def _span(begun: Sequence[float], period: float) -> float:
+    """Seconds from one cycle to the next, as they were."""
+    if len(begun) < 2:
+        return period
+    return max(period, (begun[-1] - begun[0]) / (len(begun) - 1))
 
 
 def monitoring_codes(profile: Profile) -> list[str]:

@@ -22,6 +22,9 @@ from .readings import Quality, Reading
 SOURCE_AGE = 5.0
 """Seconds for which a poll trusts a word that others' values depend on; an operator's read
 never does."""
+USUAL_TURNAROUND = 0.005
+"""Seconds that a drive takes to answer, until it is measured."""
+TURNAROUND_STEP = 0.002
 ASK_AGAIN = 30.0
 """Seconds after which a poll asks again for a parameter that the drive refused."""
 
@@ -62,7 +65,9 @@ class Reader:
     _refused: dict[str, Raw] = field(default_factory=dict)
     _unanswered: dict[str, Raw] = field(default_factory=dict)
     """Unconfirmed words at which the drive fell silent while it answers others."""
-    _plans: dict[tuple[frozenset[str], frozenset[str]], ReadPlan] = field(default_factory=dict)
+    _plans: dict[tuple[frozenset[str], frozenset[str], float], ReadPlan] = field(
+        default_factory=dict
+    )
 
     def __post_init__(self) -> None:
         self.line.describe(self.device, limits_of(self.profile))
@@ -75,6 +80,11 @@ class Reader:
         await self._read_sources(wanted, priority)
         raws = await self._raws(frozenset(wanted), priority)
         return {code: self._reading(self.profile[code], raws[code]) for code in wanted}
+
+    def seconds(self, codes: Iterable[str]) -> float:
+        """What reading these costs on the wire by plan, without retries."""
+        sure, unsure = self._by_trust(frozenset(codes).difference(self._refused))
+        return self._plan(sure).seconds + self._plan(unsure).seconds
 
     def forget(self) -> None:
         """Read scales and refused parameters anew: another drive may answer now."""
@@ -140,18 +150,25 @@ class Reader:
             self._sources[code] = found[code]
 
     def _plan(self, codes: frozenset[str]) -> ReadPlan:
-        key = (codes, frozenset(self._refused))
+        key = (codes, frozenset(self._refused), self._turnaround())
         if key not in self._plans:
             self._plans[key] = plan_reads(
-                self.profile, sorted(codes), self._timing(), unreadable=key[1]
+                self.profile, sorted(codes), self._timing(key[2]), unreadable=key[1]
             )
         return self._plans[key]
 
-    def _timing(self) -> WireTiming:
+    def _turnaround(self) -> float:
+        """The drive's measured turnaround in steps, so that plans do not change for nothing."""
+        measured = self.line.device_state(self.device).turnaround
+        if measured is None:
+            return USUAL_TURNAROUND
+        return math.ceil(measured / TURNAROUND_STEP) * TURNAROUND_STEP
+
+    def _timing(self, turnaround: float) -> WireTiming:
         link = self.line.link
         if isinstance(link, TcpLink):
-            return WireTiming(character=0.0, silence=0.0, turnaround=0.005)
-        return WireTiming(character_time(link), silence(link))
+            return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
+        return WireTiming(character_time(link), silence(link), turnaround)
 
     async def _exchange(self, request: ReadRequest, priority: Priority) -> dict[str, Raw]:
         """The raw values of one planned request.

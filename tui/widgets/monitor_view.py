@@ -42,8 +42,8 @@ class View:
         return reading.aged(self.now, STALE_CYCLES * cycle * (1 if often else SLOW_FACTOR))
 
     def slow(self, code: str) -> bool:
-        """Whether the value is one of the slow ones of the monitoring set."""
-        return any(v.parameter == code and v.rate == "slow" for v in self.values)
+        """Whether the value is one that need not come with every cycle."""
+        return any(v.parameter == code and v.rate != "fast" for v in self.values)
 
     def rare(self, code: str) -> bool:
         """Whether the value is one of those read seldom beside the monitoring set."""

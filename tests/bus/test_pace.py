@@ -1,0 +1,37 @@
+"""All periods of a line grow by one factor when together they do not fit."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.bus.pace import SHARE, Pace
+
+
+def test_a_line_with_time_to_spare_keeps_every_wish() -> None:
+    pace = Pace()
+    assert pace.claim("a", 0.02, 0.1) == 0.1
+    assert pace.claim("b", 0.05, 0.1) == 0.1
+
+
+@given(st.lists(st.tuples(st.floats(0.001, 1.0), st.floats(0.05, 10.0)), min_size=1, max_size=31))
+def test_all_are_slowed_down_evenly_until_they_fit(wishes: list[tuple[float, float]]) -> None:
+    pace = Pace()
+    for who, (seconds, period) in enumerate(wishes):
+        pace.claim(who, seconds, period)
+    held = [pace.claim(who, *wish) for who, wish in enumerate(wishes)]
+    factors = [got / period for got, (_, period) in zip(held, wishes, strict=True)]
+    assert factors == pytest.approx([factors[0]] * len(factors))
+    load = sum(seconds / got for got, (seconds, _) in zip(held, wishes, strict=True))
+    assert load <= SHARE * (1 + 1e-9)
+    assert factors[0] == 1.0 or load == pytest.approx(SHARE)
+
+
+def test_who_leaves_gives_time_back() -> None:
+    pace = Pace()
+    pace.claim("a", 0.09, 0.1)
+    assert pace.claim("b", 0.09, 0.1) == pytest.approx(0.2)
+    pace.release("a")
+    pace.release("never there")
+    assert pace.claim("b", 0.09, 0.1) == pytest.approx(0.1)
