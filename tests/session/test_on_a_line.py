@@ -5,12 +5,14 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
-from tui.bus.errors import LineLost, LinkSyntaxError, NoAnswer, RequestRefused
-from tui.bus.line import Line
+from tui.bus.errors import LineBusy, LineLost, LinkSyntaxError, NoAnswer, RequestRefused
+from tui.bus.line import Line, Priority
+from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.session.addresses import parse_addresses
 from tui.session.drive_session import DriveSession
@@ -189,6 +191,90 @@ async def test_a_drive_watched_from_the_start_is_judged_by_its_monitor() -> None
     finally:
         keeper.stop()
         opened.close()
+
+
+async def test_a_drive_is_fed_whatever_else_the_line_does() -> None:
+    """A flood of polls and of operator's reads leaves the keeper its place before them."""
+    opened = demo_line({"atv21": 35.0, "atv71": 50.0})
+    keeper = Keeper(opened.line)
+    keeper.keep(session(opened, "atv21"))
+    await until(lambda: keeper.watch(1) is not None)
+    gaps: list[float] = []
+
+    async def flood(priority: Priority) -> None:
+        for _ in range(40):
+            with suppress(LineBusy):
+                await opened.line.read(2, 3201, priority=priority)
+
+    try:
+        end = time.monotonic() + 4.0
+        while time.monotonic() < end:
+            crowd = [flood(priority) for priority in (Priority.OPERATOR_READ, Priority.POLL) * 10]
+            work = asyncio.gather(*crowd)
+            while not work.done():
+                gaps.append(time.monotonic() - (opened.line.device_state(1).heard or 0.0))
+                await asyncio.sleep(0.01)
+        assert max(gaps) < 3.0 / 3
+        assert not keeper.hungry()
+        assert opened.simulation is not None
+        assert opened.simulation.drive(1).raw("FC90") == 0
+    finally:
+        keeper.stop()
+        opened.close()
+
+
+async def test_who_cannot_be_fed_is_told_of_before_it_acts() -> None:
+    opened = demo_line({"atv21": 35.0})
+    keeper = Keeper(opened.line)
+    keeper.keep(session(opened, "atv21"))
+    try:
+        await until(lambda: keeper.watch(1) is not None)
+        assert not keeper.hungry()
+        assert opened.simulation is not None
+        opened.simulation.unplug()
+        await until(lambda: bool(keeper.hungry()))
+        (hunger,) = keeper.hungry()
+        assert (hunger.device, hunger.watch.timeout) == (1, 3.0)
+        assert 1.0 < hunger.left <= 1.5
+        assert hunger.watch.reaction is not None
+        assert hunger.watch.reaction.trips
+        opened.simulation.replug()
+        await until(lambda: not keeper.hungry())
+    finally:
+        keeper.stop()
+        opened.close()
+
+
+async def test_a_watch_that_begins_with_a_command_is_not_told_of_before() -> None:
+    opened = demo_line({"atv71": 50.0})
+    keeper = Keeper(opened.line)
+    drive = DriveSession(opened.line, 1, library.load("atv71"))
+    keeper.keep(drive)
+    try:
+        await until(lambda: keeper.watch(1) is not None)
+        watch = keeper.watch(1)
+        assert watch is not None
+        assert (watch.timeout, watch.active) == (10.0, False)
+        assert keeper.left_alone() == {}
+    finally:
+        keeper.stop()
+        opened.close()
+
+
+async def test_an_overloaded_line_lowers_all_rates_evenly(five: OpenLine) -> None:
+    drives = [session(five, profile) for profile in DRIVES]
+    slow = Line(SerialLink("/dev/null", baud=9600))
+    for drive in drives:
+        # as if the line were that slow: its time is shared out by what the plans cost there
+        drive.monitor.reader.line.link = slow.link
+        drive.monitor.start(period=0.1)
+    await asyncio.sleep(8.0)
+    rates = [drive.monitor.latest.rate for drive in drives if drive.monitor.latest]
+    assert len(rates) == len(drives)
+    assert max(rates) / min(rates) < 1.1
+    assert 0.5 < max(rates) < 2.0
+    for drive in drives:
+        drive.close()
 
 
 @pytest.mark.parametrize(
