@@ -13,6 +13,7 @@ from tui.drive.errors import DriveError, UnknownParameter
 from tui.drive.profile import Profile
 from tui.drive.read_plan import ReadPlan, WireTiming, plan_reads
 from tui.drive.schema import ProfileData
+from tui.drive.write_plan import plan_write
 
 TIMING = WireTiming(character=11 / 19200, silence=3.5 * 11 / 19200, turnaround=0.005)
 
@@ -25,13 +26,22 @@ def profile_of(
     single: bool = False,
     blocks: Sequence[dict[str, object]] = (),
     write_only: Sequence[int] = (),
+    both: tuple[int, int] | None = None,
 ) -> Profile:
     """A profile with a word P<address> at each address."""
     tables = {
         "profile": {"id": "plan", "name": "Plan", "vendor": "Nobody", "version": "1"},
         "link": {"baud": 19200, "format": "8E1"},
         "sources": [{"id": "manual", "title": "None"}],
-        "functions": [{"code": 3, "name": "Read", "max_read": longest}],
+        "functions": [
+            {"code": 3, "name": "Read", "max_read": longest},
+            {"code": 6, "name": "Write"},
+            *(
+                [{"code": 23, "name": "Both", "max_read": both[0], "max_write": both[1]}]
+                if both
+                else []
+            ),
+        ],
         "reading": {"gaps_readable": gaps, "single_words_only": single},
         "monitoring": {"values": []},
         "blocks": list(blocks),
@@ -118,6 +128,7 @@ BLOCK = {
     "selects_by": "choice",
     "choices": [{"raw": 1, "parameter": "P500"}, {"raw": 2, "parameter": "P900"}],
     "fixed_start": True,
+    "effective": "after-reset",
 }
 
 
@@ -135,6 +146,61 @@ def test_a_block_with_a_free_first_slot_is_not_used() -> None:
     profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
     plan = plan_reads(profile, codes([900]), TIMING, slots={"P2165": 0, "P2166": 2})
     assert spans(plan) == [(900, 1)]
+
+
+SCANNER = BLOCK | {
+    "id": "scanner",
+    "address": 700,
+    "min_words": 1,
+    "max_words": 3,
+    "selects_by": "address",
+    "fixed_start": False,
+    "effective": "at-once",
+    "choices": [],
+}
+
+
+def test_slots_that_anybody_may_change_are_read_after_their_block() -> None:
+    profile = profile_of([500, 900, 1200, 2165, 2166, 2167], blocks=[SCANNER])
+    slots = {"P2165": 500, "P2166": 900, "P2167": 1200}
+    plan = plan_reads(profile, codes([500, 900, 1200]), TIMING, slots=slots)
+    assert spans(plan) == [(700, 3)]
+    (check,) = plan.checks
+    assert (check.request.address, check.request.count, check.slots) == (2165, 3, slots)
+    assert set(check.governs) == {"P500", "P900", "P1200"}
+    assert plan.seconds == pytest.approx(2 * TIMING.read(3))
+    assert plan.microseconds == round(plan.seconds * 1e6)
+
+
+def test_a_scanner_that_saves_no_time_is_not_used() -> None:
+    profile = profile_of([500, 900, 2165, 2166, 2167], blocks=[SCANNER])
+    plan = plan_reads(profile, codes([500, 900]), TIMING, slots={"P2165": 500, "P2166": 900})
+    # two reads of one word and two reads of two words: the drive is asked directly
+    assert spans(plan) == [(500, 1), (900, 1)]
+    assert plan.checks == ()
+
+
+@settings(deadline=None, max_examples=60)
+@given(
+    slots=st.lists(st.sampled_from([0, 10, 11, 12, 20, 30, 40, 50]), min_size=3, max_size=3),
+    wanted=st.sets(st.sampled_from([10, 11, 12, 20, 30, 40, 50]), min_size=1),
+    checked=st.booleans(),
+)
+def test_no_use_of_a_block_is_cheaper(slots: list[int], wanted: set[int], *, checked: bool) -> None:
+    """Every part of the block, with the best direct reads of what it leaves."""
+    block = SCANNER | {"effective": "at-once" if checked else "after-reset"}
+    profile = profile_of([10, 11, 12, 20, 30, 40, 50, 2165, 2166, 2167], blocks=[block])
+    known = {f"P{2165 + place}": raw for place, raw in enumerate(slots)}
+    plan = plan_reads(profile, codes(sorted(wanted)), TIMING, slots=known)
+    assert covered(plan) == sorted(codes(sorted(wanted)))
+    costs = [plan_reads(profile, codes(sorted(wanted)), TIMING).seconds]
+    for first in range(3):
+        for count in range(1, 4 - first):
+            used = slots[first : first + count]
+            if 0 not in used and wanted & set(used):
+                rest = plan_reads(profile, codes(sorted(wanted - set(used))), TIMING).seconds
+                costs.append(rest + TIMING.read(count) * (2 if checked else 1))
+    assert plan.seconds == pytest.approx(min(costs))
 
 
 def splits(items: Sequence[int]) -> Iterator[list[Sequence[int]]]:
@@ -175,3 +241,51 @@ def test_no_split_is_cheaper(
         )
     )
     assert plan.seconds == pytest.approx(cheapest)
+
+
+def test_reading_rides_on_a_write_where_the_drive_can() -> None:
+    profile = profile_of([10, 11, 50], both=(20, 20))
+    plan = plan_write(profile, 8501, 2, codes([10, 11, 50]), TIMING)
+    assert plan.riding is not None
+    assert (plan.riding.address, plan.riding.count) == (10, 2)
+    assert [(r.address, r.count) for r in plan.reads] == [(50, 1)]
+    assert plan.seconds == pytest.approx(TIMING.read_write(2, 2) + TIMING.read(1))
+    assert plan.microseconds == round(plan.seconds * 1e6)
+
+
+def test_without_function_23_it_is_written_first_and_read_then() -> None:
+    plan = plan_write(profile_of([10]), 8501, 1, ["P10"], TIMING)
+    assert plan.riding is None
+    assert plan.seconds == pytest.approx(TIMING.write(1, multiple=False) + TIMING.read(1))
+
+
+@settings(deadline=None)
+@given(
+    known=st.sets(st.integers(0, 16), min_size=1, max_size=10),
+    share=st.randoms(use_true_random=False),
+    ride=st.integers(1, 6),
+    write=st.integers(1, 5),
+)
+def test_nothing_rides_cheaper(known: set[int], share: object, ride: int, write: int) -> None:
+    longest = 8
+    profile = profile_of(sorted(known), longest=longest, both=(ride, 4))
+    wanted = sorted(a for a in known if share.random() < 0.6)  # type: ignore[attr-defined]
+    plan = plan_write(profile, 8501, write, codes(wanted), TIMING)
+    read = [*plan.reads, *([plan.riding] if plan.riding else [])]
+    places = sorted(place.code for request in read for place in request.places)
+    assert places == sorted(codes(wanted))
+
+    def allowed(run: Sequence[int], limit: int) -> bool:
+        return run[-1] - run[0] < limit and set(range(run[0], run[-1] + 1)) <= known
+
+    costs = []
+    for split in splits(wanted):
+        times = [TIMING.read(run[-1] - run[0] + 1) for run in split]
+        if all(allowed(run, longest) for run in split):
+            costs.append(TIMING.write(write, multiple=write > 1) + sum(times))
+        for at, run in enumerate(split):
+            others = [*split[:at], *split[at + 1 :]]
+            if write <= 4 and allowed(run, ride) and all(allowed(o, longest) for o in others):
+                rides = TIMING.read_write(run[-1] - run[0] + 1, write)
+                costs.append(rides + sum(times) - times[at])
+    assert plan.seconds == pytest.approx(min(costs))

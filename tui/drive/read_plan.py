@@ -20,6 +20,13 @@ REQUEST_CHARACTERS = 8
 """Characters of a function 3 request: address, function, start, count, checksum."""
 REPLY_CHARACTERS = 5
 """Characters of its reply beside the words: address, function, byte count, checksum."""
+WRITE_ONE_CHARACTERS = 8
+"""Characters of a function 6 request, and of its reply: address, function, register, word,
+checksum; the reply of function 16 has as many."""
+WRITE_MANY_CHARACTERS = 9
+"""Characters of a function 16 request beside the words."""
+READ_WRITE_CHARACTERS = 13
+"""Characters of a function 23 request beside the words to write."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,7 +39,18 @@ class WireTiming:
 
     def read(self, words: int) -> float:
         """Time of one read of so many words: request, turnaround, reply and both silences."""
-        characters = REQUEST_CHARACTERS + REPLY_CHARACTERS + 2 * words
+        return self._exchange(REQUEST_CHARACTERS + REPLY_CHARACTERS + 2 * words)
+
+    def write(self, words: int, *, multiple: bool) -> float:
+        """Time of one write, by function 16 if `multiple`, else by function 6."""
+        request = WRITE_MANY_CHARACTERS + 2 * words if multiple else WRITE_ONE_CHARACTERS
+        return self._exchange(request + WRITE_ONE_CHARACTERS)
+
+    def read_write(self, read: int, written: int) -> float:
+        """Time of one exchange by function 23."""
+        return self._exchange(READ_WRITE_CHARACTERS + 2 * written + REPLY_CHARACTERS + 2 * read)
+
+    def _exchange(self, characters: int) -> float:
         return characters * self.character + 2 * self.silence + self.turnaround
 
 
@@ -54,11 +72,23 @@ class ReadRequest:
 
 
 @dataclass(frozen=True, slots=True)
+class Check:
+    """A read of slots after the block they govern, and what they must hold for it to count."""
+
+    request: ReadRequest
+    slots: Mapping[str, int]
+    governs: tuple[str, ...]
+    """Codes whose values stand for nothing when a slot holds something else."""
+
+
+@dataclass(frozen=True, slots=True)
 class ReadPlan:
     """Requests in the order of their addresses, and their time on the wire in seconds."""
 
     requests: tuple[ReadRequest, ...]
     seconds: float
+    checks: tuple[Check, ...] = ()
+    """Sent after the requests; their time is in `seconds`."""
 
     @property
     def microseconds(self) -> int:
@@ -76,9 +106,11 @@ def plan_reads(
     """The cheapest requests for these parameters.
 
     `slots` holds the raw values of block and scanner slots that are known to be in force; a
-    block none of whose slots is known is not used. `unreadable` names parameters that this drive
-    refused: no run goes over them. Raises DriveError for a parameter that can
-    only be written, UnknownParameter for one that the profile does not have.
+    block none of whose slots is known is not used. Slots that take effect at once may be
+    changed by anybody at any time: they are read after each use, which the cost includes.
+    `unreadable` names parameters that this drive refused: no run goes over them. Raises
+    DriveError for a parameter that can only be written, UnknownParameter for one that the
+    profile does not have.
     """
     wanted = {code: profile[code] for code in dict.fromkeys(codes)}
     for parameter in wanted.values():
@@ -88,17 +120,22 @@ def plan_reads(
     options = [list(_stretches(profile, block, slots or {})) for block in profile.data.blocks]
     for choice in product(*([None, *stretches] for stretches in options)):
         used = [stretch for stretch in choice if stretch is not None]
-        covered = {place.code for stretch in used for place in stretch.places}
+        covered = {place.code for stretch in used for place in stretch.request.places}
         if any(not covered & set(wanted) for _ in used):
             continue
         rest = [p for code, p in wanted.items() if code not in covered]
         requests = [
             *_runs(profile, rest, timing, unreadable),
-            *(_only(stretch, wanted) for stretch in used),
+            *(_only(stretch.request, wanted) for stretch in used),
         ]
-        seconds = sum(timing.read(request.count) for request in requests)
+        checks = [
+            check for stretch in used for check in _checks(profile, stretch, timing, unreadable)
+        ]
+        seconds = sum(timing.read(r.count) for r in (*requests, *(c.request for c in checks)))
         if best is None or (seconds, len(requests)) < (best.seconds, len(best.requests)):
-            best = ReadPlan(tuple(sorted(requests, key=lambda r: r.address)), seconds)
+            best = ReadPlan(
+                tuple(sorted(requests, key=lambda r: r.address)), seconds, tuple(checks)
+            )
     return best or ReadPlan((), 0.0)
 
 
@@ -107,7 +144,16 @@ def _only(request: ReadRequest, wanted: Mapping[str, Parameter]) -> ReadRequest:
     return ReadRequest(request.address, request.count, places)
 
 
-def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iterator[ReadRequest]:
+@dataclass(frozen=True, slots=True)
+class _Stretch:
+    """One read of a block, and the slots that it depends on."""
+
+    request: ReadRequest
+    slots: Mapping[str, int]
+    checked: bool
+
+
+def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iterator[_Stretch]:
     """Every read of a read block whose slots all stand for a known parameter."""
     if block.direction != "read":
         return
@@ -120,7 +166,26 @@ def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iter
                 break
             places.append(Place(code, offset))
             if len(places) >= block.min_words:
-                yield ReadRequest(block.address + first, len(places), tuple(places))
+                names = block.slots[first : first + len(places)]
+                yield _Stretch(
+                    ReadRequest(block.address + first, len(places), tuple(places)),
+                    {name: slots[name] for name in names},
+                    checked=block.effective == "at-once",
+                )
+
+
+def _checks(
+    profile: Profile, stretch: _Stretch, timing: WireTiming, unreadable: Collection[str]
+) -> list[Check]:
+    """The reads that prove after a stretch was used that its slots have not changed."""
+    if not stretch.checked:
+        return []
+    slots = [profile[code] for code in stretch.slots]
+    governs = tuple(place.code for place in stretch.request.places)
+    return [
+        Check(request, {p.code: stretch.slots[p.code] for p in request.places}, governs)
+        for request in _runs(profile, slots, timing, unreadable)
+    ]
 
 
 def _assigned(profile: Profile, block: Block, raw: int | None) -> str | None:
@@ -135,48 +200,67 @@ def _assigned(profile: Profile, block: Block, raw: int | None) -> str | None:
 
 def _runs(
     profile: Profile,
-    parameters: Sequence[Parameter],
+    parameters: Iterable[Parameter],
     timing: WireTiming,
     unreadable: Collection[str],
 ) -> list[ReadRequest]:
     """The cheapest split of parameters into runs of neighbours, by dynamic programming."""
     ordered = sorted(parameters, key=lambda p: p.address)
+    best = cheapest(profile, ordered, timing, unreadable)
+    runs: list[ReadRequest] = []
+    end = len(ordered)
+    while end:
+        start = best[end][1]
+        runs.append(request_of(ordered[start:end]))
+        end = start
+    return runs[::-1]
+
+
+def cheapest(
+    profile: Profile,
+    ordered: Sequence[Parameter],
+    timing: WireTiming,
+    unreadable: Collection[str] = (),
+) -> list[tuple[float, int]]:
+    """For every beginning of the row: its least time in seconds, and where its last run starts."""
     best: list[tuple[float, int]] = [(0.0, 0)]
     for end in range(1, len(ordered) + 1):
         choices = [
             (best[start][0] + timing.read(count), start)
             for start in range(end)
-            if (count := _run_length(profile, ordered[start:end], unreadable)) is not None
+            if (count := run_length(profile, ordered[start:end], unreadable)) is not None
         ]
         best.append(min(choices))
-    runs: list[ReadRequest] = []
-    end = len(ordered)
-    while end:
-        start = best[end][1]
-        runs.append(_request(ordered[start:end]))
-        end = start
-    return runs[::-1]
+    return best
 
 
 def _span(run: Sequence[Parameter]) -> int:
     return max(p.address + word_count(p) for p in run) - run[0].address
 
 
-def _request(run: Sequence[Parameter]) -> ReadRequest:
+def request_of(run: Sequence[Parameter]) -> ReadRequest:
+    """The request that reads a run of neighbours, in the order of their addresses."""
     first = run[0].address
     return ReadRequest(first, _span(run), tuple(Place(p.code, p.address - first) for p in run))
 
 
-def _run_length(
-    profile: Profile, run: Sequence[Parameter], unreadable: Collection[str]
+def run_length(
+    profile: Profile,
+    run: Sequence[Parameter],
+    unreadable: Collection[str] = (),
+    longest: int | None = None,
 ) -> int | None:
-    """Words of a read over this run, or None where the drive does not allow it."""
+    """Words of a read over this run, or None where the drive does not allow it.
+
+    `longest` is the limit of a function other than 3.
+    """
     count = _span(run)
-    if len(run) == 1:
-        return count
     reading = profile.data.reading
-    function = profile.function(3)
-    longest = (function.max_read if function else None) or 1
+    if longest is None:
+        if len(run) == 1:
+            return count
+        function = profile.function(3)
+        longest = (function.max_read if function else None) or 1
     if reading.single_words_only or count > longest:
         return None
     if not reading.gaps_readable and not _all_known(profile, run[0].address, count, unreadable):

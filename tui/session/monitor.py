@@ -30,6 +30,8 @@ SLOW_FACTOR = 10
 TREND_SECONDS = 300.0
 TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 SHORTEST_PERIOD = 0.05
+RESET_NEAR = frozenset({"fault", "starting", "unknown"})
+"""Kinds of state in or after which a drive is reset, maybe without falling silent."""
 RATE_OVER = 6
 """Cycles over which the rate is measured."""
 
@@ -50,6 +52,8 @@ class Snapshot:
     error: str
     """Why this cycle brought nothing, or empty."""
     line: LineState
+    block: str = ""
+    """The block or scanner that brought some of the values."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,6 +91,7 @@ class Monitor:
         """Wished time of a cycle in seconds; read anew at each."""
         self.reader = Reader(line, device, profile)
         self._latest: Snapshot | None = None
+        self._using = ""
         self._trend: deque[TrendPoint] = deque()
         self._listeners: tuple[Listener, ...] = ()
         self._worker: Worker | None = None
@@ -186,6 +191,9 @@ class Monitor:
         """All readings of one cycle; the state's details as soon as it changes."""
         due = (*rates.fast, *rates.changing, *rates.slow) if seldom else rates.fast
         found = await self.reader.read(due or rates.slow, priority=Priority.POLL)
+        self._using = self.reader.using
+        if seldom:
+            await self.reader.learn_slots()
         if seldom or not rates.changing:
             return found
         now = drive_state(self.profile, found)
@@ -217,7 +225,10 @@ class Monitor:
             rate=0.0 if error else 1.0 / span,
             error=error,
             line=self.line.state,
+            block=self._using,
         )
+        if snapshot.state.kind in RESET_NEAR:
+            self.reader.distrust()
         self._latest = snapshot
         self._add_to_trend(snapshot)
         for listener in self._listeners:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from decimal import Decimal
 
@@ -13,11 +13,12 @@ from tui.bus.line import Line, Priority, Reply
 from tui.bus.link import TcpLink, character_time, silence
 from tui.drive.profile import Profile, is_verified
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
-from tui.drive.schema import Parameter
+from tui.drive.schema import Block, Parameter
 from tui.drive.values import Value, decode, from_words, percent_of, word_count
 
 from .limits import limits_of
 from .readings import Quality, Reading
+from .slots import Slots
 
 SOURCE_AGE = 5.0
 """Seconds for which a poll trusts a word that others' values depend on; an operator's read
@@ -61,16 +62,18 @@ class Reader:
     profile: Profile
     ratings: dict[str, Rating] = field(default_factory=dict)
     """What 100 % is, by code, where a person has told it from the nameplate."""
+    using: str = ""
+    """Name of the block or scanner that the last poll read, if it read one."""
     _sources: dict[str, Raw] = field(default_factory=dict)
     _refused: dict[str, Raw] = field(default_factory=dict)
     _unanswered: dict[str, Raw] = field(default_factory=dict)
     """Unconfirmed words at which the drive fell silent while it answers others."""
-    _plans: dict[tuple[frozenset[str], frozenset[str], float], ReadPlan] = field(
-        default_factory=dict
-    )
+    _plans: dict[tuple[Hashable, ...], ReadPlan] = field(default_factory=dict)
+    _slots: Slots = field(init=False)
 
     def __post_init__(self) -> None:
         self.line.describe(self.device, limits_of(self.profile))
+        self._slots = Slots(self.line, self.device, self.profile)
 
     async def read(
         self, codes: Iterable[str], *, priority: Priority = Priority.OPERATOR_READ
@@ -84,13 +87,29 @@ class Reader:
     def seconds(self, codes: Iterable[str]) -> float:
         """What reading these costs on the wire by plan, without retries."""
         sure, unsure = self._by_trust(frozenset(codes).difference(self._refused))
-        return self._plan(sure).seconds + self._plan(unsure).seconds
+        return self._plan(sure, self._slots.in_force()).seconds + self._plan(unsure).seconds
 
     def forget(self) -> None:
         """Read scales and refused parameters anew: another drive may answer now."""
         self._sources.clear()
         self._refused.clear()
         self._plans.clear()
+        self._slots.forget()
+
+    def distrust(self) -> None:
+        """Read directly what a block brings only until the drive's next reset."""
+        self._slots.distrust()
+
+    async def learn_slots(self) -> None:
+        """Find out what the drive's block or scanner brings; polls use it from then on.
+
+        To be called again now and then: others may change it. Raises the line's errors.
+        """
+
+        async def ask(codes: Iterable[str]) -> Mapping[str, Reading]:
+            return await self.read(codes, priority=Priority.POLL)
+
+        await self._slots.learn(ask)
 
     async def _read_sources(self, codes: list[str], priority: Priority) -> None:
         sources = {source for code in codes for source in _depends_on(self.profile[code])}
@@ -108,13 +127,30 @@ class Reader:
     async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
         sure, unsure = self._by_trust(codes.difference(self._refused, found))
-        for request in self._plan(sure).requests:
-            found.update(await self._exchange(request, priority))
+        slots = self._slots.in_force() if priority >= Priority.POLL else {}
+        found.update(await self._follow(self._plan(sure, slots), priority))
         for request in self._plan(unsure).requests:
             found.update(await self._exchange_unsure(request, priority))
         for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
         self._note_sources(found)
+        return found
+
+    async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Raw]:
+        """Values of a plan; those of a block whose slots have changed meanwhile are left out."""
+        found: dict[str, Raw] = {}
+        if priority >= Priority.POLL:
+            used = (self._block_of(request) for request in plan.requests)
+            self.using = next((block.name for block in used if block), "")
+        for request in plan.requests:
+            found.update(await self._exchange(request, priority))
+            self._slots.heard()
+        for check in plan.checks:
+            raws = await self._exchange(check.request, priority)
+            if {code: raw.raw for code, raw in raws.items()} != check.slots:
+                self._slots.forget()
+                for code in check.governs:
+                    found.pop(code, None)
         return found
 
     def _by_trust(self, codes: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
@@ -149,12 +185,12 @@ class Reader:
         for code in self._sources.keys() & found.keys():
             self._sources[code] = found[code]
 
-    def _plan(self, codes: frozenset[str]) -> ReadPlan:
-        key = (codes, frozenset(self._refused), self._turnaround())
+    def _plan(self, codes: frozenset[str], slots: Mapping[str, int] | None = None) -> ReadPlan:
+        refused, turnaround = frozenset(self._refused), self._turnaround()
+        key = (codes, refused, turnaround, tuple(sorted((slots or {}).items())))
         if key not in self._plans:
-            self._plans[key] = plan_reads(
-                self.profile, sorted(codes), self._timing(key[2]), unreadable=key[1]
-            )
+            timing = self._timing(turnaround)
+            self._plans[key] = plan_reads(self.profile, sorted(codes), timing, slots, refused)
         return self._plans[key]
 
     def _turnaround(self) -> float:
@@ -176,7 +212,8 @@ class Reader:
         Where the drive refuses a longer read, or answers a word with the one that stands for
         "no value", the parameter is asked for alone: only then is the answer certain.
         """
-        several = len(request.places) > 1
+        block = self._block_of(request)
+        several = len(request.places) > 1 or block is not None
         try:
             reply = await self.line.read(
                 self.device, request.address, request.count, priority=priority
@@ -191,9 +228,18 @@ class Reader:
         for place in request.places:
             parameter = self.profile[place.code]
             words = reply.words[place.offset : place.offset + word_count(parameter)]
-            if not (request.count > word_count(parameter) and unknown in words):
+            alone = request.count == word_count(parameter) and block is None
+            if alone or unknown not in words:
                 found[place.code] = Raw(reply.time, from_words(parameter, words))
         return found
+
+    def _block_of(self, request: ReadRequest) -> Block | None:
+        """The block or scanner that a request reads; None where it asks parameters directly."""
+        first = request.places[0]
+        if self.profile[first.code].address == request.address + first.offset:
+            return None
+        blocks = self.profile.data.blocks
+        return next((b for b in blocks if 0 <= request.address - b.address < b.max_words), None)
 
     async def _alone(self, parameter: Parameter, priority: Priority) -> Raw:
         count = word_count(parameter)
