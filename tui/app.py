@@ -33,6 +33,9 @@ log = logging.getLogger("drivepanel")
 CONNECT_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""
 
+HUNGER_LOOK = 0.25
+"""Seconds between two looks for drives that are about to act on their time-out."""
+
 Opener = Callable[..., OpenLine]
 
 
@@ -56,10 +59,12 @@ class DrivePanelApp(Panel):
         device: int | None = None,
         clock: Clock | None = None,
         read_only: bool = False,
+        low_bandwidth: bool = False,
     ) -> None:
         super().__init__()
         self.clock = clock or Clock()
         self.read_only = read_only
+        self.low_bandwidth = low_bandwidth
         self.period = 0.5
         self.opened: OpenLine | None = None
         self.keeper: Keeper | None = None
@@ -68,14 +73,30 @@ class DrivePanelApp(Panel):
         self._start = start
         self._device = device
         self._gone = False
+        self._hungry: set[int] = set()
 
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
         self.register_theme(THEME)
         self.theme = THEME.name
         self.push_screen(self.connection)
+        self.set_interval(HUNGER_LOOK, self._tell_hunger)
         if self._start is not None:
             self.call_after_refresh(self.connection.start, self._start, self._device)
+
+    def _tell_hunger(self) -> None:
+        """Tell of a drive that is about to act because it was not asked in time."""
+        hungry = self.keeper.hungry() if self.keeper else []
+        for one in hungry:
+            if one.device not in self._hungry and one.left > 0:
+                does = f": {one.watch.reaction.does}" if one.watch.reaction else "."
+                self.notify(
+                    f"{one.profile.name}, device {one.device}, was not heard for"
+                    f" {one.silent:.1f} s. In {one.left:.1f} s it acts on its time-out{does}",
+                    severity="error",
+                    timeout=max(3.0, one.left),
+                )
+        self._hungry = {one.device for one in hungry}
 
     async def on_unmount(self) -> None:
         """Leave no line open."""

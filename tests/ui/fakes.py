@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, cast
 
 from tui.app import DrivePanelApp
-from tui.bus.line import Counters, Frame, Line, LineState, LineStatus
+from tui.bus.line import Counters, DeviceState, Frame, Line, LineState, LineStatus
 from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.drive.profile import Profile
@@ -15,7 +15,7 @@ from tui.drive.values import decode
 from tui.session.drive_session import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.identify import DriveIdentity
-from tui.session.keeper import Keeper
+from tui.session.keeper import Keeper, Watch
 from tui.session.lines import OpenLine
 from tui.session.monitor import Snapshot, TrendPoint
 from tui.session.readings import Quality, Reading
@@ -72,6 +72,8 @@ def snapshot_of(
     *,
     age: float = 0.1,
     error: str = "",
+    rate: float = 2.0,
+    block: str = "",
 ) -> Snapshot:
     """A snapshot whose values are so many seconds old."""
     readings = readings_of(profile, raws, NOW - age)
@@ -81,9 +83,10 @@ def snapshot_of(
         wall=0.0,
         readings=readings,
         state=drive_state(profile, readings),
-        rate=0.0 if error else 2.0,
+        rate=0.0 if error else rate,
         error=error,
         line=line,
+        block=block,
     )
 
 
@@ -119,6 +122,7 @@ class FakeLine:
             busy_seconds=31.0,
         )
     )
+    heard: float = NOW - 0.2
     trace: tuple[Frame, ...] = (
         Frame(NOW - 0.6, "out", bytes.fromhex("02030c1e0004276c")),
         Frame(NOW - 0.59, "in", bytes.fromhex("02030800280258 01f4000052b0".replace(" ", ""))),
@@ -129,6 +133,10 @@ class FakeLine:
     def spawn(self, *_: Any, **__: Any) -> Any:
         """No loop, no worker."""
         return type("Worker", (), {"cancel": lambda self: None, "done": lambda self: False})()
+
+    def device_state(self, _device: int) -> DeviceState:
+        """Heard a moment ago."""
+        return DeviceState(True, 0, None, None, 0.005, self.heard)
 
     def describe(self, *_: Any) -> None:
         """Limits are not looked at."""
@@ -141,6 +149,17 @@ class FakeKeeper:
     """A keeper that has looked at no drive."""
 
     looks: ClassVar[dict[int, Any]] = {}
+
+    def __init__(self, watch: Watch | None = None) -> None:
+        self._watch = watch
+
+    def watch(self, _device: int) -> Watch | None:
+        """The watch that the test gives."""
+        return self._watch
+
+    def hungry(self) -> list[Any]:
+        """No drive is about to trip."""
+        return []
 
     def left_alone(self) -> dict[int, float]:
         """No drive trips."""

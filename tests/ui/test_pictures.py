@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from textual.pilot import Pilot
@@ -16,6 +16,7 @@ from tui.screens.connection import ConnectionScreen
 from tui.screens.found import FoundDrive
 from tui.screens.monitor import MonitorScreen
 from tui.session.identify import DriveIdentity
+from tui.session.keeper import Keeper, Watch
 
 from . import fakes
 
@@ -54,6 +55,41 @@ def test_monitor(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(MonitorScreen(fakes.session_of(snapshot, line)))
+        await pilot.pause()
+        app.screen.look()  # type: ignore[attr-defined]
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+WATCH = Watch(10.0, library.load("atv71").data.communication_fault.reactions[6], active=True)  # type: ignore[union-attr]
+LOST_WATCHED = {"raws": fakes.RUNNING, "age": 12.0, "error": "The line is lost."}
+SPECIAL: dict[str, tuple[dict[str, Any], LineState, float, bool]] = {
+    "watched": ({"raws": fakes.RUNNING}, fakes.CONNECTED, 0.2, False),
+    "hungry": (
+        {"raws": fakes.RUNNING, "rate": 0.7, "block": "Scanner inputs"},
+        fakes.CONNECTED,
+        6.2,
+        False,
+    ),
+    "lost-watched": (LOST_WATCHED, fakes.LOST, 7.0, False),
+    "low-bandwidth": ({"raws": fakes.RUNNING}, fakes.CONNECTED, 0.2, True),
+}
+
+
+@SIZES
+@pytest.mark.parametrize("state", SPECIAL)
+def test_watched(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+    how, line, age, low = SPECIAL[state]
+    snapshot = fakes.snapshot_of(library.load("atv71"), line=line, **how)
+    app = fakes.app_of()
+    app.opened, app.low_bandwidth = fakes.opened(line), low
+    session = fakes.session_of(snapshot, line)
+    session.line.heard = fakes.NOW - age  # type: ignore[attr-defined]
+
+    async def show(pilot: Pilot[None]) -> None:
+        app.keeper = cast("Keeper", fakes.FakeKeeper(WATCH))
+        await app.push_screen(MonitorScreen(session))
         await pilot.pause()
         app.screen.look()  # type: ignore[attr-defined]
         await pilot.pause()

@@ -22,7 +22,13 @@ DEMO_LINE = "demo"
 """The LINE of the demo inside the panel; every other text is opened as it is written."""
 
 
-def run_panel(start: str | None, device: int | None, *, read_only: bool = False) -> None:
+def run_panel(
+    start: str | None,
+    device: int | None,
+    *,
+    read_only: bool = False,
+    low_bandwidth: bool = False,
+) -> None:
     """Run the panel until it is left."""
     if not _has_terminal():
         raise Failure("The panel needs a terminal. Without one, use read, watch or --help.", USAGE)
@@ -35,6 +41,7 @@ def run_panel(start: str | None, device: int | None, *, read_only: bool = False)
         start=start,
         device=device,
         read_only=read_only,
+        low_bandwidth=low_bandwidth,
     )
     app.run()
     if app.return_code:
@@ -54,11 +61,17 @@ def _has_terminal() -> bool:
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
+low_bandwidth_option = click.option(
+    "--low-bandwidth", is_flag=True, help="Send as little as possible to a slow terminal."
+)
+
+
 @click.command()
+@low_bandwidth_option
 @told
-def demo() -> None:
+def demo(low_bandwidth: bool) -> None:
     """Open the panel on one simulated line with five running drives."""
-    run_panel(DEMO_LINE, None)
+    run_panel(DEMO_LINE, None, low_bandwidth=low_bandwidth)
 
 
 @click.command(hidden=True)
@@ -71,9 +84,10 @@ def demo() -> None:
     help="Watch the drive at this slave address at once; without it, look for drives.",
 )
 @read_only_option
+@low_bandwidth_option
 @told
-def panel(line_text: str | None, device: int | None, read_only: bool) -> None:
+def panel(line_text: str | None, device: int | None, read_only: bool, low_bandwidth: bool) -> None:
     """Open the panel."""
     if device is not None and line_text is None:
         raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
-    run_panel(line_text, device, read_only=read_only)
+    run_panel(line_text, device, read_only=read_only, low_bandwidth=low_bandwidth)

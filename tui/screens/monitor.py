@@ -35,6 +35,7 @@ from .panel import Panel
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
+LOW_BANDWIDTH_REFRESH = 2.0
 WIDE = (110, 36)
 """Columns and rows from which all words stand side by side."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -84,7 +85,9 @@ class MonitorScreen(Screen[None]):
     def on_mount(self) -> None:
         """Start watching."""
         self.session.monitor.start(period=self.app.period, extra=self._extras())
-        self._timer = self.set_interval(REFRESH, self.look)
+        self._timer = self.set_interval(
+            LOW_BANDWIDTH_REFRESH if self.app.low_bandwidth else REFRESH, self.look
+        )
         self.query_one("#keys", Lines).show([key_line(keys_of(MONITOR))])
         self.call_after_refresh(self.look)
 
@@ -136,6 +139,9 @@ class MonitorScreen(Screen[None]):
             now=now,
             clock=self.app.clock.time_of_day(),
             read_only=self.app.read_only,
+            low_bandwidth=self.app.low_bandwidth,
+            watch=self.app.keeper.watch(self.session.device) if self.app.keeper else None,
+            heard=self.session.line.device_state(self.session.device).heard,
             was=self._was,
         )
 

@@ -17,6 +17,8 @@ class Panel(App[None]):
 
     clock: Clock
     read_only: bool
+    low_bandwidth: bool
+    """Whether the terminal is to be sent as little as possible."""
     period: float
     """Wished time of a monitoring cycle in seconds, the same for every drive."""
     opened: OpenLine | None

@@ -9,6 +9,7 @@ from tui.bus.line import LineStatus
 from tui.drive.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.drive_state import DriveState, channel_text
+from tui.session.keeper import TOLD_AFTER
 from tui.session.readings import Quality
 
 from .drawing import cut, pair, rule
@@ -31,6 +32,8 @@ STATE_STYLES: dict[str, Style] = {
     "unknown": ALARM,
     "stopping": PLAIN,
 }
+HELD = 0.9
+"""Share of the wished rate from which on it counts as held."""
 STATE_SIGNS = {"running": "▶", "fault": "■", "unknown": "?"}
 
 
@@ -122,7 +125,7 @@ def _messages(view: View, width: int) -> list[Text]:
         return [Text("connecting to the drive", FAINT), Text("")]
     if snapshot.error:
         return [
-            Text(cut("NO VALUES: what is shown is old", width), ALARM),
+            Text(cut("NO VALUES: what is shown is old" + _countdown(view), width), ALARM),
             Text(cut(snapshot.error, width), STALE),
         ]
     state = snapshot.state
@@ -133,6 +136,11 @@ def _messages(view: View, width: int) -> list[Text]:
         return [
             Text(cut(f"FAULT {fault.code} ({fault.raw}) {fault.name}", width), FAULT),
             Text(cut(cause + remedy, width), PLAIN),
+        ]
+    if _is_hungry(view):
+        return [
+            _alarm_line(view, state, width),
+            Text(cut(f"NOT HEARD{_countdown(view)}", width), ALARM),
         ]
     return [_alarm_line(view, state, width), _last_fault(view, width)]
 
@@ -168,19 +176,44 @@ def _line_trouble(view: View, width: int) -> list[Text]:
         if line.next_try is not None:
             again = f", trying again in {max(0.0, line.next_try - view.now):.0f} s"
         word = "LINE LOST" if line.status is LineStatus.LOST else "LINE CLOSED"
-        head = Text(cut(f"{word} for {since}{again}", width), ALARM)
+        head = Text(cut(f"{word} for {since}{again}{_countdown(view)}", width), ALARM)
     return [head, Text(cut(line.reason, width), STALE)]
+
+
+def _is_hungry(view: View) -> bool:
+    """Whether the drive was not asked for a good part of its time-out."""
+    left = view.time_left
+    return (
+        left is not None and view.watch is not None and left < (1 - TOLD_AFTER) * view.watch.timeout
+    )
+
+
+def _countdown(view: View) -> str:
+    """What a drive that is not asked does, and when; nothing where it does nothing."""
+    left = view.time_left
+    if left is None or view.watch is None:
+        return ""
+    does = view.watch.reaction.name.lower() if view.watch.reaction else "its own reaction"
+    when = f"drive acts in {left:.0f} s" if left > 0 else "drive has acted by now"
+    return f" · {when}: {does}"
 
 
 def status_lines(view: View, width: int) -> list[Text]:
     """What the panel itself does: monitoring, how fast, how well the line answers."""
     text = Text(no_wrap=True)
     text.append(" MONITORING", STRONG if not view.lost else ALARM)
-    rate = view.snapshot.rate if view.snapshot else 0.0
+    rate, wished = view.snapshot.rate if view.snapshot else 0.0, 1 / view.period
     counts = view.counters
     bad = counts.timeouts + counts.checksum + counts.wrong
-    text.append(f"  {rate:4.1f} of {1 / view.period:.1f} cycles/s", FAINT)
-    text.append(f"  {counts.requests} requests, {bad} without a good answer", FAINT)
+    held = rate > HELD * wished or not rate
+    text.append(f"  {rate:4.1f} of {wished:.1f} cycles/s", FAINT if held else ALARM)
+    if view.snapshot is not None and view.snapshot.block:
+        text.append(f" by {view.snapshot.block.lower()}", FAINT)
+    if view.watch is not None and view.watch.active:
+        text.append(f"  watch {view.watch.timeout:g} s", FAINT)
+        if _is_hungry(view):
+            text.append(f", {max(0.0, view.time_left or 0.0):.0f} s left", ALARM)
+    text.append(f"  {counts.requests} requests, {bad} failed", FAINT)
     if view.read_only:
         text.append("  read-only", FAINT)
     text.truncate(width)

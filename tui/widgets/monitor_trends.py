@@ -49,6 +49,9 @@ def _trend(
     if parameter is None:
         nothing = Text(cut(" not known", width), FAINT)
         return [rule(title, width), nothing, *[Text(" " * width)] * (height - 2)]
+    if view.low_bandwidth:
+        off = Text(cut(" off: low bandwidth", width), FAINT)
+        return [rule(title, width), off, *[Text(" " * width)] * (height - 2)]
     high = _trend_high(view, parameter, index)
     columns = width - 1
     step = TREND_SPAN / columns

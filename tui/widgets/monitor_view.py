@@ -8,6 +8,7 @@ from tui.bus.line import Counters, LineState, LineStatus
 from tui.drive.profile import Profile
 from tui.drive.schema import MonitoringValue
 from tui.session.identify import DriveIdentity
+from tui.session.keeper import Watch
 from tui.session.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
 from tui.session.readings import Reading
 
@@ -29,6 +30,12 @@ class View:
     now: float
     clock: str
     read_only: bool = False
+    low_bandwidth: bool = False
+    """Whether the trend is left out and the screen looked at less often."""
+    watch: Watch | None = None
+    """The drive's watch over the line, where it has one that runs."""
+    heard: float | None = None
+    """When the drive last answered anybody on this line."""
     was: str = ""
     """What the drive did when it was last known."""
 
@@ -48,6 +55,13 @@ class View:
     def rare(self, code: str) -> bool:
         """Whether the value is one of those read seldom beside the monitoring set."""
         return code not in {value.parameter for value in self.values}
+
+    @property
+    def time_left(self) -> float | None:
+        """Seconds until the drive acts on its time-out if nobody asks it; None if it does not."""
+        if self.watch is None or not self.watch.active or self.heard is None:
+            return None
+        return self.watch.timeout - (self.now - self.heard)
 
     @property
     def values(self) -> list[MonitoringValue]:
