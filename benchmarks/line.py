@@ -42,7 +42,9 @@ from tui.simulator import LineTiming
 FAMILIES = "atv21,atv31,atv312,atv71,powerdrive,proxidrive,varmeca"
 DEVICE = 1
 PATIENCE = 20.0
-PANEL_SECONDS = 1.5
+LAST_REPLY = 0.1
+"""Seconds for the reply that is on its way when a process is ended."""
+PANEL_SECONDS = 2.5
 """Least time for which the panel is measured; it reads its slow values every tenth cycle."""
 SETTLED = 0.5
 """Seconds after the panel's first cycle that are not counted."""
@@ -247,7 +249,7 @@ def mbpoll(cell: Cell) -> Record:
     time.sleep(cell.seconds + 0.1)
     process.terminate()
     process.wait()
-    time.sleep(0.1)  # the reply that was on its way
+    time.sleep(LAST_REPLY)
     exchanges = cell.wire.take()
     return Record(cell.wire.times, exchanges, [e.ended for e in exchanges if e.size])
 
@@ -285,12 +287,14 @@ def whole_panel(cell: Cell) -> Record:
             time.sleep(SETTLED)
             cell.wire.take()
             time.sleep(max(PANEL_SECONDS, cell.seconds))
-            exchanges = cell.wire.take()
+            stop = time.monotonic()
         finally:
             process.send_signal(signal.SIGTERM)
             process.wait(10)
+        time.sleep(LAST_REPLY)
     with os.fdopen(reading, "rb") as pipe:
         ends = [end for end, _ in struct.iter_unpack("d?", pipe.read())]
+    exchanges = [exchange for exchange in cell.wire.take() if exchange.began < stop]
     return Record(cell.wire.times, exchanges, ends)
 
 
@@ -332,6 +336,7 @@ class Row:
             "cycle_to_best_plan": whole and whole / self.cell.limit,
             "cycle_to_design": whole and whole / self.cell.design,
             "cycle_to_own_requests": sum(lengths) / sum(own) if own else None,
+            "line_use": mean(record.use() for record in records),
             "request_median": median(steps) if steps else None,
             "request_mean": mean(steps) if steps else None,
             "request_99": share(steps, 0.99),
@@ -380,6 +385,7 @@ COLUMNS = (
     ("cycle_to_best_plan", "/ best plan", "{:.3f}"),
     ("cycle_to_design", "/ two silences", "{:.3f}"),
     ("cycle_to_own_requests", "/ own requests", "{:.3f}"),
+    ("line_use", "line use", "{:.2f}"),
     ("request_median", "request median", "{:.3f}"),
     ("request_mean", "mean", "{:.3f}"),
     ("request_99", "99 %", "{:.3f}"),
@@ -433,8 +439,8 @@ def options() -> argparse.Namespace:
     parser.add_argument("--families", default=FAMILIES)
     parser.add_argument("--bauds", default="9600,19200")
     parser.add_argument("--format", default="8E1", help="characters of the simulated line")
-    parser.add_argument("--seconds", type=float, default=0.3, help="length of a run")
-    parser.add_argument("--rounds", type=int, default=2)
+    parser.add_argument("--seconds", type=float, default=0.4, help="length of a run")
+    parser.add_argument("--rounds", type=int, default=1, help="rounds of all contestants")
     return parser.parse_args()
 
 

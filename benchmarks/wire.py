@@ -135,6 +135,11 @@ class Record:
         """Least time of all exchanges that were answered, in s."""
         return sum(self.times.shortest(e) for e in self.exchanges if e.size)
 
+    def use(self) -> float:
+        """Share of the time from the first to the last request for which the line was needed."""
+        before = sum(self.times.shortest(e) for e in self.exchanges[:-1] if e.size)
+        return before / (self.exchanges[-1].began - self.exchanges[0].began)
+
     @property
     def unanswered(self) -> int:
         """Requests without a reply."""

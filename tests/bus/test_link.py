@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from tui.bus.errors import LinkSyntaxError
+from tui.bus.line import Line
 from tui.bus.link import (
     Link,
     RtuTcpLink,
@@ -40,6 +41,10 @@ from tui.bus.link import (
         ("tcp:[fe80::1%eth0]:503", TcpLink("fe80::1%eth0", 503)),
         ("rtu-tcp:10.0.0.5:4001", RtuTcpLink("10.0.0.5", 4001)),
         (" tcp:10.0.0.5 ", TcpLink("10.0.0.5", 502)),
+        ("tcp:10.0.0.5,timeout=2.5", TcpLink("10.0.0.5", 502, 2.5)),
+        ("rtu-tcp:10.0.0.5:4001, Timeout=0.3", RtuTcpLink("10.0.0.5", 4001, 0.3)),
+        ("/dev/ttyUSB0,timeout=2", SerialLink("/dev/ttyUSB0", timeout=2.0)),
+        ("serial:/dev/ttyUSB0,9600,8N1,timeout=2", SerialLink("/dev/ttyUSB0", 9600, "8N1", 2.0)),
     ],
 )
 def test_links_that_can_be_typed(text: str, link: Link) -> None:
@@ -66,6 +71,11 @@ def test_any_path_that_exists_is_a_port(tmp_path: Path) -> None:
         "serial:/dev/ttyUSB0,0",
         "serial:/dev/ttyUSB0,19200,7E1",
         "serial:/dev/ttyUSB0,19200,8E1,x",
+        "serial:/dev/ttyUSB0,timeout=",
+        "tcp:10.0.0.5,timeout=0",
+        "tcp:10.0.0.5,timeout=nan",
+        "tcp:10.0.0.5,timeout=60",
+        "timeout=2",
         "tcp:",
         "tcp::502",
         "tcp:10.0.0.5:0",
@@ -79,6 +89,14 @@ def test_links_that_cannot(text: str) -> None:
     with pytest.raises(LinkSyntaxError) as caught:
         parse_link(text)
     assert str(caught.value).endswith((".", "bits."))
+
+
+def test_a_time_out_that_was_set_is_kept() -> None:
+    usual, patient = Line(TcpLink("::1")).timing, Line(TcpLink("::1", timeout=5.0)).timing
+    assert (patient.first_timeout, patient.late_reply) == (5.0, 10.0)
+    assert patient.min_timeout == usual.min_timeout
+    hurried = Line(TcpLink("::1", timeout=0.05)).timing
+    assert (hurried.first_timeout, hurried.min_timeout, hurried.scan_timeout) == (0.05,) * 3
 
 
 def test_labels() -> None:

@@ -6,6 +6,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from .devices import Devices
 from .engine import Engine
@@ -59,6 +60,10 @@ logging.getLogger("pymodbus").propagate = False
 logging.getLogger("pymodbus").addHandler(logging.NullHandler())
 
 
+LATE_REPLY = 2.0
+"""A reply may come so many times later than the time-out that a person has set."""
+
+
 class Line:
     """A line shared by everything that talks to its devices.
 
@@ -78,7 +83,7 @@ class Line:
     ) -> None:
         self.link = link
         self.read_only = read_only
-        self.timing = timing or Timing()
+        self.timing = timing or timing_of(link)
         self.pace = Pace()
         """Shares the line's time out among regular polls."""
         self._engine = Engine(link, self.timing, clock)
@@ -235,6 +240,20 @@ class Line:
         job = Job(request, priority, limits, replaceable=replaceable)
         self._engine.submit(job)
         return await asyncio.wrap_future(job.answer)
+
+
+def timing_of(link: Link) -> Timing:
+    """The usual timing of a line, with the time-out that a person has set."""
+    usual = Timing()
+    if link.timeout is None:
+        return usual
+    return replace(
+        usual,
+        first_timeout=link.timeout,
+        min_timeout=min(usual.min_timeout, link.timeout),
+        scan_timeout=min(usual.scan_timeout, link.timeout),
+        late_reply=max(usual.late_reply, LATE_REPLY * link.timeout),
+    )
 
 
 def _write(

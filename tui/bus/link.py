@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import os
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from .errors import LinkSyntaxError
 
 FORMS = (
     "serial:PATH[,BAUD[,FORMAT]] such as serial:/dev/ttyUSB0,19200,8E1, tcp:HOST[:PORT], "
-    "or rtu-tcp:HOST:PORT"
+    "or rtu-tcp:HOST:PORT; ,timeout=SECONDS at the end sets the longest wait for a reply"
 )
 FAST = 19200
 """Above this rate the silence between frames is FAST_SILENCE (Modbus over serial line 2.5.1.1)."""
@@ -18,6 +18,8 @@ FAST_SILENCE = 0.00175
 SILENT_CHARACTERS = 3.5
 MODBUS_PORT = 502
 _FORMAT = re.compile(r"8([NEO])([12])")
+_TIMEOUT = re.compile(r"(.*),\s*timeout\s*=([^,]*)", re.IGNORECASE)
+SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.02, 30.0
 _PORT_NAME = re.compile(r"(?:/dev/.+|\\\\\.\\.+|COM\d+)", re.IGNORECASE)
 
 
@@ -28,6 +30,8 @@ class SerialLink:
     path: str
     baud: int = 19200
     format: str = "8E1"
+    timeout: float | None = None
+    """Longest wait for a reply in seconds, where a person has set it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +40,7 @@ class TcpLink:
 
     host: str
     port: int = MODBUS_PORT
+    timeout: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +49,7 @@ class RtuTcpLink:
 
     host: str
     port: int
+    timeout: float | None = None
 
 
 Link = SerialLink | TcpLink | RtuTcpLink
@@ -53,10 +59,30 @@ def parse_link(text: str) -> Link:
     """The link that a person typed.
 
     Takes `serial:PATH[,BAUD[,FORMAT]]`, a bare port (`/dev/ttyUSB0`, `COM3`, any path that
-    exists), `tcp:HOST[:PORT]` and `rtu-tcp:HOST:PORT`, with IPv6 hosts in brackets.
+    exists), `tcp:HOST[:PORT]` and `rtu-tcp:HOST:PORT`, with IPv6 hosts in brackets, each with
+    `,timeout=SECONDS` behind it (0.02..30) where a drive or a gateway is slow.
     Raises LinkSyntaxError.
     """
     text = text.strip()
+    if match := _TIMEOUT.fullmatch(text):
+        return replace(_parse(match[1]), timeout=_seconds(text, match[2].strip()))
+    return _parse(text)
+
+
+def _seconds(text: str, typed: str) -> float:
+    try:
+        seconds = float(typed)
+    except ValueError:
+        seconds = 0.0
+    if not SHORTEST_TIMEOUT <= seconds <= LONGEST_TIMEOUT:
+        raise LinkSyntaxError(
+            f"{text}: {typed!r} is not a time-out. Write seconds from {SHORTEST_TIMEOUT:g} to "
+            f"{LONGEST_TIMEOUT:g}, such as timeout=2."
+        )
+    return seconds
+
+
+def _parse(text: str) -> Link:
     kind, colon, rest = text.partition(":")
     match kind.casefold() if colon else "":
         case "serial":
@@ -112,13 +138,14 @@ def _host_and_port(text: str, rest: str) -> tuple[str, int | None]:
 
 def label(link: Link) -> str:
     """How the link is written: `serial:/dev/ttyUSB0,19200,8E1`, `tcp:10.0.0.5:502`."""
+    timeout = "" if link.timeout is None else f",timeout={link.timeout:g}"
     match link:
         case SerialLink(path, baud, format_):
-            return f"serial:{path},{baud},{format_}"
+            return f"serial:{path},{baud},{format_}{timeout}"
         case TcpLink(host, port):
-            return f"tcp:{_bracketed(host)}:{port}"
+            return f"tcp:{_bracketed(host)}:{port}{timeout}"
         case RtuTcpLink(host, port):
-            return f"rtu-tcp:{_bracketed(host)}:{port}"
+            return f"rtu-tcp:{_bracketed(host)}:{port}{timeout}"
 
 
 def _bracketed(host: str) -> str:

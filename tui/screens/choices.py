@@ -12,7 +12,7 @@ from tui.widgets.drawing import cut
 from tui.widgets.palette import FAINT, PLAIN
 
 LINE_FORMS = (
-    "serial:/dev/ttyUSB0,19200,8E1",
+    "serial:/dev/ttyUSB0,19200,8E1 (and ,timeout=2 for slow drives)",
     "tcp:192.168.0.10:502",
     "rtu-tcp:192.168.0.10:4001",
     "sim:atv71@2,atv21",
