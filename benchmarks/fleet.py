@@ -1,0 +1,236 @@
+"""Many simulated drives on one line, all watched at once: how full, how even, at what cost.
+
+    python -m benchmarks.fleet [--drives N] [--seconds S] [--period S]
+
+Once all drives answer; once, from the same start, one of them is switched off. All drives read
+their slow values at about the same time, in every tenth cycle: a stretch of time holds that or
+not, so only stretches at the same distance from the start can be compared.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import sys
+import time
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict
+from statistics import median
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.wire import Record, WireLine, Worker, share
+from tui.bus.line import Line
+from tui.bus.link import parse_link
+from tui.drive.library import load
+from tui.drive.read_plan import WireTiming, plan_reads
+from tui.session.drive_session import DriveSession
+from tui.session.monitor import monitoring_codes
+from tui.simulator import LineTiming
+
+FAMILIES = ("atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca")
+GROUPS = 4
+"""The families from this one on take an address with the digit 0 for that of a group."""
+SETTLING = 5.0
+"""Seconds from the start in which all drives are met for the first time; not counted."""
+
+
+def fleet(count: int) -> dict[int, str]:
+    """Families by address, mixed."""
+    return {address: _family(address) for address in range(1, count + 1)}
+
+
+def _family(address: int) -> str:
+    kinds = FAMILIES[:GROUPS] if "0" in str(address) else FAMILIES
+    return kinds[address % len(kinds)]
+
+
+# The process that watches
+
+
+def watch() -> None:
+    """Watch all drives named in the first job; the next one asks for figures."""
+    first = json.loads(sys.stdin.readline())
+    line = Line(parse_link(first["text"]))
+    line.open(wait=5.0)
+    drives = {int(address): family for address, family in first["drives"].items()}
+    sessions = {a: DriveSession(line, a, load(family)) for a, family in drives.items()}
+    for session in sessions.values():
+        session.monitor.start(period=first["period"])
+    print(json.dumps({}), flush=True)
+    seconds = json.loads(sys.stdin.readline())["seconds"]
+    before = _state(line, sessions)
+    time.sleep(seconds)
+    print(json.dumps({"before": before, "after": _state(line, sessions)}), flush=True)
+    line.close()
+
+
+def _state(line: Line, sessions: Mapping[int, DriveSession]) -> dict[str, object]:
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    latest = {address: session.monitor.latest for address, session in sessions.items()}
+    return {
+        "time": time.monotonic(),
+        "cpu": used.ru_utime + used.ru_stime,
+        "cycles": {address: one.cycle if one else 0 for address, one in latest.items()},
+        "failing": [address for address, one in latest.items() if one is None or one.error],
+        "counters": asdict(line.counters),
+    }
+
+
+# What the line saw of it
+
+
+def figures(
+    record: Record, drives: Mapping[int, str], told: dict[str, Any], chosen: int
+) -> dict[str, Any]:
+    """Figures of one stretch of time; the others are all but the drive that is chosen to die."""
+    before, after = told["before"], told["after"]
+    seconds = after["time"] - before["time"]
+    inside = [e for e in record.exchanges if before["time"] <= e.began < after["time"]]
+    record = Record(record.times, inside)
+    by_drive = _values(record, drives)
+    values = sum(by_drive.values())
+    cycles = {
+        address: count - before["cycles"][address]
+        for address, count in after["cycles"].items()
+        if int(address) != chosen
+    }
+    late, gaps = record.lateness(), record.gaps()
+    counters = {key: after["counters"][key] - was for key, was in before["counters"].items()}
+    return {
+        "seconds": seconds,
+        "values_a_second": values / seconds,
+        "others_values_a_second": (values - by_drive[chosen]) / seconds,
+        "limit_of_same_requests": values / record.least(),
+        "line_use": record.least() / seconds,
+        "fewest_cycles": min(cycles.values()),
+        "most_cycles": max(cycles.values()),
+        "evenness": min(cycles.values()) / max(max(cycles.values()), 1),
+        "cpu_share": (after["cpu"] - before["cpu"]) / seconds,
+        "failing": after["failing"],
+        "counters": counters,
+        "smallest_silence": min(gaps) / record.times.silence,
+        "broken_silences": sum(gap < record.times.silence for gap in gaps),
+        "request_median": median(record.steps()),
+        "simulator_late_ms": {"median": median(late) * 1e3, "99": (share(late, 0.99) or 0) * 1e3},
+    }
+
+
+def _values(record: Record, drives: Mapping[int, str]) -> Counter[int]:
+    """How many monitored values were in the replies of each drive."""
+    addresses = {}
+    for family in set(drives.values()):
+        profile = load(family)
+        addresses[family] = [profile[code].address for code in monitoring_codes(profile)]
+    values: Counter[int] = Counter()
+    for exchange in record.exchanges:
+        first = int.from_bytes(exchange.request[2:4], "big")
+        last = first + (exchange.size - 5) // 2
+        device = exchange.request[0]
+        values[device] += sum(first <= one < last for one in addresses[drives[device]])
+    return values
+
+
+def full_sets(wire: WireLine, drives: Mapping[int, str]) -> float:
+    """Values a second if nothing but whole monitoring sets by their best plans were read."""
+    values, seconds = 0, 0.0
+    for address, family in drives.items():
+        profile = load(family)
+        codes = monitoring_codes(profile)
+        times = wire.times
+        timing = WireTiming(times.character, times.silence, times.turnarounds[address])
+        plan = plan_reads(profile, codes, timing)
+        values += len(codes)
+        seconds += sum(times.read(address, request.count) for request in plan.requests)
+    return values / seconds
+
+
+# What is printed
+
+
+def show(console: Console, stretches: Sequence[dict[str, Any]], title: str) -> None:
+    """Print the figures of both stretches side by side."""
+    table = Table(title=title)
+    table.add_column("")
+    table.add_column("all answer", justify="right")
+    table.add_column("one dead", justify="right")
+    rows: dict[str, Callable[[dict[str, Any]], str]] = {
+        "values a second": lambda one: f"{one['values_a_second']:.1f}",
+        "of these by the others": lambda one: f"{one['others_values_a_second']:.1f}",
+        "limit for the same requests": lambda one: f"{one['limit_of_same_requests']:.1f}",
+        "share of the limit": lambda one: f"{one['line_use']:.3f}",
+        "others: fewest / most cycles": lambda one: (
+            f"{one['fewest_cycles']} / {one['most_cycles']}"
+        ),
+        "CPU, share of a core": lambda one: f"{one['cpu_share']:.3f}",
+        "requests": lambda one: str(one["counters"]["requests"]),
+        "replies": lambda one: str(one["counters"]["replies"]),
+        "time-outs": lambda one: str(one["counters"]["timeouts"]),
+        "refusals": lambda one: str(one["counters"]["exceptions"]),
+        "drives failing at the end": lambda one: str(len(one["failing"])),
+        "request to request / theory": lambda one: f"{one['request_median']:.3f}",
+        "least silence / 3.5 characters": lambda one: f"{one['smallest_silence']:.2f}",
+        "silences broken": lambda one: str(one["broken_silences"]),
+        "simulator late, ms": lambda one: f"{one['simulator_late_ms']['median']:.2f}",
+    }
+    for name, text in rows.items():
+        table.add_row(name, *(text(one) for one in stretches))
+    console.print(table)
+
+
+def options() -> argparse.Namespace:
+    """The options that were given."""
+    parser = argparse.ArgumentParser(description="Many drives on one line.")
+    parser.add_argument("--drives", type=int, default=31)
+    parser.add_argument("--baud", type=int, default=19200)
+    parser.add_argument("--seconds", type=float, default=20.0, help="length of each stretch")
+    parser.add_argument("--period", type=float, default=0.1, help="wished cycle time in seconds")
+    return parser.parse_args()
+
+
+def stretch(
+    wire: WireLine, given: argparse.Namespace, chosen: int, *, dies: bool
+) -> dict[str, Any]:
+    """Figures of one stretch, from a fresh start of line and panel side."""
+    drives = fleet(given.drives)
+    wire.set_up(drives, LineTiming(given.baud, "8E1", True))
+    worker = Worker("from benchmarks.fleet import watch; watch()")
+    try:
+        worker.ask(text=wire.text, drives=drives, period=given.period)
+        time.sleep(SETTLING)
+        if dies:
+            wire.kill(chosen)
+        told = worker.ask(seconds=given.seconds)
+        return figures(Record(wire.times, wire.take()), drives, told, chosen)
+    finally:
+        worker.close()
+
+
+def main() -> None:
+    """Measure, print the table, and all figures as JSON in the last line."""
+    given = options()
+    console = Console()
+    chosen = (given.drives + 1) // 2
+    wire = WireLine()
+    try:
+        stretches = [stretch(wire, given, chosen, dies=dies) for dies in (False, True)]
+        limit = full_sets(wire, fleet(given.drives))
+    finally:
+        wire.close()
+    title = f"{given.drives} drives at {given.baud} baud, a cycle wished each {given.period} s"
+    show(console, stretches, title)
+    others = [one["others_values_a_second"] for one in stretches]
+    lost = 1 - others[1] / others[0]
+    console.print(f"Whole monitoring sets alone would bring {limit:.1f} values a second.")
+    console.print(f"With drive {chosen} dead the others bring {100 * lost:.1f} % fewer values.")
+    result = {"benchmark": "fleet", "drives": given.drives, "baud": given.baud, "dead": chosen}
+    both = {"all": stretches[0], "one_dead": stretches[1]}
+    print(json.dumps({**result, "full_sets_limit": limit, "others_lose": lost, **both}))
+
+
+if __name__ == "__main__":
+    main()
