@@ -224,12 +224,12 @@ def main() -> None:
     title = f"{given.drives} drives at {given.baud} baud, a cycle wished each {given.period} s"
     show(console, stretches, title)
     others = [one["others_values_a_second"] for one in stretches]
-    lost = 1 - others[1] / others[0]
+    change = others[1] / others[0] - 1
     console.print(f"Whole monitoring sets alone would bring {limit:.1f} values a second.")
-    console.print(f"With drive {chosen} dead the others bring {100 * lost:.1f} % fewer values.")
+    console.print(f"Drive {chosen} dead: values a second of the others {100 * change:+.1f} %.")
     result = {"benchmark": "fleet", "drives": given.drives, "baud": given.baud, "dead": chosen}
     both = {"all": stretches[0], "one_dead": stretches[1]}
-    print(json.dumps({**result, "full_sets_limit": limit, "others_lose": lost, **both}))
+    print(json.dumps({**result, "full_sets_limit": limit, "others_change": change, **both}))
 
 
 if __name__ == "__main__":

@@ -376,12 +376,16 @@ def measured(cell: Cell, contestants: Sequence[Contestant], rounds: int) -> dict
         "design_ms": cell.design * 1e3,
         "turnaround_ms": cell.wire.times.turnarounds[DEVICE] * 1e3,
         "limit_to_one_a_value": cell.limit / singly,
-        "ours_to_one_a_value": by_name[OURS] / one_by_one,
-        "panel_to_one_a_value": by_name[PANEL] / one_by_one if by_name.get(PANEL) else None,
+        "ours_to_one_a_value": _ratio(by_name[OURS], one_by_one),
+        "panel_to_one_a_value": _ratio(by_name[PANEL], one_by_one),
         "simulator_late_ms": {"median": median(late) * 1e3, "99": (share(late, 0.99) or 0) * 1e3},
         "simulator_late_share": sum(late) / least,
         "contestants": figures,
     }
+
+
+def _ratio(one: float | None, other: float | None) -> float | None:
+    return one / other if one and other else None
 
 
 # What is printed
@@ -429,14 +433,9 @@ def show_blocks(console: Console, cells: Sequence[dict[str, Any]]) -> None:
     for title in ("family", "baud", "by the limit", OURS, "panel's cycle"):
         table.add_column(title, justify="left" if title == "family" else "right")
     for one in cells:
-        shares = (one["limit_to_one_a_value"], one["ours_to_one_a_value"])
-        panel_share = one["panel_to_one_a_value"]
-        table.add_row(
-            one["family"],
-            str(one["baud"]),
-            *(f"{value:.2f}" for value in shares),
-            f"{panel_share:.2f}" if panel_share else "-",
-        )
+        keys = ("limit_to_one_a_value", "ours_to_one_a_value", "panel_to_one_a_value")
+        shares = (f"{one[key]:.2f}" if one[key] else "-" for key in keys)
+        table.add_row(one["family"], str(one["baud"]), *shares)
     console.print(table)
 
 
