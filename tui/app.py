@@ -6,18 +6,22 @@ import asyncio
 import logging
 import threading
 from collections.abc import Callable, Iterable
+from contextlib import suppress
 from typing import ClassVar
 
 from rich.console import RenderableType
 from rich.text import Text
 from textual.app import SystemCommand
+from textual.driver import Driver
 from textual.screen import Screen
+from textual.widgets import Input, TextArea
 
 from tui.bus.errors import LineClosed
 from tui.session.drive_session import DriveSession
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line, state_folder
+from tui.session.stop import Stopper, StopSummary
 from tui.widgets.clock import Clock
 from tui.widgets.lean import lean
 from tui.widgets.palette import THEME
@@ -27,6 +31,7 @@ from .screens.confirm import Confirm
 from .screens.connection import ConnectionScreen
 from .screens.help import HelpScreen
 from .screens.panel import Panel
+from .screens.stop_keys import STOP_ALL_ANYWHERE, STOP_ANYWHERE, STOP_OUTSIDE_TEXT, with_stop_keys
 
 log = logging.getLogger("drivepanel")
 
@@ -35,6 +40,8 @@ CONNECT_WITHIN = 4.0
 
 HUNGER_LOOK = 0.25
 """Seconds between two looks for drives that are about to act on their time-out."""
+
+STOP_KEYS = frozenset({STOP_ANYWHERE, STOP_ALL_ANYWHERE, STOP_OUTSIDE_TEXT})
 
 Opener = Callable[..., OpenLine]
 
@@ -68,12 +75,63 @@ class DrivePanelApp(Panel):
         self.period = 0.5
         self.opened: OpenLine | None = None
         self.keeper: Keeper | None = None
+        self.stopper: Stopper | None = None
         self.connection = ConnectionScreen()
         self._open = open_line
         self._start = start
         self._device = device
         self._gone = False
         self._hungry: set[int] = set()
+        self._told: StopSummary | None = None
+
+    def get_driver_class(self) -> type[Driver]:
+        """The driver of this platform, with the stop keys before everything else."""
+        return with_stop_keys(super().get_driver_class())
+
+    def take_stop_key(self, key: str) -> bool:
+        """Stop, if the key means that now; may be called in any thread."""
+        if key not in STOP_KEYS or (key == STOP_OUTSIDE_TEXT and self._is_typing()):
+            return False
+        self._stop(everything=key == STOP_ALL_ANYWHERE)
+        return True
+
+    def _is_typing(self) -> bool:
+        """Whether a space would go into a text."""
+        return isinstance(self.focused, Input | TextArea)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """A space belongs to the text that is being typed."""
+        if action == "stop_by_space":
+            return not self._is_typing()
+        return super().check_action(action, parameters)
+
+    def action_stop_by_space(self) -> None:
+        """Stop the drive that is shown, while no text is being typed."""
+        self._stop(everything=False)
+
+    def action_stop(self) -> None:
+        """Stop the drive that is shown."""
+        self._stop(everything=False)
+
+    def action_stop_all(self) -> None:
+        """Stop every drive of the line."""
+        self._stop(everything=True)
+
+    def _stop(self, *, everything: bool) -> None:
+        sessions = [found.session for found in self.connection.found.values() if found.session]
+        if not everything:
+            sessions = self._shown(sessions)
+        if self.stopper is not None and sessions:
+            with suppress(LineClosed):
+                self.stopper.stop(sessions)
+
+    def _shown(self, found: list[DriveSession]) -> list[DriveSession]:
+        """The drive whose screen is open; without one those commanded from here, else all."""
+        for screen in reversed(self.screen_stack):
+            session = getattr(screen, "session", None)
+            if isinstance(session, DriveSession):
+                return [session]
+        return [session for session in found if session.commanded] or found
 
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
@@ -81,6 +139,7 @@ class DrivePanelApp(Panel):
         self.theme = THEME.name
         self.push_screen(self.connection)
         self.set_interval(HUNGER_LOOK, self._tell_hunger)
+        self.set_interval(HUNGER_LOOK, self._tell_stops)
         if self._start is not None:
             self.call_after_refresh(self.connection.start, self._start, self._device)
 
@@ -97,6 +156,26 @@ class DrivePanelApp(Panel):
                     timeout=max(3.0, one.left),
                 )
         self._hungry = {one.device for one in hungry}
+
+    def _tell_stops(self) -> None:
+        """Tell what the last stop has come to where the screen on top does not show it."""
+        reports = list(self.stopper.reports.values()) if self.stopper else []
+        last = max((report.time for report in reports), default=0.0)
+        stop = StopSummary([report for report in reports if report.time >= last - 0.1])
+        if stop == self._told or not reports:
+            return
+        before, self._told = self._told, stop
+        session = getattr(self.screen, "session", None)
+        if session is not None and {session.device} == {r.device for r in stop.reports}:
+            return
+        if self.screen is self.connection:
+            self.connection.say(stop.head, stop.text, "error" if stop.failed else "alarm")
+        elif before is None or stop.ended != before.ended:
+            self.notify(
+                f"{stop.head} {stop.text if stop.failed else ''}".strip(),
+                severity="error" if stop.failed else "information",
+                timeout=30.0 if stop.failed else 4.0,
+            )
 
     async def on_unmount(self) -> None:
         """Leave no line open."""
@@ -126,6 +205,7 @@ class DrivePanelApp(Panel):
             opening.add_done_callback(_close_unwanted)
             raise
         self.keeper = Keeper(self.opened.line)
+        self.stopper = Stopper(self.opened.line)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 
@@ -139,7 +219,7 @@ class DrivePanelApp(Panel):
 
     async def disconnect(self) -> None:
         """Close the open line, if there is one."""
-        opened, self.opened, self.keeper = self.opened, None, None
+        opened, self.opened, self.keeper, self.stopper = self.opened, None, None, None
         if opened is not None:
             await asyncio.to_thread(opened.close)
             log.info("closed %s", opened.label)
@@ -216,7 +296,7 @@ class DrivePanelApp(Panel):
         """Every action of the screen on top, for the command palette."""
         name = (screen.TITLE or CONNECTION).lower()
         for action in ACTIONS:
-            if name not in action.screens or action.id == "command_palette":
+            if name not in action.screens or action.id in ("command_palette", "stop_by_space"):
                 continue
             owner = self if action.app else screen
             yield SystemCommand(

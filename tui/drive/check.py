@@ -117,7 +117,9 @@ def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
             chart.channel,
             chart.when,
         )
-        for code in (chart.status, chart.command, *(m.parameter for m in marks if m)):
+        ordered = [o.parameter for o in chart.orders]
+        ordered += [when.parameter for o in chart.orders for when in o.when]
+        for code in (chart.status, chart.command, *(m.parameter for m in marks if m), *ordered):
             yield ["charts", index], code
     for index, reference in enumerate(data.references):
         yield ["references", index], reference.parameter
@@ -166,6 +168,12 @@ def _states(data: ProfileData) -> Iterator[Finding]:
             for state in (transition.source, transition.target):
                 if state not in ids:
                     yield ["charts", index], f"chart {chart.id}: there is no state {state!r}."
+        for order in chart.orders:
+            for state in order.states:
+                if state not in ids:
+                    yield ["charts", index], f"order {order.id}: there is no state {state!r}."
+            if not order.words or not (order.parameter or chart.command):
+                yield ["charts", index], f"order {order.id}: nothing to write, or nowhere."
         for state_ in chart.states:
             if state_.value & ~state_.mask:
                 yield (

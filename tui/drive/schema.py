@@ -451,6 +451,41 @@ class ChannelBits(Table, frozen=True, kw_only=True):
     names: dict[str, str]
 
 
+OrderId = Literal[
+    "forward",
+    "reverse",
+    "stop",
+    "quick-stop",
+    "freewheel",
+    "emergency-stop",
+    "dc-braking",
+    "reset",
+    "take-control",
+    "hand-back",
+]
+
+
+class Order(Table, frozen=True, kw_only=True):
+    """What a person may order of a drive, as the words that are written one after another.
+
+    Of several orders with one id the first counts whose states and conditions hold.
+    """
+
+    id: OrderId
+    name: str
+    words: list[RawWord]
+    parameter: str = ""
+    """Where the words go; the chart's command word where empty."""
+    states: list[Identifier] = []
+    """States in which it may be given; any where empty."""
+    when: list[When] = []
+    """Raw values that must be known and hold."""
+    broadcast: bool = False
+    """True where its word can start no motor on any drive that hears it."""
+    note: str = ""
+    confidence: Confidence = "manual"
+
+
 class Chart(Table, frozen=True, kw_only=True):
     """A state chart: how the status word tells the state, and how commands change it."""
 
@@ -463,6 +498,7 @@ class Chart(Table, frozen=True, kw_only=True):
     command: str = ""
     states: list[State]
     transitions: list[Transition] = []
+    orders: list[Order] = []
     direction: DirectionBit | None = None
     reached: StatusBit | None = None
     alarm: StatusBit | None = None

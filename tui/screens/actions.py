@@ -34,9 +34,40 @@ class Action:
     """Whether it stands in the line of keys."""
     both: str = ""
     """What the line of keys shows where one entry stands for a pair of keys."""
+    first: bool = False
+    """Whether the key counts before any widget that has the focus."""
 
 
 ACTIONS: tuple[Action, ...] = (
+    Action(
+        "stop_by_space",
+        "space",
+        "Space",
+        "STOP",
+        "Stop the motor on its ramp, wherever no text is being typed.",
+        app=True,
+        first=True,
+    ),
+    Action(
+        "stop",
+        "f12",
+        "F12",
+        "",
+        "Stop the motor on its ramp, from any screen, dialog or text.",
+        app=True,
+        line=False,
+        first=True,
+    ),
+    Action(
+        "stop_all",
+        "f9",
+        "F9",
+        "",
+        "Stop every drive of the line on its ramp, from any screen.",
+        app=True,
+        line=False,
+        first=True,
+    ),
     Action(
         "open_chosen", "enter", "Enter", "open", "Open the chosen line or drive.", (CONNECTION,)
     ),
@@ -123,6 +154,7 @@ def bindings(screen: str | None) -> list[BindingType]:
             show=False,
             id=f"{screen or 'app'}.{action.id}",
             tooltip=action.help,
+            priority=action.first,
         )
         for action in ACTIONS
         if action.app == (screen is None) and (screen is None or screen in action.screens)
@@ -130,7 +162,7 @@ def bindings(screen: str | None) -> list[BindingType]:
 
 
 def of_screen(screen: str) -> list[Action]:
-    """Actions that work on a screen, those of the app last."""
+    """Actions that work on a screen: the stop first, then the screen's own and the app's."""
     return [action for action in ACTIONS if screen in action.screens]
 
 

@@ -15,6 +15,7 @@ from textual.timer import Timer
 from tui.drive.schema import Parameter
 from tui.session.drive_session import DriveSession
 from tui.session.reader import Rating
+from tui.session.stop import Phase, StopReport
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 from tui.widgets.monitor_motor import motor_lines
@@ -36,6 +37,8 @@ from .panel import Panel
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
 LOW_BANDWIDTH_REFRESH = 2.0
+STOP_TOLD = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
+"""Seconds for which the end of a stop is shown."""
 WIDE = (110, 36)
 """Columns and rows from which all words stand side by side."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -142,8 +145,17 @@ class MonitorScreen(Screen[None]):
             low_bandwidth=self.app.low_bandwidth,
             watch=self.app.keeper.watch(self.session.device) if self.app.keeper else None,
             heard=self.session.line.device_state(self.session.device).heard,
+            stop=self._stop(now),
             was=self._was,
         )
+
+    def _stop(self, now: float) -> StopReport | None:
+        """What a stop of this drive has come to; a good end is told for a while only."""
+        stopper = self.app.stopper
+        report = stopper.reports.get(self.session.device) if stopper else None
+        if report is None:
+            return None
+        return report if now - report.since < STOP_TOLD.get(report.phase, now) else None
 
     def _measure_load(self, now: float, busy: float) -> None:
         """Share of the last seconds in which the line was busy."""

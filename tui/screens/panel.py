@@ -9,6 +9,7 @@ from textual.app import App
 from tui.session.drive_session import DriveSession
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine
+from tui.session.stop import Stopper
 from tui.widgets.clock import Clock
 
 
@@ -23,6 +24,7 @@ class Panel(App[None]):
     """Wished time of a monitoring cycle in seconds, the same for every drive."""
     opened: OpenLine | None
     keeper: Keeper | None
+    stopper: Stopper | None
 
     @property
     def line_text(self) -> str:

@@ -16,6 +16,7 @@ from dataclasses import dataclass, field
 from tui.bus.errors import LineError
 from tui.bus.line import Line, Priority, Worker
 from tui.drive.chart import watched_codes
+from tui.drive.orders import deciding_codes
 from tui.drive.profile import Profile
 from tui.drive.schema import Reaction
 
@@ -204,6 +205,7 @@ class Keeper:
         try:
             readings = await kept.reader.read(_state_codes(profile), priority=Priority.POLL)
             state = drive_state(profile, readings)
+            kept.session.monitor.known.note(readings)
         except LineError as fault:
             error = str(fault)
         timeout = kept.watch.timeout if kept.watch and kept.watch.active else None
@@ -218,7 +220,9 @@ class Keeper:
             kept.learned, kept.watch = time.monotonic(), None
             return
         codes = [code for code in (rules.timeout, rules.reaction) if code]
+        codes += deciding_codes(kept.session.profile)
         readings = await kept.reader.read(codes, priority=Priority.POLL)
+        kept.session.monitor.known.note(readings)
         timeout = _seconds(readings[rules.timeout], rules.off)
         raw = readings[rules.reaction].raw if rules.reaction else None
         reaction = next((one for one in rules.reactions if one.raw == raw), None)

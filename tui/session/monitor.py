@@ -16,10 +16,12 @@ from tui.bus.errors import LineError
 from tui.bus.line import Line, LineState, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.errors import DriveError
+from tui.drive.orders import deciding_codes
 from tui.drive.profile import Profile
 from tui.drive.schema import Quantity
 
 from .drive_state import DriveState, drive_state
+from .known import Known
 from .reader import Reader
 from .readings import Reading
 
@@ -90,6 +92,8 @@ class Monitor:
         self.period = 0.5
         """Wished time of a cycle in seconds; read anew at each."""
         self.reader = Reader(line, device, profile)
+        self.known = Known()
+        """What was last read of the drive, by whomever."""
         self._latest: Snapshot | None = None
         self._using = ""
         self._trend: deque[TrendPoint] = deque()
@@ -139,6 +143,8 @@ class Monitor:
         rates = rates_of(self.profile) if codes is None else Rates(tuple(dict.fromkeys(codes)))
         known = {*rates.fast, *rates.changing, *rates.slow}
         more = tuple(code for code in dict.fromkeys(extra) if code not in known)
+        if codes is None:
+            more += tuple(c for c in deciding_codes(self.profile) if c not in {*known, *more})
         rates = replace(rates, slow=rates.slow + more)
         self._worker = self.line.spawn(
             lambda: self._watch(rates), f"monitor {self.profile.id} {self.device}"
@@ -170,6 +176,7 @@ class Monitor:
                     begun.clear()
                     slow_due = 0.0
                 else:
+                    self.known.note(readings)
                     begun.append(started)
                     if seldom:
                         slow_due = started + SLOW_FACTOR * period

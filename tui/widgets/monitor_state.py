@@ -11,11 +11,13 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.keeper import TOLD_AFTER
 from tui.session.readings import Quality
+from tui.session.stop import Phase, StopReport
 
 from .drawing import cut, pair, rule
 from .monitor_view import View, age_text
 from .palette import (
     ALARM,
+    ATTENTION,
     FAINT,
     FAULT,
     FAULT_BLOCK,
@@ -113,8 +115,25 @@ def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
 
 
 def message_lines(view: View, width: int) -> list[Text]:
-    """Two lines: what is wrong, or that nothing is."""
-    return [Text(" ") + line if line.plain else line for line in _messages(view, width - 2)]
+    """Two lines: what is wrong, or that nothing is; what a stop has come to before all."""
+    lines = _messages(view, width - 2)
+    if view.stop is not None:
+        lines = [_stop_line(view.stop, width - 2), lines[0]]
+    return [Text(" ") + line if line.plain else line for line in lines]
+
+
+STOP_STYLES = {
+    Phase.SENDING: ATTENTION,
+    Phase.STOPPING: ATTENTION,
+    Phase.STOPPED: STRONG,
+    Phase.FAILED: FAULT_BLOCK,
+}
+
+
+def _stop_line(report: StopReport, width: int) -> Text:
+    words = {Phase.FAILED: report.text, Phase.STOPPED: "STOPPED by the stop key"}
+    text = words.get(report.phase, f"STOP: {report.text}")
+    return Text(cut(text, width), STOP_STYLES[report.phase])
 
 
 def _messages(view: View, width: int) -> list[Text]:

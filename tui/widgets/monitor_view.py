@@ -11,6 +11,7 @@ from tui.session.identify import DriveIdentity
 from tui.session.keeper import Watch
 from tui.session.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
 from tui.session.readings import Reading
+from tui.session.stop import StopReport
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +37,8 @@ class View:
     """The drive's watch over the line, where it has one that runs."""
     heard: float | None = None
     """When the drive last answered anybody on this line."""
+    stop: StopReport | None = None
+    """What became of a stop that was ordered lately."""
     was: str = ""
     """What the drive did when it was last known."""
 

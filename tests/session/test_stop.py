@@ -1,0 +1,238 @@
+"""Stopping: every family's own way, whatever the line does, never by a word that starts a motor."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Iterator
+
+import pytest
+
+from tui.bus.line import Line, Priority
+from tui.bus.link import SerialLink
+from tui.drive import library
+from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
+from tui.session.drive_session import DriveSession
+from tui.session.stop import Phase, Stopper, StopReport
+from tui.simulator import DriveSpec, Simulation
+
+FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
+Start = Callable[..., tuple[Simulation, Line]]
+
+
+@pytest.fixture
+def start() -> Iterator[Start]:
+    """Simulated drives and a line to them, closed afterwards."""
+    opened: list[tuple[Simulation, Line]] = []
+
+    def begin(*specs: DriveSpec, read_only: bool = False) -> tuple[Simulation, Line]:
+        simulation = Simulation(list(specs))
+        simulation.start()
+        line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
+        line.open(wait=5.0)
+        opened.append((simulation, line))
+        return opened[-1]
+
+    yield begin
+    for simulation, line in opened:
+        line.close()
+        simulation.stop()
+
+
+async def ended(stopper: Stopper, device: int, seconds: float = 30.0) -> StopReport:
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        report = stopper.reports.get(device)
+        if report and report.phase in (Phase.STOPPED, Phase.FAILED):
+            return report
+        await asyncio.sleep(0.02)
+    raise AssertionError(f"the stop did not end: {stopper.reports.get(device)}")
+
+
+def writes(line: Line) -> list[tuple[int, int]]:
+    """Register and word of every write that went out."""
+    sent = [frame.data for frame in line.trace if frame.direction == "out"]
+    return [
+        (int.from_bytes(data[2:4], "big"), int.from_bytes(data[4:6], "big"))
+        for data in sent
+        if data[1] == 6
+    ]
+
+
+WORDS = {
+    "atv21": (0xFA00, 0xC000),
+    "atv31": (8501, 0x0007),
+    "atv312": (8501, 0x0007),
+    "atv71": (8501, 0x0007),
+    "powerdrive": (641, 0x0001),
+    "proxidrive": (641, 0x0001),
+    "varmeca": (641, 0x0001),
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_every_family_stops_on_its_ramp(start: Start, family: str) -> None:
+    sets = {} if family.startswith("atv") else {"6.43": 1, "6.42": 3}
+    simulation, line = start(DriveSpec(family, 1, run_hz=20.0, sets=sets))
+    drive = simulation.drive(1)
+    await wait_for(lambda: drive.motor.frequency > 5)
+    stopper = Stopper(line)
+    stopper.stop([DriveSession(line, 1, library.load(family))])
+    await wait_for(lambda: bool(writes(line)))
+    assert writes(line)[0] == WORDS[family]
+    seen: list[float] = []
+    while (stopper.reports[1].phase) not in (Phase.STOPPED, Phase.FAILED):
+        seen.append(abs(drive.motor.frequency))
+        await asyncio.sleep(0.02)
+    assert stopper.reports[1].phase is Phase.STOPPED, stopper.reports[1].text
+    assert drive.motor.frequency == 0
+    # on the ramp, not coasting: the frequency was seen on its way down
+    assert len({round(value) for value in seen if 0.5 < value < 19}) > 3
+
+
+async def wait_for(holds: Callable[[], bool], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not come to that"
+        await asyncio.sleep(0.01)
+
+
+async def test_an_altivar_71_in_the_i_o_profile_never_gets_a_word_of_drivecom(start: Start) -> None:
+    """16#0007 has bit 0 set, which runs the motor in this profile."""
+    simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0}))
+    drive = simulation.drive(1)
+    stopper = Stopper(line)
+    stopper.stop([DriveSession(line, 1, library.load("atv71"))])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert writes(line) == [(8501, 0x0000)]
+    assert drive.motor.frequency == 0
+
+
+async def test_a_profile_without_a_known_stop_says_so(start: Start) -> None:
+    _, line = start(DriveSpec("atv71", 1, sets={"CHCF": 0}))
+    stopper = Stopper(line)
+    stopper.stop([DriveSession(line, 1, library.load("atv71"))])
+    report = await ended(stopper, 1)
+    assert report.phase is Phase.FAILED
+    assert "at the machine" in report.text
+    assert writes(line) == []
+
+
+async def test_with_dotd_at_freewheel_the_drive_is_halted_instead(start: Start) -> None:
+    simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0, sets={"DOTD": 0}))
+    await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
+    session = DriveSession(line, 1, library.load("atv71"))
+    session.monitor.known.note(await session.read(["CHCF", "DOTD", "ETA"]))
+    stopper = Stopper(line)
+    stopper.stop([session])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert writes(line)[0] == (8501, 0x010F)
+
+
+async def test_a_locked_leroy_somer_is_not_unlocked_by_a_stop(start: Start) -> None:
+    _, line = start(DriveSpec("powerdrive", 1, sets={"6.43": 1}))
+    stopper = Stopper(line)
+    stopper.stop([DriveSession(line, 1, library.load("powerdrive"))])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert writes(line) == [(641, 0x0000)]
+
+
+async def test_a_drive_commanded_from_elsewhere_is_told_of(start: Start) -> None:
+    simulation, line = start(DriveSpec("powerdrive", 1, run_hz=20.0))
+    await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
+    stopper = Stopper(line)
+    stopper.stop([DriveSession(line, 1, library.load("powerdrive"))])
+    report = await ended(stopper, 1)
+    assert report.phase is Phase.FAILED
+    assert "commanded from elsewhere" in report.text
+
+
+async def test_a_dead_drive_is_tried_again_and_told_of(start: Start) -> None:
+    _, line = start(DriveSpec("atv21", 1))
+    stopper = Stopper(line)
+    stopper.stop([DriveSession(line, 9, library.load("atv21"))])
+    report = await ended(stopper, 9)
+    assert report.phase is Phase.FAILED
+    assert len(writes(line)) == 5
+
+
+async def test_a_read_only_line_stops_nothing_and_says_so(start: Start) -> None:
+    _, line = start(DriveSpec("atv21", 1), read_only=True)
+    stopper = Stopper(line)
+    stopper.stop([DriveSession(line, 1, library.load("atv21"))])
+    report = await ended(stopper, 1)
+    assert report.phase is Phase.FAILED
+    assert "read-only" in report.text
+
+
+async def test_all_are_stopped_and_a_broadcast_starts_none(start: Start) -> None:
+    specs = [DriveSpec(family, at, run_hz=20.0) for at, family in enumerate(FAMILIES[:4], start=1)]
+    simulation, line = start(*specs)
+    await wait_for(lambda: all(simulation.drive(at).motor.frequency > 5 for at in range(1, 5)))
+    stopper = Stopper(line)
+    sessions = [
+        DriveSession(line, at, library.load(family))
+        for at, family in enumerate(FAMILIES[:4], start=1)
+    ]
+    stopper.stop(sessions)
+    reports = [await ended(stopper, at) for at in range(1, 5)]
+    assert {report.phase for report in reports} == {Phase.STOPPED}
+    broadcasts = [f.data for f in line.trace if f.direction == "out" and f.data[0] == 0]
+    assert [(data[1], data[2:6].hex()) for data in broadcasts] == [(6, "fa00c000")]
+
+
+async def test_a_stop_goes_before_all_that_waits(start: Start) -> None:
+    simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
+    session = DriveSession(line, 1, library.load("atv71"))
+    session.monitor.known.note(await session.read(["CHCF", "DOTD", "ETA"]))
+    crowd = [
+        asyncio.create_task(line.read(1, 3201, priority=priority))
+        for priority in (Priority.OPERATOR_READ, Priority.POLL) * 20
+    ]
+    await asyncio.sleep(0.005)
+    before = len([frame for frame in line.trace if frame.direction == "out"])
+    Stopper(line).stop([session])
+    await asyncio.gather(*crowd)
+    sent = [frame.data for frame in line.trace if frame.direction == "out"]
+    at = next(index for index, data in enumerate(sent) if data[1] == 6)
+    assert at <= before + 1
+    assert simulation.drive(1).raw("CMD") == 7
+
+
+def test_orders_that_no_state_allows_are_refused_in_words() -> None:
+    profile = library.load("atv21")
+    chart = profile.data.charts[0]
+    with pytest.raises(OrderRefused, match=r"possible in the states: .*Fault.* It is now: Standby"):
+        choose(chart, "reset", {"FD01": 0x4000})
+    with pytest.raises(OrderRefused, match="no order 'take control'"):
+        choose(chart, "take-control", {"FD01": 0x4000})
+    leroy = library.load("powerdrive").data.charts[0]
+    with pytest.raises(OrderRefused, match=r"needs 6\.43 = 1"):
+        choose(leroy, "forward", {"10.40": 1, "6.43": 0})
+
+
+def test_the_way_through_the_chart() -> None:
+    chart = library.load("atv31").data.charts[0]
+    assert walk(chart, "disabled", "enabled") == [
+        ("ready", 0x0006), ("switched-on", 0x0007), ("enabled", 0x000F),
+    ]  # fmt: skip
+    assert walk(chart, "enabled", "enabled") == []
+    with pytest.raises(OrderRefused, match="No command leads from Fault"):
+        walk(chart, "fault", "enabled")
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_stop_word_runs_a_motor_in_any_state(family: str) -> None:
+    """No stop has the words of a run order of its chart, in none of its states."""
+    profile = library.load(family)
+    for chart in profile.data.charts:
+        runs = {o.words[-1] for o in chart.orders if o.id in ("forward", "reverse")}
+        for state in chart.states:
+            raws = {chart.status: state.value}
+            if chart.when:
+                raws[chart.when.parameter] = chart.when.values[0]
+            if not chart.orders:
+                continue
+            assert chart_in_force(profile, raws) is chart
+            stop = choose(chart, "stop", raws)
+            assert not runs & set(stop.words)

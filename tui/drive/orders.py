@@ -1,0 +1,83 @@
+"""Which words carry out an order in the state that a drive is in; pure functions of a profile."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping
+
+from .chart import state_of
+from .errors import DriveError
+from .profile import Profile
+from .schema import Chart, Order, OrderId, Parameter
+
+
+class OrderRefused(DriveError):
+    """An order that cannot be given now, and why."""
+
+
+def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
+    """The chart that surely holds; None while the word that decides between charts is unknown."""
+    deciding = {chart.when.parameter for chart in profile.data.charts if chart.when}
+    return profile.chart(raws) if deciding <= raws.keys() else None
+
+
+def deciding_codes(profile: Profile) -> list[str]:
+    """Codes of the words on which it depends how an order is carried out."""
+    codes = [chart.when.parameter for chart in profile.data.charts if chart.when]
+    for chart in profile.data.charts:
+        codes += [when.parameter for order in chart.orders for when in order.when]
+    return list(dict.fromkeys(codes))
+
+
+def choose(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Order:
+    """The order that holds in the state that the raw values tell; raises OrderRefused."""
+    same = [order for order in chart.orders if order.id == id]
+    if not same:
+        raise OrderRefused(f"The {chart.name} has no order {id.replace('-', ' ')!r}.")
+    word = raws.get(chart.status)
+    state = state_of(chart, word) if word is not None else None
+    fitting = [o for o in same if not o.states or (state is not None and state.id in o.states)]
+    for order in fitting:
+        if all(raws.get(when.parameter) in when.values for when in order.when):
+            return order
+    if fitting:
+        needed = " or ".join(_conditions(order) for order in fitting)
+        raise OrderRefused(f"{fitting[0].name} needs {needed}.")
+    names = {s.id: s.name for s in chart.states}
+    allowed = ", ".join(dict.fromkeys(names[s] for order in same for s in order.states))
+    now = state.name if state else "not known"
+    raise OrderRefused(f"{same[0].name} is possible in the states: {allowed}. It is now: {now}.")
+
+
+def _conditions(order: Order) -> str:
+    return " and ".join(
+        f"{when.parameter} = {' or '.join(map(str, when.values))}" for when in order.when
+    )
+
+
+def target(profile: Profile, chart: Chart, order: Order) -> Parameter:
+    """Where the words of an order go."""
+    return profile[order.parameter or chart.command]
+
+
+def walk(chart: Chart, source: str, goal: str) -> list[tuple[str, int]]:
+    """The shortest way through the chart by commands: pairs of next state and command word.
+
+    Without edges and faults. Raises OrderRefused where there is none.
+    """
+    ways: deque[tuple[str, list[tuple[str, int]]]] = deque([(source, [])])
+    seen = {source}
+    while ways:
+        at, way = ways.popleft()
+        if at == goal:
+            return way
+        for step in chart.transitions:
+            if step.source == at and step.command is not None and step.target not in seen:
+                if step.edge_bit is not None:
+                    continue
+                seen.add(step.target)
+                ways.append((step.target, [*way, (step.target, step.command)]))
+    names = {state.id: state.name for state in chart.states}
+    raise OrderRefused(
+        f"No command leads from {names.get(source, source)} to {names.get(goal, goal)}."
+    )
