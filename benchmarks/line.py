@@ -445,7 +445,7 @@ def options() -> argparse.Namespace:
     parser.add_argument("--families", default=FAMILIES)
     parser.add_argument("--bauds", default="9600,19200")
     parser.add_argument("--format", default="8E1", help="characters of the simulated line")
-    parser.add_argument("--seconds", type=float, default=0.4, help="length of a run")
+    parser.add_argument("--seconds", type=float, default=0.3, help="length of a run")
     parser.add_argument("--rounds", type=int, default=1, help="rounds of all contestants")
     return parser.parse_args()
 
