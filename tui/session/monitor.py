@@ -179,7 +179,9 @@ class Monitor:
                     self.known.note(readings)
                     begun.append(started)
                     if seldom:
-                        slow_due = started + SLOW_FACTOR * period
+                        # drives watched together read their slow values at different times
+                        first = 1 + self.device % SLOW_FACTOR
+                        slow_due = started + (first if cycle == 1 else SLOW_FACTOR) * period
                 self._publish(cycle, readings, rates, _span(begun, period), error)
                 rest = started + period - time.monotonic()
                 await asyncio.sleep(period if error else max(0.0, rest))
