@@ -30,7 +30,7 @@ class FakeLine:
         self.turnaround: float | None = None
 
     def device_state(self, device: int) -> DeviceState:
-        return DeviceState(None, 0, None, None, self.turnaround, None)
+        return DeviceState(None, 0, None, None, self.turnaround, self.turnaround, None)
 
     def describe(self, device: int, limits: Limits) -> None:
         self.limits[device] = limits

@@ -136,7 +136,7 @@ class FakeLine:
 
     def device_state(self, _device: int) -> DeviceState:
         """Heard a moment ago."""
-        return DeviceState(True, 0, None, None, 0.005, self.heard)
+        return DeviceState(True, 0, None, None, 0.005, 0.005, self.heard)
 
     def describe(self, *_: Any) -> None:
         """Limits are not looked at."""

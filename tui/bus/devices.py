@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from statistics import median
 
 from .backoff import pause
 from .expectation import EXCEPTION, Expectation
 from .limits import CAUTIOUS, Limits
 from .model import DeviceState, Priority, Timing
-from .requests import WriteMany
+from .requests import Read, WriteMany
 from .rtu import Piece
 
 RECENT = 16
@@ -90,6 +92,7 @@ class Devices:
             record.silent_since,
             record.next_try,
             record.turnaround,
+            usual(record.recent),
             record.heard,
         )
 
@@ -213,6 +216,12 @@ class Devices:
             record.outstanding.append(again)
             return True
         return False
+
+
+def usual(recent: Mapping[int, Sequence[float]]) -> float | None:
+    """The median of the recent turnarounds of reads, None before the first."""
+    reads = recent.get(Read.function)
+    return median(tuple(reads)) if reads else None
 
 
 def _remember(record: Device, function: int, turnaround: float) -> None:

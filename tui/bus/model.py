@@ -53,6 +53,8 @@ class DeviceState:
     """When polls are sent again; None when they are sent now."""
     turnaround: float | None
     """Seconds from the end of a request to the start of its reply, longest of the recent ones."""
+    usual_turnaround: float | None
+    """The median of the same."""
     heard: float | None
     """When its last reply ended, on the line's clock; None before the first."""
 

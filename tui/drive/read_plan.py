@@ -38,7 +38,10 @@ class WireTiming:
     turnaround: float = 0.005
 
     def read(self, words: int) -> float:
-        """Time of one read of so many words: request, turnaround, reply and both silences."""
+        """Time of one read of so many words, from its request to the next request.
+
+        The turnaround counts from the end of the request to the start of the reply.
+        """
         return self._exchange(REQUEST_CHARACTERS + REPLY_CHARACTERS + 2 * words)
 
     def write(self, words: int, *, multiple: bool) -> float:
@@ -51,7 +54,9 @@ class WireTiming:
         return self._exchange(READ_WRITE_CHARACTERS + 2 * written + REPLY_CHARACTERS + 2 * read)
 
     def _exchange(self, characters: int) -> float:
-        return characters * self.character + 2 * self.silence + self.turnaround
+        # a drive tells the end of the request by the same silence: it lies in its turnaround
+        waits = max(self.turnaround, self.silence) + self.silence
+        return characters * self.character + waits
 
 
 @dataclass(frozen=True, slots=True)

@@ -70,6 +70,11 @@ class Rates:
     key: tuple[str, ...] = ()
     """Those of the fast ones that tell the state."""
 
+    @property
+    def seldom(self) -> tuple[str, ...]:
+        """What is not read in every cycle."""
+        return (*self.changing, *self.slow)
+
 
 @dataclass(frozen=True, slots=True)
 class TrendPoint:
@@ -159,7 +164,7 @@ class Monitor:
     async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
         begun: deque[float] = deque(maxlen=RATE_OVER)
-        slow_due = 0.0
+        seldom = True
         cycle = 0
         try:
             while True:
@@ -167,21 +172,20 @@ class Monitor:
                 cycle += 1
                 error = ""
                 period = self._period(rates)
-                seldom = started >= slow_due
                 try:
-                    readings.update(await self._cycle(rates, readings, seldom=seldom))
+                    turn = rates.seldom if seldom else self._turn(rates, cycle)
+                    readings.update(await self._cycle(rates, readings, turn))
+                    if seldom or cycle % SLOW_FACTOR == 0:
+                        await self.reader.learn_slots()
                 except (LineError, DriveError) as fault:
                     error = str(fault)
                     self.reader.forget()  # what answers next may be another drive
                     begun.clear()
-                    slow_due = 0.0
+                    seldom = True
                 else:
                     self.known.note(readings)
                     begun.append(started)
-                    if seldom:
-                        # drives watched together read their slow values at different times
-                        first = 1 + self.device % SLOW_FACTOR
-                        slow_due = started + (first if cycle == 1 else SLOW_FACTOR) * period
+                    seldom = False
                 self._publish(cycle, readings, rates, _span(begun, period), error)
                 rest = started + period - time.monotonic()
                 await asyncio.sleep(period if error else max(0.0, rest))
@@ -191,19 +195,21 @@ class Monitor:
     def _period(self, rates: Rates) -> float:
         """The wished time of a cycle, longer where the line cannot keep it for all."""
         cost = self.reader.seconds(rates.fast)
-        cost += self.reader.seconds((*rates.changing, *rates.slow)) / SLOW_FACTOR
+        cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
         return self.line.pace.claim(self, cost, max(self.period, SHORTEST_PERIOD))
 
+    def _turn(self, rates: Rates, cycle: int) -> tuple[str, ...]:
+        """The seldom values whose turn it is: a tenth of their requests in each cycle."""
+        groups = self.reader.groups(rates.seldom)
+        return tuple(code for group in groups[cycle % SLOW_FACTOR :: SLOW_FACTOR] for code in group)
+
     async def _cycle(
-        self, rates: Rates, before: Mapping[str, Reading], *, seldom: bool
+        self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
     ) -> dict[str, Reading]:
         """All readings of one cycle; the state's details as soon as it changes."""
-        due = (*rates.fast, *rates.changing, *rates.slow) if seldom else rates.fast
-        found = await self.reader.read(due or rates.slow, priority=Priority.POLL)
+        found = await self.reader.read((*rates.fast, *turn), priority=Priority.POLL)
         self._using = self.reader.using
-        if seldom:
-            await self.reader.learn_slots()
-        if seldom or not rates.changing:
+        if set(rates.changing) <= set(turn):
             return found
         now = drive_state(self.profile, found)
         same = all(found[code].raw == before[code].raw for code in rates.key if code in before)

@@ -25,7 +25,7 @@ SOURCE_AGE = 5.0
 never does."""
 USUAL_TURNAROUND = 0.005
 """Seconds that a drive takes to answer, until it is measured."""
-TURNAROUND_STEP = 0.002
+TURNAROUND_STEP = 0.001
 ASK_AGAIN = 30.0
 """Seconds after which a poll asks again for a parameter that the drive refused."""
 
@@ -66,6 +66,8 @@ class Reader:
     """Name of the block or scanner that the last poll read, if it read one."""
     _sources: dict[str, Raw] = field(default_factory=dict)
     _refused: dict[str, Raw] = field(default_factory=dict)
+    _met: set[str] = field(default_factory=set)
+    """Unconfirmed words that this drive has answered."""
     _unanswered: dict[str, Raw] = field(default_factory=dict)
     """Unconfirmed words at which the drive fell silent while it answers others."""
     _plans: dict[tuple[Hashable, ...], ReadPlan] = field(default_factory=dict)
@@ -89,11 +91,19 @@ class Reader:
         sure, unsure = self._by_trust(frozenset(codes).difference(self._refused))
         return self._plan(sure, self._slots.in_force()).seconds + self._plan(unsure).seconds
 
+    def groups(self, codes: Iterable[str]) -> list[tuple[str, ...]]:
+        """The codes that come in one request each."""
+        wanted = frozenset(codes).difference(self._refused)
+        trusts = self._by_trust(wanted)
+        requests = [request for trust in trusts for request in self._plan(trust).requests]
+        return [tuple(place.code for place in request.places) for request in requests]
+
     def forget(self) -> None:
         """Read scales and refused parameters anew: another drive may answer now."""
         self._sources.clear()
         self._refused.clear()
         self._plans.clear()
+        self._met.clear()
         self._slots.forget()
 
     def distrust(self) -> None:
@@ -158,13 +168,15 @@ class Reader:
         function = self.profile.function(3)
         if function is None or function.past_limit != "silence":
             return codes, frozenset()
-        sure = frozenset(code for code in codes if is_verified(self.profile[code]))
+        sure = frozenset(c for c in codes if c in self._met or is_verified(self.profile[c]))
         return sure, codes - sure
 
     async def _exchange_unsure(self, request: ReadRequest, priority: Priority) -> dict[str, Raw]:
         """A read of words that the drive may not have: its silence there is no dead drive."""
         try:
-            return await self._exchange(request, priority)
+            found = await self._exchange(request, priority)
+            self._met.update(found)
+            return found
         except NoAnswer:
             status = self.profile.quantity("status_word")
             if status is None:
@@ -195,10 +207,10 @@ class Reader:
 
     def _turnaround(self) -> float:
         """The drive's measured turnaround in steps, so that plans do not change for nothing."""
-        measured = self.line.device_state(self.device).turnaround
+        measured = self.line.device_state(self.device).usual_turnaround
         if measured is None:
             return USUAL_TURNAROUND
-        return math.ceil(measured / TURNAROUND_STEP) * TURNAROUND_STEP
+        return round(measured / TURNAROUND_STEP) * TURNAROUND_STEP
 
     def _timing(self, turnaround: float) -> WireTiming:
         link = self.line.link
