@@ -22,6 +22,7 @@ from tui.session.lines import OpenLine, check_line, demo_line, open_line
 from tui.session.monitor import Snapshot
 from tui.session.readings import Quality
 from tui.session.state import recent_lines, remember_line, state_folder
+from tui.simulator import DriveSpec, Simulation
 
 DRIVES = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 ADDRESSES = {profile: address for address, profile in enumerate(DRIVES, start=1)}
@@ -223,8 +224,12 @@ async def test_a_drive_is_fed_whatever_else_the_line_does() -> None:
         opened.close()
 
 
-async def test_who_cannot_be_fed_is_told_of_before_it_acts() -> None:
-    opened = demo_line({"atv21": 35.0})
+async def test_who_cannot_be_fed_is_told_of_before_it_acts(tmp_path: Path) -> None:
+    simulation = Simulation([DriveSpec("atv21", 1, run_hz=35.0)])
+    simulation.start()
+    # a name of its own: the number of a pseudo-terminal may be taken by others meanwhile
+    opened = open_line(f"serial:{simulation.serve_pty(str(tmp_path / 'line'))},19200,8N1", wait=5.0)
+    opened.simulation = simulation
     keeper = Keeper(opened.line)
     keeper.keep(session(opened, "atv21"))
     try:
