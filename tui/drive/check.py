@@ -119,6 +119,8 @@ def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
         )
         ordered = [o.parameter for o in chart.orders]
         ordered += [when.parameter for o in chart.orders for when in o.when]
+        ordered += [lock.parameter for lock in chart.interlocks]
+        ordered += [option.parameter for option in chart.options]
         for code in (chart.status, chart.command, *(m.parameter for m in marks if m), *ordered):
             yield ["charts", index], code
     for index, reference in enumerate(data.references):

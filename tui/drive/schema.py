@@ -486,6 +486,40 @@ class Order(Table, frozen=True, kw_only=True):
     confidence: Confidence = "manual"
 
 
+class Interlock(Table, frozen=True, kw_only=True):
+    """What must hold before an order that can move the motor is sent."""
+
+    parameter: str
+    mask: WordAddress = 0xFFFF
+    values: list[int]
+    """Raw values, behind the mask, with which it may be given."""
+    orders: list[OrderId] = []
+    """Orders that it holds for; those that run or brake where empty."""
+    text: str
+    """What is wrong otherwise, as a sentence."""
+    remedy: str = ""
+
+
+class OptionChoice(Table, frozen=True, kw_only=True):
+    """One setting of an option: the bits behind its mask, and their name."""
+
+    bits: WordAddress
+    name: str
+
+
+class CommandOption(Table, frozen=True, kw_only=True):
+    """Bits of a command word that stay as they are from order to order."""
+
+    id: Identifier
+    name: str
+    parameter: str
+    mask: WordAddress
+    choices: list[OptionChoice]
+    stopped_only: bool = False
+    note: str = ""
+    confidence: Confidence = "manual"
+
+
 class Chart(Table, frozen=True, kw_only=True):
     """A state chart: how the status word tells the state, and how commands change it."""
 
@@ -499,6 +533,8 @@ class Chart(Table, frozen=True, kw_only=True):
     states: list[State]
     transitions: list[Transition] = []
     orders: list[Order] = []
+    interlocks: list[Interlock] = []
+    options: list[CommandOption] = []
     direction: DirectionBit | None = None
     reached: StatusBit | None = None
     alarm: StatusBit | None = None

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tui.bus.line import Line, Priority
+from tui.bus.link import label
 from tui.drive.profile import Profile
 
 from .identify import DriveIdentity
@@ -30,6 +31,11 @@ class DriveSession:
         """Whether a command or reference was sent to the drive from here."""
         self.monitor = Monitor(line, device, profile)
         self._reader = Reader(line, device, profile)
+
+    @property
+    def line_text(self) -> str:
+        """The line as it is written."""
+        return label(self.line.link)
 
     async def read(
         self, codes: Sequence[str], *, priority: Priority = Priority.OPERATOR_READ
