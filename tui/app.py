@@ -18,6 +18,7 @@ from textual.widgets import Input, TextArea
 
 from tui.bus.errors import LineClosed
 from tui.session.drive_session import DriveSession
+from tui.session.journal import Journal
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line, state_folder
@@ -76,6 +77,7 @@ class DrivePanelApp(Panel):
         self.opened: OpenLine | None = None
         self.keeper: Keeper | None = None
         self.stopper: Stopper | None = None
+        self.journal = Journal()
         self.connection = ConnectionScreen()
         self._open = open_line
         self._start = start
@@ -205,7 +207,7 @@ class DrivePanelApp(Panel):
             opening.add_done_callback(_close_unwanted)
             raise
         self.keeper = Keeper(self.opened.line)
-        self.stopper = Stopper(self.opened.line)
+        self.stopper = Stopper(self.opened.line, self.journal)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 

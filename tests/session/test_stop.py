@@ -13,6 +13,7 @@ from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
 from tui.session.drive_session import DriveSession
+from tui.session.journal import Journal
 from tui.session.stop import Phase, Stopper, StopReport
 from tui.simulator import DriveSpec, Simulation
 
@@ -21,7 +22,7 @@ Start = Callable[..., tuple[Simulation, Line]]
 
 
 @pytest.fixture
-def start() -> Iterator[Start]:
+def start(journal: Journal) -> Iterator[Start]:
     """Simulated drives and a line to them, closed afterwards."""
     opened: list[tuple[Simulation, Line]] = []
 
@@ -37,6 +38,14 @@ def start() -> Iterator[Start]:
     for simulation, line in opened:
         line.close()
         simulation.stop()
+
+
+@pytest.fixture
+def journal() -> Iterator[Journal]:
+    """A journal in the test's own folder."""
+    made = Journal()
+    yield made
+    made.close()
 
 
 async def ended(stopper: Stopper, device: int, seconds: float = 30.0) -> StopReport:
@@ -71,17 +80,17 @@ WORDS = {
 
 
 @pytest.mark.parametrize("family", FAMILIES)
-async def test_every_family_stops_on_its_ramp(start: Start, family: str) -> None:
+async def test_every_family_stops_on_its_ramp(start: Start, journal: Journal, family: str) -> None:
     sets = {} if family.startswith("atv") else {"6.43": 1, "6.42": 3}
     simulation, line = start(DriveSpec(family, 1, run_hz=20.0, sets=sets))
     drive = simulation.drive(1)
     await wait_for(lambda: drive.motor.frequency > 5)
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load(family))])
     await wait_for(lambda: bool(writes(line)))
     assert writes(line)[0] == WORDS[family]
     seen: list[float] = []
-    while (stopper.reports[1].phase) not in (Phase.STOPPED, Phase.FAILED):
+    while stopper.reports[1].phase not in (Phase.STOPPED, Phase.FAILED):
         seen.append(abs(drive.motor.frequency))
         await asyncio.sleep(0.02)
     assert stopper.reports[1].phase is Phase.STOPPED, stopper.reports[1].text
@@ -97,20 +106,22 @@ async def wait_for(holds: Callable[[], bool], seconds: float = 20.0) -> None:
         await asyncio.sleep(0.01)
 
 
-async def test_an_altivar_71_in_the_i_o_profile_never_gets_a_word_of_drivecom(start: Start) -> None:
+async def test_an_altivar_71_in_the_i_o_profile_never_gets_a_word_of_drivecom(
+    start: Start, journal: Journal
+) -> None:
     """16#0007 has bit 0 set, which runs the motor in this profile."""
     simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0}))
     drive = simulation.drive(1)
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("atv71"))])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
     assert writes(line) == [(8501, 0x0000)]
     assert drive.motor.frequency == 0
 
 
-async def test_a_profile_without_a_known_stop_says_so(start: Start) -> None:
+async def test_a_profile_without_a_known_stop_says_so(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv71", 1, sets={"CHCF": 0}))
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("atv71"))])
     report = await ended(stopper, 1)
     assert report.phase is Phase.FAILED
@@ -118,58 +129,62 @@ async def test_a_profile_without_a_known_stop_says_so(start: Start) -> None:
     assert writes(line) == []
 
 
-async def test_with_dotd_at_freewheel_the_drive_is_halted_instead(start: Start) -> None:
+async def test_with_dotd_at_freewheel_the_drive_is_halted_instead(
+    start: Start, journal: Journal
+) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0, sets={"DOTD": 0}))
     await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
     session = DriveSession(line, 1, library.load("atv71"))
     session.monitor.known.note(await session.read(["CHCF", "DOTD", "ETA"]))
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
     assert writes(line)[0] == (8501, 0x010F)
 
 
-async def test_a_locked_leroy_somer_is_not_unlocked_by_a_stop(start: Start) -> None:
+async def test_a_locked_leroy_somer_is_not_unlocked_by_a_stop(
+    start: Start, journal: Journal
+) -> None:
     _, line = start(DriveSpec("powerdrive", 1, sets={"6.43": 1}))
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("powerdrive"))])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
     assert writes(line) == [(641, 0x0000)]
 
 
-async def test_a_drive_commanded_from_elsewhere_is_told_of(start: Start) -> None:
+async def test_a_drive_commanded_from_elsewhere_is_told_of(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("powerdrive", 1, run_hz=20.0))
     await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("powerdrive"))])
     report = await ended(stopper, 1)
     assert report.phase is Phase.FAILED
     assert "commanded from elsewhere" in report.text
 
 
-async def test_a_dead_drive_is_tried_again_and_told_of(start: Start) -> None:
+async def test_a_dead_drive_is_tried_again_and_told_of(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv21", 1))
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 9, library.load("atv21"))])
     report = await ended(stopper, 9)
     assert report.phase is Phase.FAILED
     assert len(writes(line)) == 5
 
 
-async def test_a_read_only_line_stops_nothing_and_says_so(start: Start) -> None:
+async def test_a_read_only_line_stops_nothing_and_says_so(start: Start, journal: Journal) -> None:
     _, line = start(DriveSpec("atv21", 1), read_only=True)
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     stopper.stop([DriveSession(line, 1, library.load("atv21"))])
     report = await ended(stopper, 1)
     assert report.phase is Phase.FAILED
     assert "read-only" in report.text
 
 
-async def test_all_are_stopped_and_a_broadcast_starts_none(start: Start) -> None:
+async def test_all_are_stopped_and_a_broadcast_starts_none(start: Start, journal: Journal) -> None:
     specs = [DriveSpec(family, at, run_hz=20.0) for at, family in enumerate(FAMILIES[:4], start=1)]
     simulation, line = start(*specs)
     await wait_for(lambda: all(simulation.drive(at).motor.frequency > 5 for at in range(1, 5)))
-    stopper = Stopper(line)
+    stopper = Stopper(line, journal)
     sessions = [
         DriveSession(line, at, library.load(family))
         for at, family in enumerate(FAMILIES[:4], start=1)
@@ -181,7 +196,7 @@ async def test_all_are_stopped_and_a_broadcast_starts_none(start: Start) -> None
     assert [(data[1], data[2:6].hex()) for data in broadcasts] == [(6, "fa00c000")]
 
 
-async def test_a_stop_goes_before_all_that_waits(start: Start) -> None:
+async def test_a_stop_goes_before_all_that_waits(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
     session = DriveSession(line, 1, library.load("atv71"))
     session.monitor.known.note(await session.read(["CHCF", "DOTD", "ETA"]))
@@ -191,7 +206,7 @@ async def test_a_stop_goes_before_all_that_waits(start: Start) -> None:
     ]
     await asyncio.sleep(0.005)
     before = len([frame for frame in line.trace if frame.direction == "out"])
-    Stopper(line).stop([session])
+    Stopper(line, journal).stop([session])
     await asyncio.gather(*crowd)
     sent = [frame.data for frame in line.trace if frame.direction == "out"]
     at = next(index for index, data in enumerate(sent) if data[1] == 6)

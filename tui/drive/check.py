@@ -120,6 +120,7 @@ def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
         ordered = [o.parameter for o in chart.orders]
         ordered += [when.parameter for o in chart.orders for when in o.when]
         ordered += [lock.parameter for lock in chart.interlocks]
+        ordered += [when.parameter for lock in chart.interlocks for when in lock.when]
         ordered += [option.parameter for option in chart.options]
         for code in (chart.status, chart.command, *(m.parameter for m in marks if m), *ordered):
             yield ["charts", index], code

@@ -55,6 +55,49 @@ def _conditions(order: Order) -> str:
     )
 
 
+STOPS: frozenset[OrderId] = frozenset({"stop", "quick-stop", "freewheel", "emergency-stop"})
+"""Orders that no interlock and no missing arming ever holds back."""
+MOVES: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking"})
+
+
+def interlock(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
+    """Why an order must not be sent now, with what to do; empty when it may."""
+    if id in STOPS:
+        return ""
+    for lock in chart.interlocks:
+        if id not in (lock.orders or MOVES):
+            continue
+        if not all(raws.get(when.parameter) in when.values for when in lock.when):
+            continue
+        raw = raws.get(lock.parameter)
+        if raw is None:
+            return f"{lock.parameter} is not known, and it decides: {lock.text}"
+        if raw & lock.mask not in lock.values:
+            return f"{lock.text} {lock.remedy}".strip()
+    return ""
+
+
+def interlock_codes(chart: Chart) -> list[str]:
+    """Codes of the words that the interlocks of a chart look at."""
+    codes = [lock.parameter for lock in chart.interlocks]
+    codes += [when.parameter for lock in chart.interlocks for when in lock.when]
+    return list(dict.fromkeys(codes))
+
+
+def with_options(chart: Chart, order: Order, raws: Mapping[str, int]) -> list[int]:
+    """The words of an order, with the option bits that its word carries now kept.
+
+    Zeros hand the control back or lock the drive: they stay zeros.
+    """
+    where = order.parameter or chart.command
+    keep = 0
+    for option in chart.options:
+        if option.parameter == where:
+            keep |= option.mask
+    kept = raws.get(where, 0) & keep
+    return [word & 0xFFFF | kept if word else 0 for word in order.words]
+
+
 def target(profile: Profile, chart: Chart, order: Order) -> Parameter:
     """Where the words of an order go."""
     return profile[order.parameter or chart.command]

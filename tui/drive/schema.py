@@ -495,6 +495,8 @@ class Interlock(Table, frozen=True, kw_only=True):
     """Raw values, behind the mask, with which it may be given."""
     orders: list[OrderId] = []
     """Orders that it holds for; those that run or brake where empty."""
+    when: list[When] = []
+    """Raw values with which it counts at all."""
     text: str
     """What is wrong otherwise, as a sentence."""
     remedy: str = ""

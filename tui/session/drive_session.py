@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.bus.line import Line, Priority
+from tui.bus.line import Line, Priority, Worker
 from tui.bus.link import label
 from tui.drive.profile import Profile
 
@@ -27,6 +27,8 @@ class DriveSession:
         self.device = device
         self.profile = profile
         self.identity = identity
+        self.busy: Worker | None = None
+        """The order that is being carried out; a stop ends it."""
         self.commanded = False
         """Whether a command or reference was sent to the drive from here."""
         self.monitor = Monitor(line, device, profile)

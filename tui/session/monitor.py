@@ -99,6 +99,8 @@ class Monitor:
         self.reader = Reader(line, device, profile)
         self.known = Known()
         """What was last read of the drive, by whomever."""
+        self.also: tuple[str, ...] = ()
+        """Codes read with the seldom ones beside those that were asked for at the start."""
         self._latest: Snapshot | None = None
         self._using = ""
         self._trend: deque[TrendPoint] = deque()
@@ -200,7 +202,7 @@ class Monitor:
 
     def _turn(self, rates: Rates, cycle: int) -> tuple[str, ...]:
         """The seldom values whose turn it is: a tenth of their requests in each cycle."""
-        groups = self.reader.groups(rates.seldom)
+        groups = self.reader.groups((*rates.seldom, *self.also))
         return tuple(code for group in groups[cycle % SLOW_FACTOR :: SLOW_FACTOR] for code in group)
 
     async def _cycle(

@@ -18,11 +18,21 @@ from tui.bus.errors import DeviceException, ExchangeError, LineError, RequestRef
 from tui.bus.line import Line, Priority, Worker
 from tui.drive.chart import read_chart
 from tui.drive.errors import DriveError
-from tui.drive.orders import OrderRefused, chart_in_force, choose, deciding_codes, target
+from tui.drive.orders import (
+    OrderRefused,
+    chart_in_force,
+    choose,
+    deciding_codes,
+    target,
+    with_options,
+)
 from tui.drive.schema import Chart, Order, OrderId
+from tui.drive.values import from_words
 
 from .drive_session import DriveSession
+from .journal import Journal
 from .limits import limits_of
+from .writing import Writer
 
 log = logging.getLogger("drivepanel")
 
@@ -90,8 +100,9 @@ class StopSummary:
 class Stopper:
     """Stops drives of one line; `stop` may be called from any thread and returns at once."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: Line, journal: Journal) -> None:
         self._line = line
+        self._journal = journal
         self._reports: dict[int, StopReport] = {}
         self._workers: dict[int, Worker] = {}
 
@@ -107,8 +118,9 @@ class Stopper:
         if len(wanted) > 1:
             self._line.spawn(lambda: self._broadcast(wanted, order), "stop all")
         for session in wanted:
-            if (before := self._workers.get(session.device)) is not None:
-                before.cancel()
+            for before in (self._workers.get(session.device), session.busy):
+                if before is not None:
+                    before.cancel()
             work = partial(self._stop, session, order, ordered)
             self._workers[session.device] = self._line.spawn(work, f"stop {session.device}")
 
@@ -197,9 +209,12 @@ class Stopper:
         session.monitor.known.put(code, reply.words[0])
 
     async def _send(self, session: DriveSession, chart: Chart, order: Order) -> None:
-        address = target(session.profile, chart, order).address
-        for word in order.words:
-            await self._line.write(session.device, address, [word & 0xFFFF], priority=Priority.STOP)
+        parameter = target(session.profile, chart, order)
+        writer = Writer(session, self._journal)
+        for word in with_options(chart, order, session.monitor.known.raws()):
+            raw = from_words(parameter, [word])
+            why = f"stopped: {order.name}"
+            await writer.write(parameter, raw, why=why, priority=Priority.STOP, read_back=False)
 
     async def _follow(self, session: DriveSession, order: Order, ordered: float) -> str | None:
         """See the motor stop; returns why it does not, or nothing."""

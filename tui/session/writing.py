@@ -32,9 +32,12 @@ class Writer:
         why: str,
         check: int = 0xFFFFFFFF,
         replaceable: bool = False,
+        read_back: bool = True,
         priority: Priority = Priority.OPERATOR_WRITE,
     ) -> None:
         """Write a raw value and see that the drive holds it, in the bits of `check`.
+
+        A `replaceable` one gives way to a newer value of the same parameter while it waits.
 
         Raises the line's errors, and NotTaken where the drive holds something else.
         """
@@ -49,7 +52,7 @@ class Writer:
                 priority=priority,
                 replaceable=replaceable,
             )
-            back = await self._read_back(parameter)
+            back = await self._read_back(parameter) if read_back else None
             if back is not None and (back ^ raw) & check & 0xFFFFFFFF:
                 answer = "holds another value"
                 raise NotTaken(

@@ -1,0 +1,315 @@
+"""Commanding simulated drives of every family over a real line, by the words of their manuals."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from decimal import Decimal
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+from tui.bus.line import Line
+from tui.bus.link import SerialLink
+from tui.drive import library
+from tui.drive.orders import OrderRefused
+from tui.session import command as module
+from tui.session.command import Commander, Kind, Outcome
+from tui.session.drive_session import DriveSession
+from tui.session.journal import Journal
+from tui.session.stop import Phase, Stopper
+from tui.simulator import DriveSpec, Simulation
+from tui.simulator.drive import SimulatedDrive
+
+FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
+ALTIVARS = FAMILIES[:4]
+
+
+class Bench(NamedTuple):
+    """A drive, the line to it, and what commands it."""
+
+    drive: SimulatedDrive
+    line: Line
+    commander: Commander
+    stopper: Stopper
+    simulation: Simulation
+
+    async def done(self, kind: Kind = Kind.DONE, seconds: float = 10.0) -> str:
+        """What the order that was just given comes to."""
+        before = self.commander.outcome
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            now: Outcome | None = self.commander.outcome
+            if now is not before and now is not None:
+                assert now.kind is kind, now.text
+                return now.text
+            await asyncio.sleep(0.01)
+        raise AssertionError("the order came to nothing")
+
+    async def order(self, id: str, kind: Kind = Kind.DONE) -> str:
+        self.commander.order(id)  # type: ignore[arg-type]
+        return await self.done(kind)
+
+    async def until(self, holds: Callable[[], bool], seconds: float = 20.0) -> None:
+        end = time.monotonic() + seconds
+        while not holds():
+            assert time.monotonic() < end, "it did not come to that"
+            await asyncio.sleep(0.01)
+
+    @property
+    def stopped(self) -> bool:
+        """Whether the last stop has come to its end."""
+        report = self.stopper.reports.get(1)
+        return report is not None and report.phase is Phase.STOPPED
+
+    def writes(self) -> list[tuple[int, int]]:
+        sent = [f.data for f in self.line.trace if f.direction == "out" and f.data[1] == 6]
+        return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
+
+
+@asynccontextmanager
+async def bench(
+    family: str, *, armed: bool = True, read_only: bool = False, **spec: object
+) -> AsyncIterator[Bench]:
+    """A simulated drive with a monitor and a commander, armed."""
+    simulation = Simulation([DriveSpec(family, 1, **spec)])  # type: ignore[arg-type]
+    simulation.start()
+    line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
+    line.open(wait=5.0)
+    session = DriveSession(line, 1, library.load(family))
+    session.monitor.start(period=0.1)
+    journal = Journal()
+    made = Bench(
+        simulation.drive(1), line, Commander(session, journal), Stopper(line, journal), simulation
+    )
+    try:
+        await made.until(lambda: session.monitor.latest is not None)
+        if armed:
+            made.commander.arm()
+        yield made
+    finally:
+        journal.close()
+        line.close()
+        simulation.stop()
+
+
+def ready(family: str) -> dict[str, int]:
+    return {} if family.startswith("atv") else {"6.43": 1}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_run_reverse_and_stop(family: str) -> None:
+    async with bench(family, sets=ready(family)) as made:
+        if family in ALTIVARS:
+            made.commander.refer("20Hz")
+            assert "20" in await made.done()
+        await made.order("forward")
+        await made.until(lambda: made.drive.motor.frequency > 3)
+        await made.order("reverse")
+        await made.until(lambda: made.drive.motor.frequency < -3)
+        made.stopper.stop([made.commander.session])
+        await made.until(lambda: made.drive.motor.frequency == 0)
+        await made.until(lambda: made.stopped)
+
+
+STARTS = {
+    # as the manuals and facts write the sequences: reference, then the chart step by step
+    "atv31": [(8502, 0), (8501, 0x0006), (8501, 0x0007), (8501, 0x000F)],
+    "atv312": [(8502, 0), (8501, 0x0006), (8501, 0x0007), (8501, 0x000F)],
+    "atv71": [(8502, 0), (8501, 0x0006), (8501, 0x000F)],
+    "atv21": [(0xFA01, 0), (0xFA00, 0xC400)],
+    "powerdrive": [(641, 0x0003)],
+    "proxidrive": [(641, 0x0003)],
+    "varmeca": [(641, 0x0003)],
+}
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_start_sequences_are_those_of_the_manuals(family: str) -> None:
+    async with bench(family, sets=ready(family)) as made:
+        await made.order("forward")
+        assert made.writes() == STARTS[family]
+
+
+async def test_the_journal_keeps_every_word() -> None:
+    async with bench("atv71") as made:
+        made.commander.refer("12.5")
+        await made.done()
+        await made.order("forward")
+    lines = [json.loads(line) for line in Journal().path.read_text("utf-8").splitlines()]
+    assert [(one["code"], one["new_raw"]) for one in lines] == [
+        ("LFR", 125), ("LFR", 125), ("CMD", 6), ("CMD", 15),
+    ]  # fmt: skip
+    first = lines[0]
+    assert (first["device"], first["profile"], first["address"]) == (1, "atv71", 8502)
+    assert (first["new"], first["answer"], first["read_back"]) == ("12.5 Hz", "ok", 125)
+
+
+async def test_nothing_is_commanded_before_arming() -> None:
+    async with bench("atv71", armed=False) as made:
+        with pytest.raises(OrderRefused, match="Not armed"):
+            made.commander.order("forward")
+        with pytest.raises(OrderRefused, match="Not armed"):
+            made.commander.refer("30")
+        with pytest.raises(OrderRefused, match="Not armed"):
+            made.commander.step(Decimal(1))
+        assert made.writes() == []
+
+
+async def test_arming_ends_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "ARMED_FOR", 0.3)
+    async with bench("atv71") as made:
+        await asyncio.sleep(0.2)
+        made.commander.touch()
+        await asyncio.sleep(0.2)
+        assert made.commander.armed_for is not None
+        await asyncio.sleep(0.2)
+        assert made.commander.armed_for is None
+        assert "No key" in made.commander.why_disarmed
+
+
+async def test_a_lost_line_disarms() -> None:
+    async with bench("atv71") as made:
+        made.simulation.unplug()
+        await made.until(lambda: made.commander.armed_for is None)
+        assert "line was lost" in made.commander.why_disarmed
+
+
+async def test_a_read_only_line_is_not_armed() -> None:
+    async with bench("atv71", armed=False, read_only=True) as made:
+        with pytest.raises(OrderRefused, match="read-only"):
+            made.commander.arm()
+
+
+async def test_a_drive_whose_state_is_unknown_is_not_armed() -> None:
+    async with bench("atv71", armed=False, sets={"CHCF": 0}) as made:
+        with pytest.raises(OrderRefused, match="state of the drive is not known"):
+            made.commander.arm()
+
+
+REFUSALS = [
+    ("atv31", {"LAC": 1}, "forward", r"below L3.*Set LAC to L3"),
+    ("atv312", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
+    ("atv71", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
+    ("powerdrive", {"6.43": 0}, "forward", r"needs 6\.43 = 1"),
+    ("atv71", {}, "reset", r"possible in the states: Fault"),
+    ("atv31", {}, "take-control", r"no order 'take control'"),
+]
+
+
+@pytest.mark.parametrize(("family", "sets", "order", "text"), REFUSALS)
+async def test_refusals(family: str, sets: dict[str, int], order: str, text: str) -> None:
+    codes = {p.code.casefold(): p.code for p in library.load(family).parameters}
+    named = {codes[code.casefold()]: raw for code, raw in sets.items()}
+    async with bench(family, sets=named) as made:
+        import re
+
+        assert re.search(text, await made.order(order, Kind.REFUSED))
+        assert made.writes() == [] or all(register == 8502 for register, _ in made.writes())
+        assert made.drive.motor.frequency == 0
+
+
+@pytest.mark.parametrize(
+    ("typed", "text"),
+    [
+        ("fast", "is no reference"),
+        ("-5", "not negative"),
+        ("90Hz", "above HSP"),
+        ("3Hz", "below LSP = 5"),
+        ("9000rpm", "above HSP"),
+    ],
+)
+async def test_references_that_are_refused(typed: str, text: str) -> None:
+    async with bench("atv71", sets={"LSP": 50, "HSP": 500}) as made:
+        made.commander.refer(typed)
+        assert text in await made.done(Kind.REFUSED)
+        assert made.writes() == []
+
+
+async def test_references_by_number_step_and_speed() -> None:
+    async with bench("atv71", sets={"HSP": 500, "FRS": 500, "NSP": 1450}) as made:
+        made.commander.refer("30,25")
+        assert "rounded" in await made.done()
+        assert made.drive.raw("LFR") == 303
+        made.commander.step(Decimal(-1))
+        assert "29.3 Hz" in await made.done()
+        made.commander.refer("1200 rpm")
+        assert "1200 rpm" in await made.done()
+        assert made.drive.raw("LFRD") == 1200
+
+
+@pytest.mark.parametrize("family", ["atv21", "atv31", "atv71"])
+async def test_a_fault_is_reset_and_starts_nothing(family: str) -> None:
+    async with bench(family) as made:
+        if family in ALTIVARS:
+            made.commander.refer("20")
+            await made.done()
+        await made.order("forward")
+        await made.until(lambda: made.drive.motor.frequency > 3)
+        made.drive.provoke("OC1" if family == "atv21" else "OCF")
+        await made.until(lambda: made.drive.fault is not None)
+        await made.until(lambda: made.drive.motor.rotor == 0)
+        if family != "atv21":
+            assert "reset it first" in await made.order("forward", Kind.REFUSED)
+        made.drive.clear_cause()
+        await made.order("reset")
+        await made.until(lambda: made.drive.fault is None)
+        await asyncio.sleep(0.5)
+        assert made.drive.motor.frequency == 0
+
+
+async def test_options_of_an_altivar_21_stay_from_order_to_order() -> None:
+    async with bench("atv21") as made:
+        chart = made.commander.session.profile.data.charts[0]
+        options = {option.id: option for option in chart.options}
+        made.commander.refer("20")
+        await made.done()
+        made.commander.choose_option(options["ramp"], 0x0040)
+        assert await made.done() == "Ramp: F500, F501"
+        await made.order("forward")
+        assert made.drive.raw("FA00") == 0xC440
+        made.commander.choose_option(options["motor"], 0x0010)
+        assert "stopped only" in await made.done(Kind.REFUSED)
+        made.stopper.stop([made.commander.session])
+        await made.until(lambda: made.stopped)
+        assert made.drive.raw("FA00") == 0xC040
+
+
+async def test_priorities_that_fall_are_noticed() -> None:
+    """FA00 is in the memory that a power-off empties."""
+    async with bench("atv21") as made:
+        await made.order("forward")
+        assert made.commander.lost_orders() == ""
+        made.drive.power_cycle()
+        await made.until(lambda: bool(made.commander.lost_orders()))
+        assert "FA00 16#C400 is now 16#0000" in made.commander.lost_orders()
+
+
+async def test_a_stop_ends_an_order_on_its_way() -> None:
+    async with bench("atv71") as made:
+        made.commander.refer("20")
+        await made.done()
+        made.commander.order("forward")
+        made.stopper.stop([made.commander.session])
+        await made.until(lambda: made.stopped)
+        await asyncio.sleep(1.0)
+        assert made.drive.motor.frequency == 0
+        assert made.writes()[-1] == (8501, 7)
+
+
+async def test_a_journal_that_cannot_be_written_stops_no_command(tmp_path: Path) -> None:
+    (tmp_path / "file").touch()
+    journal = Journal(tmp_path / "file")
+    async with bench("atv71") as made:
+        commander = Commander(made.commander.session, journal)
+        commander.arm()
+        commander.order("forward")
+        await made.until(lambda: commander.outcome is not None)
+        assert commander.outcome is not None
+        assert commander.outcome.kind is Kind.DONE
+        assert "cannot be written" in journal.trouble
+        assert len(journal.recent) == 3
