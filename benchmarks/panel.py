@@ -1,0 +1,336 @@
+"""The panel as its terminal sees it: start, keys, bytes, CPU and memory, beside two peers.
+
+    python -m benchmarks.panel [--rounds N] [--seconds S] [--presses N]
+
+The panel watches one simulated, running Altivar 71 that a process of its own serves at 19200
+baud in real time. A bare Textual program and htop at 10 refreshes a second run on the same kind
+of pseudo-terminal, one program at a time. The aims are told beside the figures, not asserted.
+"""
+
+from __future__ import annotations
+
+import argparse
+import inspect
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import closing, contextmanager
+from datetime import datetime
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.hello import TEXTS
+from benchmarks.terminal import Figures, Key, Terminal, press_often, spread, steady
+from benchmarks.wire import ROOT
+from tui.cli.panel import run_panel
+
+SIZES = ((80, 24), (120, 40))
+SLOW = 20_000.0
+"""Bytes a second of the slow terminal."""
+PANEL = (sys.executable, "-m", "tui")
+SIMULATED = ("--format", "8N1", "--real-time", "--run", "50")
+HELLO = (sys.executable, "-m", "benchmarks.hello")
+HTOP = ("htop", "-d", "1")
+FIRST_WORDS = (
+    "Drive Panel · Connection",
+    "Lines ─",
+    "Simulated",
+    "Drives ─",
+    "Choose a line",
+    "? help",
+)
+"""What the first full picture of the panel says, from its first row to its last one."""
+SETTLED = 1.5
+"""Seconds after which a program that has shown itself is measured."""
+LOW_SECONDS = 12.0
+"""Least time in s for which the low-bandwidth mode is measured; it refreshes every 2 s."""
+
+
+def word_sign(text: str) -> tuple[object, ...]:
+    """The word of bits that Monitor shows first: its title and the names of its bits."""
+    rows = text.split("\n")
+    for y, row in enumerate(rows):
+        if title := re.match(r"([A-Z]\w+(?: \d/\d)?) ─+ 16#", row):
+            return title[1], *(row[5:13].strip() for row in rows[y + 1 : y + 13])
+    return ()
+
+
+def saying(*words: str) -> Callable[[str], tuple[object, ...]]:
+    """A sign by words that are on the screen or not."""
+    return lambda text: tuple(word in text for word in words)
+
+
+WORD = Key("w", word_sign)
+HELP = Key("?", saying("Keys on Monitor", "──╮", "──╯"))
+HELLO_TEXT = Key("w", saying(*TEXTS))
+HTOP_HELP = Key("?", saying("any key to return", "F10Quit"))
+
+
+class Bench:
+    """The same place and settings for every program that is measured."""
+
+    def __init__(self, folder: Path, line: str, options: argparse.Namespace) -> None:
+        self.line = line
+        self.options = options
+        self._environment = {
+            "TERM": "xterm-256color",
+            "COLORTERM": "truecolor",
+            "TEXTUAL_ANIMATIONS": "none",
+            "PYTHONPATH": str(ROOT),
+            "DRIVEPANEL_STATE": str(folder),
+            "HTOPRC": str(folder / "htoprc"),
+        }
+
+    def open(
+        self, command: Sequence[str], size: tuple[int, int], rate: float | None = None
+    ) -> closing[Terminal]:
+        """Start a program on a terminal."""
+        return closing(Terminal(command, size, ROOT, self._environment, rate))
+
+    def watch(
+        self, size: tuple[int, int], *options: str, rate: float | None = None
+    ) -> closing[Terminal]:
+        """Start the panel on the simulated drive."""
+        return self.open((*PANEL, "panel", self.line, "-d", "1", *options), size, rate)
+
+
+# What is measured
+
+
+def behind(terminal: Terminal, seconds: float) -> Figures:
+    """How late the clock on the picture turns to a new second.
+
+    The panel looks at its clock every 0.25 s, so that up to 0.25 s of it is no lag.
+    """
+    late: list[float] = []
+    shown = ""
+    end = time.monotonic() + seconds
+    while (left := end - time.monotonic()) > 0:
+        terminal.look(left)
+        found = re.search(r"\d\d:\d\d:\d\d", terminal.picture.text())
+        if found and found[0] != shown:
+            now = datetime.now()
+            told = datetime.combine(now.date(), datetime.strptime(found[0], "%H:%M:%S").time())
+            late += [(now - told).total_seconds()] if shown else []
+            shown = found[0]
+    return spread(late)
+
+
+# The programs
+
+
+def starts(bench: Bench, size: tuple[int, int], rounds: int) -> Figures:
+    """Start to the first full picture, program after program in each round; in s."""
+    ready: dict[str, tuple[Sequence[str], Sequence[str]]] = {
+        "panel": (PANEL, FIRST_WORDS),
+        "hello": (HELLO, TEXTS[:1]),
+    }
+    if shutil.which("htop"):
+        ready["htop"] = (HTOP, ("F10Quit",))
+    times: dict[str, list[float]] = {name: [] for name in ready}
+    for number in range(rounds + 1):
+        for name, (command, words) in ready.items():
+            with bench.open(command, size) as terminal:
+                shown = terminal.see(*words)
+            if number:  # the first round fills the caches
+                times[name].append(shown - terminal.started)
+    return {name: spread(found) for name, found in times.items()}
+
+
+def panel(bench: Bench, size: tuple[int, int]) -> dict[str, Figures]:
+    """The panel at its default rate, then at 10 Hz with keys."""
+    with bench.watch(size) as terminal:
+        values = terminal.see("RUNNING") - terminal.started
+        terminal.run(SETTLED)
+        default = steady(terminal, bench.options.seconds)
+        faster(terminal)
+        fast = steady(terminal, bench.options.seconds)
+        fast["behind"] = behind(terminal, bench.options.seconds)
+        fast["w"] = press_often(terminal, WORD, bench.options.presses)
+        fast["help"] = press_often(terminal, HELP, bench.options.presses // 4)
+    return {"2 Hz": default | {"start_to_values_s": values}, "10 Hz": fast}
+
+
+def faster(terminal: Terminal) -> None:
+    """Poll at 10 Hz instead of 2 Hz."""
+    terminal.press("++")
+    terminal.see("of 10.0 cycles")
+    terminal.run(SETTLED)
+
+
+def low_bandwidth(bench: Bench, size: tuple[int, int]) -> Figures | None:
+    """The panel in its low-bandwidth mode; None where it has no such mode."""
+    if "low_bandwidth" not in inspect.signature(run_panel).parameters:
+        return None
+    with bench.watch(size, "--low-bandwidth") as terminal:
+        terminal.see("RUNNING")
+        terminal.run(SETTLED)
+        return steady(terminal, max(LOW_SECONDS, bench.options.seconds))
+
+
+def slow(bench: Bench, size: tuple[int, int]) -> Figures:
+    """The panel at 10 Hz on a slow terminal."""
+    with bench.watch(size, rate=SLOW) as terminal:
+        terminal.see("RUNNING")
+        faster(terminal)
+        found = steady(terminal, bench.options.seconds)
+        found["behind"] = behind(terminal, bench.options.seconds)
+        found["w"] = press_often(terminal, WORD, bench.options.presses // 4)
+        found["help"] = press_often(terminal, HELP, bench.options.presses // 10)
+    return found
+
+
+def hello(bench: Bench, size: tuple[int, int]) -> Figures:
+    """The bare Textual program."""
+    with bench.open(HELLO, size) as terminal:
+        terminal.see(TEXTS[0])
+        terminal.run(SETTLED)
+        found = steady(terminal, bench.options.seconds / 2)
+        found["w"] = press_often(terminal, HELLO_TEXT, bench.options.presses)
+    return found
+
+
+def htop(bench: Bench, size: tuple[int, int]) -> Figures | None:
+    """htop at 10 refreshes a second; None where it is not installed."""
+    if shutil.which("htop") is None:
+        return None
+    with bench.open(HTOP, size) as terminal:
+        terminal.see("F10Quit")
+        terminal.run(SETTLED)
+        found = steady(terminal, bench.options.seconds)
+        found["help"] = press_often(terminal, HTOP_HELP, bench.options.presses // 4)
+    return found
+
+
+def measure(bench: Bench, size: tuple[int, int]) -> Figures:
+    """All figures at one size of the terminal."""
+    return {
+        "start": starts(bench, size, bench.options.rounds),
+        **panel(bench, size),
+        "low": low_bandwidth(bench, size),
+        "slow": slow(bench, size),
+        "hello": hello(bench, size),
+        "htop": htop(bench, size),
+    }
+
+
+# What is printed
+
+
+def show_starts(console: Console, found: dict[str, Figures]) -> None:
+    """Print the starts at both sizes."""
+    table = Table(title="Process start to the first full picture, ms (median, worst)")
+    columns = ("", "panel", "bare Textual", "htop", "panel over bare", "ratio", "drive's values")
+    for column in columns:
+        table.add_column(column, justify="right" if column else "left")
+    for size, figures in found.items():
+        start = figures["start"]
+        ours, bare = start["panel"]["median_ms"], start["hello"]["median_ms"]
+        times = [
+            f"{start[n]['median_ms']:.0f}, {start[n]['worst_ms']:.0f}" if n in start else "missing"
+            for n in ("panel", "hello", "htop")
+        ]
+        values = figures["2 Hz"]["start_to_values_s"]
+        over = f"+{ours - bare:.0f} (aim 60)"
+        table.add_row(size, *times, over, f"{ours / bare:.2f}", f"{values * 1e3:.0f}")
+    console.print(table)
+
+
+ROWS: dict[str, tuple[tuple[str, ...], str, float, str]] = {
+    "bytes a second": (("bytes_a_second",), ".0f", 1.0, "4000 at 2 Hz, 500 low"),
+    "CPU, % of a core": (("cpu_share",), ".1f", 100.0, "5"),
+    "memory, MB": (("memory_bytes",), ".1f", 1e-6, ""),
+    "w: median, ms": (("w", "median_ms"), ".1f", 1.0, "5"),
+    "w: 95th, ms": (("w", "95_ms"), ".1f", 1.0, "30"),
+    "w: 99th, ms": (("w", "99_ms"), ".1f", 1.0, ""),
+    "w: worst, ms": (("w", "worst_ms"), ".1f", 1.0, ""),
+    "w: lost": (("w", "lost"), ".0f", 1.0, "0"),
+    "?: median, ms": (("help", "median_ms"), ".1f", 1.0, "5"),
+    "?: 95th, ms": (("help", "95_ms"), ".1f", 1.0, "30"),
+    "?: worst, ms": (("help", "worst_ms"), ".1f", 1.0, ""),
+    "clock late: median, ms": (("behind", "median_ms"), ".0f", 1.0, "125"),
+    "clock late: worst, ms": (("behind", "worst_ms"), ".0f", 1.0, "250"),
+}
+"""Rows of the table: where the figure is, its form, its factor, the aim."""
+COLUMNS = {
+    "2 Hz": "panel 2 Hz",
+    "10 Hz": "panel 10 Hz",
+    "low": "low bandwidth",
+    "slow": "10 Hz at 20 kB/s",
+    "hello": "bare Textual",
+    "htop": "htop 10 Hz",
+}
+
+
+def show(console: Console, size: str, figures: Figures) -> None:
+    """Print the figures at one size."""
+    table = Table(title=f"Terminal of {size}; keys: w changes a text, ? opens and closes the help")
+    table.add_column("")
+    for name, title in COLUMNS.items():
+        table.add_column(title if figures[name] else f"{title}: {_reason(name)}", justify="right")
+    table.add_column("aim", justify="right")
+    for title, (place, form, factor, aim) in ROWS.items():
+        cells = [_cell(figures[name], place, form, factor) for name in COLUMNS]
+        table.add_row(title, *cells, aim)
+    console.print(table)
+
+
+def _reason(name: str) -> str:
+    return "not installed" if name == "htop" else "not there"
+
+
+def _cell(figures: Any, place: tuple[str, ...], form: str, factor: float) -> str:
+    for part in place:
+        figures = figures.get(part) if figures is not None else None
+    return "" if figures is None else format(figures * factor, form)
+
+
+@contextmanager
+def simulated_drive(folder: Path) -> Iterator[str]:
+    """A running drive on a line of its own, served by another process; gives the LINE."""
+    link = folder / "line"
+    process = subprocess.Popen(
+        (*PANEL, "simulate", "atv71@1", "--pty", str(link), *SIMULATED),
+        cwd=ROOT,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stdout is not None
+    try:
+        process.stdout.readline()
+        yield f"serial:{link},19200,8N1"
+    finally:
+        process.terminate()
+        process.wait(10)
+
+
+def main() -> None:
+    """Measure at both sizes and print."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rounds", type=int, default=5, help="starts of each program")
+    parser.add_argument("--seconds", type=float, default=5.0, help="time of each count of bytes")
+    parser.add_argument("--presses", type=int, default=200, help="presses of the key w")
+    options = parser.parse_args()
+    console = Console()
+    load = os.getloadavg()[0]
+    with tempfile.TemporaryDirectory() as folder, simulated_drive(Path(folder)) as line:
+        bench = Bench(Path(folder), line, options)
+        found = {f"{columns} x {rows}": measure(bench, (columns, rows)) for columns, rows in SIZES}
+    show_starts(console, found)
+    for size, figures in found.items():
+        show(console, size, figures)
+    console.print(f"Load of this machine before: {load:.2f} on {os.cpu_count()} cores.")
+    print(json.dumps({"load_before": load, "sizes": found}))
+
+
+if __name__ == "__main__":
+    main()

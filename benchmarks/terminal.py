@@ -1,0 +1,276 @@
+"""A program on a pseudo-terminal: what it writes, when, what its picture says, what it uses."""
+
+from __future__ import annotations
+
+import codecs
+import fcntl
+import os
+import pty
+import random
+import re
+import select
+import signal
+import struct
+import termios
+import time
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+from benchmarks.wire import share
+
+CHUNK = 65536
+SLOW_CHUNK = 100
+"""Bytes taken at once where the terminal is slow; small against a picture."""
+LONGEST = 5.0
+"""Seconds after which a key counts as lost."""
+GAPS = (0.02, 0.09)
+"""Shortest and longest time in s from a picture to the next key."""
+TOKEN = re.compile(
+    r"\x1b\[(?P<arguments>[0-9;:<=>?]*)[ -/]*(?P<final>[@-~])"
+    r"|\x1b[\]P_^][^\x07\x1b]*(?:\x07|\x1b\\)"
+    r"|\x1b[()][0-9A-Z]"
+    r"|\x1b[^\[\]P_^()]"
+    r"|(?P<control>[\x00-\x1a\x1c-\x1f])"
+    r"|(?P<text>[^\x00-\x1f]+)"
+)
+
+
+Figures = dict[str, Any]
+
+
+class NotShown(Exception):
+    """What was waited for did not come to the terminal."""
+
+
+class Picture:
+    """What a terminal shows: as much of its language as the programs here speak, no colours."""
+
+    def __init__(self, columns: int, rows: int) -> None:
+        self._columns, self._rows = columns, rows
+        self._cells = [[" "] * columns for _ in range(rows)]
+        self._x = self._y = 0
+        self._decode = codecs.getincrementaldecoder("utf-8")("replace").decode
+        self._rest = ""
+
+    def feed(self, data: bytes) -> None:
+        """Take what the program wrote; a sequence may come in pieces."""
+        text = self._rest + self._decode(data)
+        at = 0
+        while found := TOKEN.match(text, at):
+            at = found.end()
+            if found["text"]:
+                self._write(found["text"])
+            elif found["final"]:
+                self._control(found["final"], found["arguments"])
+            elif found["control"]:
+                self._move_by_control(found["control"])
+        self._rest = text[at:]
+
+    def row(self, y: int) -> str:
+        """The text of a row."""
+        return "".join(self._cells[y])
+
+    def text(self) -> str:
+        """All rows, one below the other."""
+        return "\n".join("".join(cells) for cells in self._cells)
+
+    def _write(self, text: str) -> None:
+        for character in text:
+            if self._x >= self._columns:
+                self._x, self._y = 0, min(self._y + 1, self._rows - 1)
+            self._cells[self._y][self._x] = character
+            self._x += 1
+
+    def _move_by_control(self, control: str) -> None:
+        if control == "\r":
+            self._x = 0
+        elif control == "\n":
+            self._y = min(self._y + 1, self._rows - 1)
+        elif control == "\b":
+            self._x = max(0, self._x - 1)
+
+    def _control(self, final: str, arguments: str) -> None:
+        """Moves and erasures; everything else changes no text."""
+        if arguments[:1] in ("?", "<", "=", ">"):
+            return
+        numbers = [int(part or 0) for part in re.split("[;:]", arguments)]
+        count = max(1, numbers[0])
+        if final in "Hf":
+            column = numbers[1] if len(numbers) > 1 else 1
+            self._go(column - 1, count - 1)
+        elif final == "G":
+            self._go(count - 1, self._y)
+        elif final == "d":
+            self._go(self._x, count - 1)
+        elif final in "ABCD":
+            step = {"A": (0, -1), "B": (0, 1), "C": (1, 0), "D": (-1, 0)}[final]
+            self._go(self._x + step[0] * count, self._y + step[1] * count)
+        elif final == "b":
+            self._write(self._cells[self._y][max(0, self._x - 1)] * count)
+        elif final in "JKX":
+            self._erase(final, numbers[0])
+
+    def _go(self, x: int, y: int) -> None:
+        self._x = max(0, min(x, self._columns - 1))
+        self._y = max(0, min(y, self._rows - 1))
+
+    def _erase(self, final: str, number: int) -> None:
+        """Erase the screen or a line, before the cursor, behind it or wholly."""
+        here = self._y * self._columns + min(self._x, self._columns - 1)
+        first, last = {
+            "J": (0, self._rows * self._columns),
+            "K": (self._y * self._columns, (self._y + 1) * self._columns),
+            "X": (here, here + max(1, number)),
+        }[final]
+        if final != "X" and number == 0:
+            first = here
+        elif final != "X" and number == 1:
+            last = here + 1
+        for cell in range(first, min(last, self._rows * self._columns)):
+            self._cells[cell // self._columns][cell % self._columns] = " "
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What a process has used: CPU time in s, memory that it holds in bytes."""
+
+    cpu: float
+    memory: int
+
+
+class Terminal:
+    """A program on a pseudo-terminal of its own, read as fast as it writes or at a set rate.
+
+    `rate` is in bytes a second. Bytes count as come once a line of that rate has carried them.
+    """
+
+    def __init__(
+        self,
+        command: Sequence[str],
+        size: tuple[int, int],
+        folder: Path,
+        environment: Mapping[str, str],
+        rate: float | None = None,
+    ) -> None:
+        self.picture = Picture(*size)
+        self.written = 0
+        self._rate = rate
+        self._free = 0.0
+        self.started = time.monotonic()
+        self._process, self._terminal = pty.fork()
+        if self._process == 0:
+            columns, rows = size
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", rows, columns, 0, 0))
+            os.chdir(folder)
+            os.execvpe(command[0], list(command), os.environ | environment)
+
+    def press(self, keys: str) -> float:
+        """Type keys; the time just before, of the monotonic clock."""
+        pressed = time.monotonic()
+        os.write(self._terminal, keys.encode())
+        return pressed
+
+    def look(self, within: float) -> float | None:
+        """Take what comes next; when it had come, or None if nothing came within so many s."""
+        wait = max(within, 0.0)
+        if not select.select([self._terminal], [], [], wait)[0]:
+            return None
+        try:
+            data = os.read(self._terminal, CHUNK if self._rate is None else SLOW_CHUNK)
+        except OSError as error:
+            raise NotShown(f"the program ended: {self.picture.text()}") from error
+        if self._rate is not None:
+            self._free = max(self._free, time.monotonic()) + len(data) / self._rate
+            time.sleep(max(0.0, self._free - time.monotonic()))
+        come = time.monotonic()
+        self.written += len(data)
+        self.picture.feed(data)
+        return come
+
+    def wait(self, shown: Callable[[str], bool], within: float = 20.0) -> float:
+        """Read until the picture's text is as wanted; when the last byte for that had come."""
+        end = time.monotonic() + within
+        while (left := end - time.monotonic()) > 0:
+            come = self.look(left)
+            if come is not None and shown(self.picture.text()):
+                return come
+        raise NotShown(f"did not come within {within} s:\n{self.picture.text()}")
+
+    def see(self, *words: str) -> float:
+        """Read until all these words are on the picture; when the last of them had come."""
+        return self.wait(lambda text: all(word in text for word in words))
+
+    def run(self, seconds: float) -> None:
+        """Read for so long."""
+        end = time.monotonic() + seconds
+        while (left := end - time.monotonic()) > 0:
+            self.look(left)
+
+    def usage(self) -> Usage | None:
+        """What the program has used so far; None where the system does not tell it."""
+        place = Path(f"/proc/{self._process}")
+        if not place.exists():
+            return None
+        fields = (place / "stat").read_text().rpartition(")")[2].split()
+        cpu = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        pages = int((place / "statm").read_text().split()[1])
+        return Usage(cpu, pages * os.sysconf("SC_PAGE_SIZE"))
+
+    def close(self) -> None:
+        """End the program, and take the terminal away from it."""
+        os.kill(self._process, signal.SIGTERM)
+        os.close(self._terminal)
+        os.waitpid(self._process, 0)
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key that changes the picture at once, and the signs in its text that all change then."""
+
+    key: str
+    signs: Callable[[str], tuple[object, ...]]
+
+    def changed(self, before: tuple[object, ...], text: str) -> bool:
+        """Whether every sign is another one than before; empty ones count for nothing."""
+        now = self.signs(text)
+        if not before or len(now) != len(before):
+            return False
+        return all(b != a for a, b in zip(before, now, strict=True) if a != "")
+
+
+def steady(terminal: Terminal, seconds: float) -> Figures:
+    """Bytes, CPU and memory of a program that nobody touches."""
+    before, written, start = terminal.usage(), terminal.written, time.monotonic()
+    terminal.run(seconds)
+    after, took = terminal.usage(), time.monotonic() - start
+    return {
+        "seconds": took,
+        "bytes_a_second": (terminal.written - written) / took,
+        "cpu_share": (after.cpu - before.cpu) / took if before and after else None,
+        "memory_bytes": after.memory if after else None,
+    }
+
+
+def press_often(terminal: Terminal, key: Key, presses: int) -> Figures:
+    """Times from a key to the whole picture that it brings, at irregular moments."""
+    times: list[float] = []
+    chance = random.Random(0)
+    for _ in range(presses):
+        terminal.run(chance.uniform(*GAPS))
+        before = key.signs(terminal.picture.text())
+        pressed = terminal.press(key.key)
+        with suppress(NotShown):
+            times.append(terminal.wait(partial(key.changed, before), LONGEST) - pressed)
+    return spread(times) | {"presses": presses, "lost": presses - len(times)}
+
+
+def spread(times: Sequence[float]) -> Figures:
+    """Median, 95th and 99th percentile and worst of times in s, told in ms."""
+    found = {"median": median(times) if times else None, "worst": max(times, default=None)}
+    found |= {"95": share(times, 0.95), "99": share(times, 0.99)}
+    return {f"{name}_ms": None if one is None else one * 1e3 for name, one in found.items()}
