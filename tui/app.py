@@ -13,10 +13,13 @@ from rich.console import RenderableType
 from rich.text import Text
 from textual.app import SystemCommand
 from textual.driver import Driver
+from textual.events import Event, Key
 from textual.screen import Screen
 from textual.widgets import Input, TextArea
 
 from tui.bus.errors import LineClosed
+from tui.drive.schema import OrderId
+from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
 from tui.session.journal import Journal
 from tui.session.keeper import Keeper
@@ -31,6 +34,7 @@ from .screens.actions import ACTIONS, CONNECTION, bindings
 from .screens.confirm import Confirm
 from .screens.connection import ConnectionScreen
 from .screens.help import HelpScreen
+from .screens.leave import Choice, Leave
 from .screens.panel import Panel
 from .screens.stop_keys import STOP_ALL_ANYWHERE, STOP_ANYWHERE, STOP_OUTSIDE_TEXT, with_stop_keys
 
@@ -39,6 +43,8 @@ log = logging.getLogger("drivepanel")
 CONNECT_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""
 
+STOPPED_WITHIN = 60.0
+"""Seconds that a motor may take to its standstill before the panel gives up waiting."""
 HUNGER_LOOK = 0.25
 """Seconds between two looks for drives that are about to act on their time-out."""
 
@@ -50,7 +56,8 @@ Opener = Callable[..., OpenLine]
 class DrivePanelApp(Panel):
     """The panel on one line at a time.
 
-    `start` is a LINE to open at once, `device` a drive on it to watch at once.
+    `start` is a LINE to open at once, `device` a drive on it to watch at once. With
+    `leave_running` motors are not stopped when the panel ends without being asked.
     """
 
     TITLE = "Drive Panel"
@@ -68,6 +75,7 @@ class DrivePanelApp(Panel):
         clock: Clock | None = None,
         read_only: bool = False,
         low_bandwidth: bool = False,
+        leave_running: bool = False,
     ) -> None:
         super().__init__()
         self.clock = clock or Clock()
@@ -83,8 +91,11 @@ class DrivePanelApp(Panel):
         self._start = start
         self._device = device
         self._gone = False
+        self._settled = leave_running
+        """Whether it was decided what becomes of motors that run by an order from here."""
         self._hungry: set[int] = set()
         self._told: StopSummary | None = None
+        self._commanders: dict[int, Commander] = {}
 
     def get_driver_class(self) -> type[Driver]:
         """The driver of this platform, with the stop keys before everything else."""
@@ -126,6 +137,26 @@ class DrivePanelApp(Panel):
         if self.stopper is not None and sessions:
             with suppress(LineClosed):
                 self.stopper.stop(sessions)
+
+    def commander(self, session: DriveSession) -> Commander:
+        """What commands a drive of the open line."""
+        known = self._commanders.get(session.device)
+        if known is None or known.session is not session:
+            known = self._commanders[session.device] = Commander(session, self.journal)
+        return known
+
+    def stop_drive(self, session: DriveSession, order: OrderId) -> None:
+        """Stop one drive, in its own way."""
+        if self.stopper is not None:
+            with suppress(LineClosed):
+                self.stopper.stop([session], order)
+
+    async def on_event(self, event: Event) -> None:
+        """A key keeps an armed drive armed."""
+        if isinstance(event, Key):
+            for commander in self._commanders.values():
+                commander.touch()
+        await super().on_event(event)
 
     def _shown(self, found: list[DriveSession]) -> list[DriveSession]:
         """The drive whose screen is open; without one those commanded from here, else all."""
@@ -182,7 +213,11 @@ class DrivePanelApp(Panel):
     async def on_unmount(self) -> None:
         """Leave no line open."""
         self._gone = True
+        if not self._settled:
+            # the panel ends without having been asked: an error of its own, or a signal
+            await asyncio.to_thread(self.stop_motors)
         await self.disconnect()
+        self.journal.close()
 
     def _handle_exception(self, error: Exception) -> None:
         """An error of the panel itself: all of it to the log, one line to the person."""
@@ -206,6 +241,7 @@ class DrivePanelApp(Panel):
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
+        self._commanders = {}
         self.keeper = Keeper(self.opened.line)
         self.stopper = Stopper(self.opened.line, self.journal)
         log.info("opened %s", self.opened.label)
@@ -246,12 +282,64 @@ class DrivePanelApp(Panel):
             self.switch_screen(MonitorScreen(found.session))
 
     async def action_quit(self) -> None:
-        """Leave; where that trips a running drive, only after saying so."""
+        """Leave; where a motor runs by an order from here, or is tripped by that, not unasked."""
+        if isinstance(self.screen, Leave):
+            return
+        if running := self.keeper.under_command() if self.keeper else []:
+            self.push_screen(Leave(self._left_running(running)), self._leave_motors)
+            return
         asked = self._question("Leave the panel?", "q or Enter leaves   Esc stays")
         if asked is None or isinstance(self.screen, Confirm):
             self.exit()
         else:
             self.push_screen(asked, self._leave)
+
+    def _left_running(self, sessions: list[DriveSession]) -> str:
+        """Which motors run, and what each drive does when nobody asks it any more."""
+        lines = []
+        for session in sessions:
+            watch = self.keeper.watch(session.device) if self.keeper else None
+            does = "goes on running: it does not watch the line"
+            if watch is not None:
+                reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
+                does = f"acts {watch.timeout:g} s after the last request: {reaction}"
+            lines.append(f"Device {session.device}, {session.profile.name}: left alone it {does}.")
+        return "\n".join(lines)
+
+    def _leave_motors(self, choice: Choice | None) -> None:
+        if choice == "leave":
+            self._settled = True
+            self.exit()
+        elif choice == "stop":
+            self.run_worker(self._stop_and_leave(), exclusive=True, group="leave")
+
+    async def _stop_and_leave(self) -> None:
+        """Stop what runs by an order from here, then leave; stay where one does not stop."""
+        if await asyncio.to_thread(self.stop_motors):
+            self._settled = True
+            self.exit()
+
+    def leave_now(self) -> None:
+        """End the screen; may be called in any thread."""
+        self._settled = True
+        loop = self._loop
+        if loop is not None and loop.is_running():
+            loop.call_soon_threadsafe(self.exit)
+
+    def stop_motors(self) -> bool:
+        """Stop every motor that runs by an order from here; True when none runs any more.
+
+        Waits for it; may be called in any thread but the loop's.
+        """
+        keeper, stopper = self.keeper, self.stopper
+        running = keeper.under_command() if keeper else []
+        if not running or stopper is None:
+            return True
+        try:
+            stopper.stop(running)
+        except LineClosed:
+            return False
+        return not stopper.wait(running, STOPPED_WITHIN).failed
 
     def _leave(self, sure: bool | None) -> None:
         if sure:

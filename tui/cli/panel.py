@@ -10,6 +10,7 @@ import click
 
 from .errors import USAGE, Failure, told
 from .options import read_only_option
+from .signals import ending_by_signal
 
 if TYPE_CHECKING:
     from tui.session.lines import OpenLine
@@ -17,6 +18,8 @@ if TYPE_CHECKING:
 DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 """Profiles of the demo and the frequency in Hz at which each motor runs."""
 
+
+STOP, LEAVE_RUNNING = "stop", "leave-running"
 
 DEMO_LINE = "demo"
 """The LINE of the demo inside the panel; every other text is opened as it is written."""
@@ -28,6 +31,7 @@ def run_panel(
     *,
     read_only: bool = False,
     low_bandwidth: bool = False,
+    on_hangup: str = STOP,
 ) -> None:
     """Run the panel until it is left."""
     if not _has_terminal():
@@ -42,8 +46,10 @@ def run_panel(
         device=device,
         read_only=read_only,
         low_bandwidth=low_bandwidth,
+        leave_running=on_hangup == LEAVE_RUNNING,
     )
-    app.run()
+    with ending_by_signal(app, stop=on_hangup == STOP):
+        app.run()
     if app.return_code:
         raise click.exceptions.Exit(app.return_code)  # the panel itself has said why
 
@@ -61,6 +67,13 @@ def _has_terminal() -> bool:
     return sys.stdin.isatty() and sys.stdout.isatty()
 
 
+on_hangup_option = click.option(
+    "--on-hangup",
+    type=click.Choice([STOP, LEAVE_RUNNING]),
+    default=STOP,
+    show_default=True,
+    help="What becomes of motors commanded from here when the terminal goes away.",
+)
 low_bandwidth_option = click.option(
     "--low-bandwidth", is_flag=True, help="Send as little as possible to a slow terminal."
 )
@@ -68,10 +81,11 @@ low_bandwidth_option = click.option(
 
 @click.command()
 @low_bandwidth_option
+@on_hangup_option
 @told
-def demo(low_bandwidth: bool) -> None:
+def demo(low_bandwidth: bool, on_hangup: str) -> None:
     """Open the panel on one simulated line with five running drives."""
-    run_panel(DEMO_LINE, None, low_bandwidth=low_bandwidth)
+    run_panel(DEMO_LINE, None, low_bandwidth=low_bandwidth, on_hangup=on_hangup)
 
 
 @click.command(hidden=True)
@@ -85,9 +99,18 @@ def demo(low_bandwidth: bool) -> None:
 )
 @read_only_option
 @low_bandwidth_option
+@on_hangup_option
 @told
-def panel(line_text: str | None, device: int | None, read_only: bool, low_bandwidth: bool) -> None:
+def panel(
+    line_text: str | None,
+    device: int | None,
+    read_only: bool,
+    low_bandwidth: bool,
+    on_hangup: str,
+) -> None:
     """Open the panel."""
     if device is not None and line_text is None:
         raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
-    run_panel(line_text, device, read_only=read_only, low_bandwidth=low_bandwidth)
+    run_panel(
+        line_text, device, read_only=read_only, low_bandwidth=low_bandwidth, on_hangup=on_hangup
+    )

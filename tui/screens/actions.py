@@ -76,14 +76,14 @@ ACTIONS: tuple[Action, ...] = (
         "type_line",
         "n",
         "n",
-        "type a line",
+        "type line",
         "Type a line: serial, TCP, RTU over TCP, sim.",
         (CONNECTION,),
     ),
     Action(
         "refresh_lines", "r", "r", "", "Look for serial ports again.", (CONNECTION,), line=False
     ),
-    Action("disconnect", "x", "x", "close line", "Close the line.", (CONNECTION,)),
+    Action("disconnect", "x", "x", "close", "Close the line.", (CONNECTION,)),
     Action(
         "stop_scan",
         "escape",
@@ -102,7 +102,105 @@ ACTIONS: tuple[Action, ...] = (
         (CONNECTION,),
         line=False,
     ),
-    Action("leave", "escape,1", "Esc", "lines", "Go back to Connection.", (MONITOR,)),
+    Action("arm", "a", "a", "arm", "Arm this drive for orders, or end that.", (MONITOR,)),
+    Action("order('forward')", "r", "r", "run", "Run forward.", (MONITOR,)),
+    Action("order('reverse')", "v", "v", "reverse", "Run reverse.", (MONITOR,)),
+    Action("reference", "f", "f", "ref", "Type a reference in Hz or rpm.", (MONITOR,)),
+    Action("order('reset')", "x", "x", "reset", "Reset a fault; runs nothing.", (MONITOR,)),
+    Action(
+        "step_reference(1)", "up", "Up", "", "Raise the reference by 1 Hz.", (MONITOR,), line=False
+    ),
+    Action(
+        "step_reference(-1)",
+        "down",
+        "Down",
+        "",
+        "Lower the reference by 1 Hz.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "step_reference(5)",
+        "pageup",
+        "PgUp",
+        "",
+        "Raise the reference by 5 Hz.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "step_reference(-5)",
+        "pagedown",
+        "PgDn",
+        "",
+        "Lower the reference by 5 Hz.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "options",
+        "o",
+        "o",
+        "",
+        "Choose a ramp, preset speed, motor or output.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "stop_as('quick-stop')",
+        "k",
+        "k",
+        "",
+        "Quick stop, where the drive has one; needs no arming.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "stop_as('freewheel')",
+        "z",
+        "z",
+        "",
+        "Let the motor coast; needs no arming.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "stop_as('emergency-stop')",
+        "e",
+        "e",
+        "",
+        "Emergency stop with a fault (Altivar 21); needs no arming.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "order('dc-braking')",
+        "b",
+        "b",
+        "",
+        "Brake by direct current, where the drive has an order for it.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "order('take-control')",
+        "t",
+        "t",
+        "",
+        "Take the control from the terminals (Leroy-Somer 6.43), locked only.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "hand_back",
+        "g",
+        "g",
+        "",
+        "Give the control back to the terminals; a run order waiting there counts then.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action("leave", "escape,1", "Esc", "", "Go back to Connection.", (MONITOR,), line=False),
     Action(
         "step_drive(-1)",
         "left_square_bracket",
@@ -120,12 +218,13 @@ ACTIONS: tuple[Action, ...] = (
         "The next drive on this line.",
         (MONITOR,),
         both="[ ]",
+        line=False,
     ),
     Action(
         "change_rate(1)", "plus,equals_sign", "+", "", "Poll twice as fast.", (MONITOR,), line=False
     ),
-    Action("change_rate(-1)", "minus", "-", "rate", "Poll half as fast.", (MONITOR,), both="+ -"),
-    Action("next_word", "w", "w", "word", "Show the next word of bits.", (MONITOR,)),
+    Action("change_rate(-1)", "minus", "-", "", "Poll half as fast.", (MONITOR,), line=False),
+    Action("next_word", "w", "w", "", "Show the next word of bits.", (MONITOR,), line=False),
     Action(
         "rating",
         "i",
@@ -135,10 +234,10 @@ ACTIONS: tuple[Action, ...] = (
         (MONITOR,),
         line=False,
     ),
-    Action("frames", "l", "l", "frames", "Show the frames on the line.", (MONITOR,)),
+    Action("frames", "l", "l", "", "Show the frames on the line.", (MONITOR,), line=False),
     Action("leave", "escape,l,2", "Esc", "back", "Go back to Monitor.", (FRAMES,)),
     Action("hold", "h", "h", "hold", "Hold the list still, or let it run.", (FRAMES,)),
-    Action("command_palette", "ctrl+p", "^p", "actions", "Find any action by its name.", app=True),
+    Action("command_palette", "ctrl+p", "^p", "all", "Find any action by its name.", app=True),
     Action("help", "question_mark,f1", "?", "help", "Show every key.", app=True),
     Action("quit", "q,ctrl+q", "q", "leave", "Leave the panel.", app=True),
 )
@@ -166,8 +265,15 @@ def of_screen(screen: str) -> list[Action]:
     return [action for action in ACTIONS if screen in action.screens]
 
 
+def line_of(screen: str) -> list[tuple[str, str, str]]:
+    """Action, key and label of everything in the line of keys of a screen."""
+    return [
+        (action.id, action.both or action.shown, action.label)
+        for action in of_screen(screen)
+        if action.line
+    ]
+
+
 def keys_of(screen: str) -> list[tuple[str, str]]:
     """What the line of keys says on a screen."""
-    return [
-        (action.both or action.shown, action.label) for action in of_screen(screen) if action.line
-    ]
+    return [(key, label) for _, key, label in line_of(screen)]

@@ -9,16 +9,15 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.events import Resize
-from textual.screen import Screen
 from textual.timer import Timer
 
 from tui.drive.schema import Parameter
 from tui.session.drive_session import DriveSession
 from tui.session.reader import Rating
 from tui.session.stop import Phase, StopReport
-from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 from tui.widgets.monitor_motor import motor_lines
+from tui.widgets.monitor_orders import order_keys
 from tui.widgets.monitor_state import (
     header,
     history_lines,
@@ -31,8 +30,8 @@ from tui.widgets.monitor_trends import stacked_trends, trend_lines
 from tui.widgets.monitor_view import View
 from tui.widgets.monitor_words import word_lines, word_pages
 
-from .actions import MONITOR, bindings, keys_of
-from .panel import Panel
+from .actions import MONITOR, bindings, line_of
+from .orders import OrderKeys
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
@@ -49,14 +48,12 @@ WORDS_HEIGHT = 16
 WIDE_MOTOR = 46
 
 
-class MonitorScreen(Screen[None]):
+class MonitorScreen(OrderKeys):
     """One drive, watched live; the screen only looks at what the line's worker brought."""
 
     CSS_PATH = "monitor.tcss"
     BINDINGS: ClassVar = bindings(MONITOR)
     TITLE = "Monitor"
-
-    app: Panel
 
     def __init__(self, session: DriveSession) -> None:
         super().__init__()
@@ -91,11 +88,11 @@ class MonitorScreen(Screen[None]):
         self._timer = self.set_interval(
             LOW_BANDWIDTH_REFRESH if self.app.low_bandwidth else REFRESH, self.look
         )
-        self.query_one("#keys", Lines).show([key_line(keys_of(MONITOR))])
         self.call_after_refresh(self.look)
 
     def on_unmount(self) -> None:
-        """Stop watching; nobody looks any more."""
+        """Stop watching; nobody looks any more, and nothing is commanded any more."""
+        self.commander.disarm()
         self.session.monitor.stop()
 
     def on_resize(self, event: Resize) -> None:
@@ -145,6 +142,7 @@ class MonitorScreen(Screen[None]):
             low_bandwidth=self.app.low_bandwidth,
             watch=self.app.keeper.watch(self.session.device) if self.app.keeper else None,
             heard=self.session.line.device_state(self.session.device).heard,
+            control=self.control(now),
             stop=self._stop(now),
             was=self._was,
         )
@@ -176,6 +174,7 @@ class MonitorScreen(Screen[None]):
             "state": state_lines(view, left),
             "message": message_lines(view, width),
             "status": status_lines(view, width),
+            "keys": [order_keys(view, line_of(MONITOR))],
         }
         body = height - (WORDS_HEIGHT if self.wide else 0) - 5
         rest = body - len(parts["state"])

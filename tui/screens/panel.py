@@ -6,6 +6,8 @@ from abc import abstractmethod
 
 from textual.app import App
 
+from tui.drive.schema import OrderId
+from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine
@@ -25,6 +27,14 @@ class Panel(App[None]):
     opened: OpenLine | None
     keeper: Keeper | None
     stopper: Stopper | None
+
+    @abstractmethod
+    def commander(self, session: DriveSession) -> Commander:
+        """What commands a drive of the open line."""
+
+    @abstractmethod
+    def stop_drive(self, session: DriveSession, order: OrderId) -> None:
+        """Stop one drive, in its own way."""
 
     @property
     def line_text(self) -> str:

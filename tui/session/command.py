@@ -164,6 +164,10 @@ class Commander:
 
         self.session.busy = self.session.line.spawn(guarded, f"order {self.session.device}")
 
+    def refuse(self, text: str) -> None:
+        """Tell why an order was not given."""
+        self._say(Kind.REFUSED, text)
+
     def _say(self, kind: Kind, text: str) -> None:
         self.outcome = Outcome(kind, text, time.monotonic())
 

@@ -11,7 +11,7 @@ import asyncio
 import logging
 import time
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from tui.bus.errors import LineError
 from tui.bus.line import Line, Priority, Worker
@@ -44,7 +44,7 @@ class Watch:
 
     timeout: float
     reaction: Reaction | None
-    active: bool
+    active: bool = True
     """False where it begins only with a first command, and none was sent from here."""
 
 
@@ -100,7 +100,14 @@ class Keeper:
     def watch(self, device: int) -> Watch | None:
         """A drive's watch over the line, once it is known and not off."""
         kept = self._kept.get(device)
-        return kept.watch if kept else None
+        return self._watch(kept) if kept else None
+
+    @staticmethod
+    def _watch(kept: _Kept) -> Watch | None:
+        rules, watch = kept.session.profile.data.communication_fault, kept.watch
+        if watch is None or rules is None:
+            return None
+        return replace(watch, active=not rules.needs_write or kept.session.commanded)
 
     def left_alone(self) -> dict[int, float]:
         """Running drives that act on their communication time-out once nobody asks them.
@@ -108,12 +115,20 @@ class Keeper:
         By device, with the time-out in seconds.
         """
         return {
-            device: kept.watch.timeout
-            for device, kept in self._kept.items()
-            if kept.watch is not None and kept.watch.active and self._runs(device)
+            device: watch.timeout
+            for device in self._kept
+            if (watch := self.watch(device)) is not None and watch.active and self.runs(device)
         }
 
-    def _runs(self, device: int) -> bool:
+    def under_command(self) -> list[DriveSession]:
+        """Drives that were commanded from here and whose motors run."""
+        return [
+            kept.session
+            for device, kept in self._kept.items()
+            if kept.session.commanded and self.runs(device)
+        ]
+
+    def runs(self, device: int) -> bool:
         """Whether a motor runs, by its drive's own monitor where that is the newer."""
         look, monitor = self._looks.get(device), self._kept[device].session.monitor
         latest = monitor.latest if monitor.running else None
@@ -127,11 +142,12 @@ class Keeper:
         now = time.monotonic()
         found = []
         for device, kept in self._kept.items():
-            if kept.watch is None or not kept.watch.active:
+            watch = self._watch(kept)
+            if watch is None or not watch.active:
                 continue
             silent = now - self._heard(kept)
-            if silent > TOLD_AFTER * kept.watch.timeout:
-                found.append(Hunger(device, kept.session.profile, silent, kept.watch))
+            if silent > TOLD_AFTER * watch.timeout:
+                found.append(Hunger(device, kept.session.profile, silent, watch))
         return found
 
     def _heard(self, kept: _Kept) -> float:
@@ -208,7 +224,8 @@ class Keeper:
             kept.session.monitor.known.note(readings)
         except LineError as fault:
             error = str(fault)
-        timeout = kept.watch.timeout if kept.watch and kept.watch.active else None
+        watch = self._watch(kept)
+        timeout = watch.timeout if watch and watch.active else None
         if self._kept.get(device) is kept:
             self._looks = {**self._looks, device: Look(state, error, time.monotonic(), timeout)}
         return GLANCE if kept.learned is not None else GLANCE / 10
@@ -226,8 +243,7 @@ class Keeper:
         timeout = _seconds(readings[rules.timeout], rules.off)
         raw = readings[rules.reaction].raw if rules.reaction else None
         reaction = next((one for one in rules.reactions if one.raw == raw), None)
-        active = not rules.needs_write or kept.session.commanded
-        kept.watch = None if timeout is None else Watch(timeout, reaction, active)
+        kept.watch = None if timeout is None else Watch(timeout, reaction)
         kept.learned = time.monotonic()
 
 

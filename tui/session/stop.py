@@ -121,8 +121,20 @@ class Stopper:
             for before in (self._workers.get(session.device), session.busy):
                 if before is not None:
                     before.cancel()
+            self._say(session, Phase.SENDING, "stop is being sent", ordered)
             work = partial(self._stop, session, order, ordered)
             self._workers[session.device] = self._line.spawn(work, f"stop {session.device}")
+
+    def wait(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
+        """Wait from another thread until these stops have ended, or the time is up."""
+        devices = {session.device for session in sessions}
+        end = time.monotonic() + seconds
+        while True:
+            reports = [one for device, one in self._reports.items() if device in devices]
+            summary = StopSummary(reports)
+            if (len(reports) == len(devices) and summary.ended) or time.monotonic() > end:
+                return summary
+            time.sleep(LOOK)
 
     def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
         before = self._reports.get(session.device)
@@ -154,7 +166,6 @@ class Stopper:
                     )
 
     async def _stop(self, session: DriveSession, order: OrderId, ordered: float) -> None:
-        self._say(session, Phase.SENDING, "stop is being sent", ordered)
         error = "it did not answer"
         for _ in range(TRIES):
             try:

@@ -14,6 +14,7 @@ from tui.session.readings import Quality
 from tui.session.stop import Phase, StopReport
 
 from .drawing import cut, pair, rule
+from .monitor_orders import mode_text, outcome_lines
 from .monitor_view import View, age_text
 from .palette import (
     ALARM,
@@ -117,6 +118,8 @@ def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
 def message_lines(view: View, width: int) -> list[Text]:
     """Two lines: what is wrong, or that nothing is; what a stop has come to before all."""
     lines = _messages(view, width - 2)
+    if view.control.outcome is not None:
+        lines = [*outcome_lines(view.control.outcome, width - 2), lines[0]][:2]
     if view.stop is not None:
         lines = [_stop_line(view.stop, width - 2), lines[0]]
     return [Text(" ") + line if line.plain else line for line in lines]
@@ -161,7 +164,15 @@ def _messages(view: View, width: int) -> list[Text]:
             _alarm_line(view, state, width),
             Text(cut(f"NOT HEARD{_countdown(view)}", width), ALARM),
         ]
-    return [_alarm_line(view, state, width), _last_fault(view, width)]
+    alarm, control = _alarm_line(view, state, width), view.control
+    for said, style in (
+        (control.lost, ALARM),
+        (control.why_disarmed, ATTENTION),
+        (control.no_effect and f"Orders from here have no effect: {control.no_effect}", FAINT),
+    ):
+        if said:
+            return [alarm, Text(cut(said, width), style)]
+    return [alarm, _last_fault(view, width)]
 
 
 def _alarm_line(view: View, state: DriveState, width: int) -> Text:
@@ -220,7 +231,7 @@ def _countdown(view: View) -> str:
 def status_lines(view: View, width: int) -> list[Text]:
     """What the panel itself does: monitoring, how fast, how well the line answers."""
     text = Text(no_wrap=True)
-    text.append(" MONITORING", STRONG if not view.lost else ALARM)
+    text.append_text(mode_text(view))
     rate, wished = view.snapshot.rate if view.snapshot else 0.0, 1 / view.period
     counts = view.counters
     bad = counts.timeouts + counts.checksum + counts.wrong

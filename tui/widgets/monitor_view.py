@@ -7,11 +7,27 @@ from dataclasses import dataclass
 from tui.bus.line import Counters, LineState, LineStatus
 from tui.drive.profile import Profile
 from tui.drive.schema import MonitoringValue
+from tui.session.command import Outcome
 from tui.session.identify import DriveIdentity
 from tui.session.keeper import Watch
 from tui.session.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
 from tui.session.readings import Reading
 from tui.session.stop import StopReport
+
+
+@dataclass(frozen=True, slots=True)
+class Control:
+    """Whether and how the drive is commanded from here."""
+
+    armed_for: float | None = None
+    """Seconds for which it is armed yet; None when it is not."""
+    why_disarmed: str = ""
+    outcome: Outcome | None = None
+    """What has become of the last order, while that is news."""
+    no_effect: str = ""
+    """Why a run order would have no effect now; empty where it would."""
+    lost: str = ""
+    """What the drive no longer holds of what was written from here."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +53,7 @@ class View:
     """The drive's watch over the line, where it has one that runs."""
     heard: float | None = None
     """When the drive last answered anybody on this line."""
+    control: Control = Control()
     stop: StopReport | None = None
     """What became of a stop that was ordered lately."""
     was: str = ""

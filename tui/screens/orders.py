@@ -1,0 +1,141 @@
+"""Keys that command the drive on the Monitor screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal
+
+from textual.screen import Screen
+
+from tui.drive.errors import ValueRefused
+from tui.drive.orders import OrderRefused, chart_in_force, interlock
+from tui.drive.schema import CommandOption, OrderId
+from tui.session.command import Commander
+from tui.session.drive_session import DriveSession
+from tui.session.reference import parse_reference
+from tui.widgets.monitor_view import Control
+
+from .panel import Panel
+
+SHOWN = 8.0
+SHOWN_REFUSED = 20.0
+"""Seconds for which it is shown what became of an order."""
+
+
+class OrderKeys(Screen[None]):
+    """The actions of the keys; everything else is the commander's."""
+
+    app: Panel
+    session: DriveSession
+
+    @property
+    def commander(self) -> Commander:
+        """What commands this drive."""
+        return self.app.commander(self.session)
+
+    def look(self) -> None:
+        """Show what there is now."""
+        raise NotImplementedError
+
+    def control(self, now: float) -> Control:
+        """Whether and how the drive is commanded from here, for the screen."""
+        commander, raws = self.commander, self.session.monitor.known.raws()
+        chart = chart_in_force(self.session.profile, raws)
+        outcome = commander.outcome
+        if outcome is not None:
+            shown = SHOWN_REFUSED if outcome.kind == "refused" else SHOWN
+            outcome = outcome if now - outcome.time < shown else None
+        return Control(
+            armed_for=commander.armed_for,
+            why_disarmed=commander.why_disarmed,
+            outcome=outcome,
+            no_effect=interlock(chart, "forward", raws) if chart else "",
+            lost=commander.lost_orders(),
+        )
+
+    def action_arm(self) -> None:
+        """Let orders to this drive through, or no longer."""
+        try:
+            if self.commander.armed_for is not None:
+                self.commander.disarm()
+            else:
+                self.commander.arm()
+        except OrderRefused as refused:
+            self.commander.refuse(str(refused))
+        self.look()
+
+    def action_order(self, id: OrderId) -> None:
+        """Give an order to the drive."""
+        self._give(lambda: self.commander.order(id))
+
+    def action_step_reference(self, steps: int) -> None:
+        """Raise or lower the reference by so many Hz."""
+        self._give(lambda: self.commander.step(Decimal(steps)))
+
+    def action_hand_back(self) -> None:
+        """Give the control back, after saying what may start then."""
+        from .confirm import Confirm
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                self._give(lambda: self.commander.order("hand-back"))
+
+        follows = (
+            "This is no stop. Command and reference go back to the terminals or the keypad:"
+            " a run order that waits there starts the motor."
+        )
+        keys = "y or Enter gives it back   Esc keeps it"
+        self.app.push_screen(Confirm("Give the control back?", follows, keys), told)
+
+    def action_stop_as(self, id: OrderId) -> None:
+        """Stop the drive in another way than on its ramp; needs no arming."""
+        self.app.stop_drive(self.session, id)
+        self.look()
+
+    def action_reference(self) -> None:
+        """Type a reference."""
+        from .ask import Ask
+
+        def given(text: str | None) -> None:
+            if text:
+                self._give(lambda: self.commander.refer(text))
+
+        profile, latest = self.session.profile, self.session.monitor.latest
+        about = "In Hz, or in rpm: 30, 30.5Hz, 900rpm. Up and Down change it by 1 Hz."
+
+        def wrong(text: str) -> str:
+            try:
+                parse_reference(profile, text, latest.readings if latest else {})
+            except ValueRefused as refused:
+                return str(refused)
+            return ""
+
+        if self.commander.armed_for is None:
+            self.commander.refuse("Not armed: a arms this drive.")
+            self.look()
+            return
+        self.app.push_screen(Ask("Reference", wrong, about=about), given)
+
+    def action_options(self) -> None:
+        """Choose a ramp, a preset speed, a motor, an output."""
+        from .options import OptionsScreen
+
+        raws = self.session.monitor.known.raws()
+        chart = chart_in_force(self.session.profile, raws)
+        if chart is None or not chart.options:
+            self.commander.refuse("This drive has no options of its commands.")
+            self.look()
+            return
+
+        def chosen(choice: tuple[CommandOption, int] | None) -> None:
+            if choice is not None:
+                self._give(lambda: self.commander.choose_option(*choice))
+
+        self.app.push_screen(OptionsScreen(chart.options, raws), chosen)
+
+    def _give(self, order: Callable[[], None]) -> None:
+        try:
+            order()
+        except OrderRefused as refused:
+            self.commander.refuse(str(refused))
+        self.look()

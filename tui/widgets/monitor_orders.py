@@ -1,0 +1,63 @@
+"""What the Monitor screen says of commands: armed or not, what became of an order, its keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.session.command import Kind, Outcome
+
+from .drawing import cut
+from .monitor_view import View
+from .palette import ALARM, ATTENTION, ATTENTION_BLOCK, FAINT, KEY, STOP_KEY, STRONG
+
+OUTCOME_STYLES = {Kind.WORKING: ATTENTION, Kind.DONE: STRONG, Kind.REFUSED: ALARM}
+
+
+def outcome_lines(outcome: Outcome, width: int) -> list[Text]:
+    """What became of the last order, on at most two lines."""
+    head = {Kind.WORKING: "ORDERED ", Kind.DONE: "DONE ", Kind.REFUSED: "NOT DONE "}[outcome.kind]
+    text = head + outcome.text
+    style = OUTCOME_STYLES[outcome.kind]
+    if len(text) <= width:
+        return [Text(text, style)]
+    at = text.rfind(" ", 0, width)
+    return [Text(text[:at], style), Text(cut(text[at + 1 :], width).rstrip(), style)]
+
+
+def mode_text(view: View) -> Text:
+    """Armed or not, in the first place of the status line."""
+    armed = view.control.armed_for
+    if armed is not None:
+        return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
+    return Text(" NOT ARMED  ", ALARM if view.lost else STRONG)
+
+
+def order_keys(view: View, keys: Sequence[tuple[str, str, str]]) -> Text:
+    """The line of keys: stop first; orders that cannot work now are dim."""
+    text = Text(no_wrap=True)
+    for index, (action, key, label) in enumerate(keys):
+        text.append("  " if index else " ")
+        style, words = _styles(view, action)
+        text.append(key, style)
+        text.append(f" {label}", words)
+    return text
+
+
+def _styles(view: View, action: str) -> tuple[Style, Style]:
+    if action.startswith("stop"):
+        return STOP_KEY, STOP_KEY
+    if not action.startswith(("order", "reference")):
+        return KEY, FAINT
+    return (ATTENTION, STRONG) if works_now(view, action) else (FAINT, FAINT)
+
+
+def works_now(view: View, action: str) -> bool:
+    """Whether an order can work now, as far as is known without asking the drive."""
+    if view.control.armed_for is None or view.lost or view.snapshot is None:
+        return False
+    if action == "order('reset')":
+        return view.snapshot.state.kind == "fault"
+    return not view.control.no_effect or action == "reference"
