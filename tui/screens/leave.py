@@ -32,6 +32,4 @@ class Leave(ModalScreen[Choice]):
         with Vertical(id="dialog"):
             yield Label("A motor runs by your order", id="question")
             yield Label(self._follows, id="follows")
-            yield Label(
-                "s or Enter stops it and leaves   l leaves it running   Esc stays", id="hint"
-            )
+            yield Label("s or Enter: stop and leave   l: leave it running   Esc: stay", id="hint")

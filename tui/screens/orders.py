@@ -101,7 +101,7 @@ class OrderKeys(Screen[None]):
                 self._give(lambda: self.commander.refer(text))
 
         profile, latest = self.session.profile, self.session.monitor.latest
-        about = "In Hz, or in rpm: 30, 30.5Hz, 900rpm. Up and Down change it by 1 Hz."
+        about = "In Hz or rpm: 30, 30.5Hz, 900rpm.\nUp and Down on Monitor change it by 1 Hz."
 
         def wrong(text: str) -> str:
             try:

@@ -161,6 +161,8 @@ class Commander:
             except asyncio.CancelledError:
                 self._say(Kind.REFUSED, "ended by a newer order or a stop")
                 raise
+            finally:
+                self.session.monitor.refresh()
 
         self.session.busy = self.session.line.spawn(guarded, f"order {self.session.device}")
 

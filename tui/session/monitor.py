@@ -103,6 +103,7 @@ class Monitor:
         """Codes read with the seldom ones beside those that were asked for at the start."""
         self._latest: Snapshot | None = None
         self._using = ""
+        self._all_due = True
         self._trend: deque[TrendPoint] = deque()
         self._listeners: tuple[Listener, ...] = ()
         self._worker: Worker | None = None
@@ -157,6 +158,10 @@ class Monitor:
             lambda: self._watch(rates), f"monitor {self.profile.id} {self.device}"
         )
 
+    def refresh(self) -> None:
+        """Read everything in the next cycle, the seldom values too; for any thread."""
+        self._all_due = True
+
     def stop(self) -> None:
         """Stop watching; an exchange in flight ends by itself."""
         if self._worker is not None:
@@ -166,7 +171,7 @@ class Monitor:
     async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
         begun: deque[float] = deque(maxlen=RATE_OVER)
-        seldom = True
+        self._all_due = True
         cycle = 0
         try:
             while True:
@@ -174,6 +179,7 @@ class Monitor:
                 cycle += 1
                 error = ""
                 period = self._period(rates)
+                seldom, self._all_due = self._all_due, False
                 try:
                     turn = rates.seldom if seldom else self._turn(rates, cycle)
                     readings.update(await self._cycle(rates, readings, turn))
@@ -183,11 +189,10 @@ class Monitor:
                     error = str(fault)
                     self.reader.forget()  # what answers next may be another drive
                     begun.clear()
-                    seldom = True
+                    self._all_due = True
                 else:
                     self.known.note(readings)
                     begun.append(started)
-                    seldom = False
                 self._publish(cycle, readings, rates, _span(begun, period), error)
                 rest = started + period - time.monotonic()
                 await asyncio.sleep(period if error else max(0.0, rest))

@@ -235,6 +235,7 @@ class Stopper:
             kind, hertz = await self._motion(session)
             if not hertz and (hertz is not None or kind not in ("running", "stopping")):
                 self._say(session, Phase.STOPPED, "stopped", ordered)
+                session.monitor.refresh()
                 return None
             slower = hertz is not None and fastest is not None and hertz < fastest
             if kind == "running" and not slower and now - sent > TAKES_EFFECT:
