@@ -72,7 +72,7 @@ def saying(*words: str) -> Callable[[str], tuple[object, ...]]:
 WORD = Key("w", word_sign)
 HELP = Key("?", saying("Keys on Monitor", "──╮", "──╯"))
 HELLO_TEXT = Key("w", saying(*TEXTS))
-HTOP_HELP = Key("?", saying("any key to return", "F10Quit"))
+HTOP_HELP = Key("?", saying("Released under the GNU", "F10Quit"))
 
 
 class Bench:
