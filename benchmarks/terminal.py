@@ -26,11 +26,11 @@ from benchmarks.wire import share
 CHUNK = 65536
 SLOW_CHUNK = 100
 """Bytes taken at once where the terminal is slow; small against a picture."""
-LONGEST = 3.0
+LONGEST = 8.0
 """Seconds after which a key counts as lost."""
 MOST_LOST = 10
 """Lost keys after which no more are pressed."""
-GAPS = (0.02, 0.09)
+GAPS = (0.01, 0.06)
 """Shortest and longest time in s from a picture to the next key."""
 TOKEN = re.compile(
     r"\x1b\[(?P<arguments>[0-9;:<=>?]*)[ -/]*(?P<final>[@-~])"
@@ -217,11 +217,12 @@ class Terminal:
         """Read until all these words are on the picture; when the last of them had come."""
         return self.wait(lambda text: all(word in text for word in words))
 
-    def run(self, seconds: float) -> None:
-        """Read for so long."""
+    def run(self, seconds: float, seen: Callable[[str], None] | None = None) -> None:
+        """Read for so long; whatever comes is shown to `seen`."""
         end = time.monotonic() + seconds
         while (left := end - time.monotonic()) > 0:
-            self.look(left)
+            if self.look(left) is not None and seen is not None:
+                seen(self.picture.text())
 
     def usage(self) -> Usage | None:
         """What the program has used so far; None where the system does not tell it."""
@@ -255,10 +256,12 @@ class Key:
         return all(b != a for a, b in zip(before, now, strict=True) if a != "")
 
 
-def steady(terminal: Terminal, seconds: float) -> Figures:
+def steady(
+    terminal: Terminal, seconds: float, seen: Callable[[str], None] | None = None
+) -> Figures:
     """Bytes, CPU and memory of a program that nobody touches."""
     before, written, start = terminal.usage(), terminal.written, time.monotonic()
-    terminal.run(seconds)
+    terminal.run(seconds, seen)
     after, took = terminal.usage(), time.monotonic() - start
     return {
         "seconds": took,
@@ -271,7 +274,7 @@ def steady(terminal: Terminal, seconds: float) -> Figures:
 def press_often(terminal: Terminal, key: Key, presses: int) -> Figures:
     """Times from a key to the whole picture that it brings, at irregular moments."""
     times: list[float] = []
-    count = 0
+    count, written = 0, terminal.written
     chance = random.Random(0)
     while count < presses and count - len(times) < MOST_LOST:
         count += 1
@@ -280,7 +283,8 @@ def press_often(terminal: Terminal, key: Key, presses: int) -> Figures:
         pressed = terminal.press(key.key)
         with suppress(NotShown):
             times.append(terminal.wait(partial(key.changed, before), LONGEST) - pressed)
-    return spread(times) | {"presses": count, "lost": count - len(times)}
+    size = (terminal.written - written) / max(count, 1)
+    return spread(times) | {"presses": count, "lost": count - len(times), "bytes_a_press": size}
 
 
 def spread(times: Sequence[float]) -> Figures:
