@@ -1,0 +1,205 @@
+"""Drives behind a line that does every wrong a line can do; a process of its own, seeded.
+
+Every register of every drive holds a value of its own, so that a value that is taken for
+another's is recognised at once. Started by `FaultyLine`, it serves a pseudo-terminal until its
+input ends; with a character time it paces its replies as a real line does.
+"""
+
+from __future__ import annotations
+
+import heapq
+import json
+import os
+import pty
+import random
+import select
+import subprocess
+import sys
+import time
+import tty
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from tui.bus.rtu import frame
+
+ROOT = Path(__file__).resolve().parents[1]
+DEVICES = (1, 2, 3, 4)
+
+
+def value_of(device: int, address: int) -> int:
+    """The word of a register: no two registers of a drive, and no two drives, share one there."""
+    return (address * 40503 + device * 9973) & 0xFFFF
+
+
+@dataclass(frozen=True, slots=True)
+class Faults:
+    """Shares of replies that are hit, by kind, and by how many seconds late ones come late."""
+
+    late: float = 0.04
+    lost: float = 0.02
+    duplicated: float = 0.03
+    truncated: float = 0.02
+    corrupted: float = 0.03
+    noise: float = 0.03
+    foreign: float = 0.02
+    other_function: float = 0.01
+    other_length: float = 0.01
+    late_from: float = 0.03
+    late_to: float = 0.12
+
+    def shares(self) -> Mapping[str, float]:
+        """The shares by kind."""
+        told = asdict(self)
+        return {kind: share for kind, share in told.items() if not kind.startswith("late_")}
+
+
+MIXED = Faults()
+LATE = Faults(0.15, 0, 0, 0, 0, 0, 0, 0, 0)
+
+
+@dataclass(slots=True)
+class Setting:
+    """How the line behaves; times in s."""
+
+    seed: int = 1
+    faults: Faults = MIXED
+    turnaround: float = 0.0005
+    character: float = 0.0
+    slow_once: float = 0.0
+    """Only the tenth reply is late, by so many seconds, and nothing else is wrong."""
+
+
+class FaultyLine:
+    """The line as its user sees it: a path to open, and counts of what was done to it."""
+
+    def __init__(self, setting: Setting) -> None:
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "benchmarks.faulty_line", json.dumps(asdict(setting))],
+            cwd=ROOT,
+            env=os.environ | {"PYTHONPATH": str(ROOT)},
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self._process.stdout is not None
+        self.path: str = json.loads(self._process.stdout.readline())["path"]
+
+    def close(self) -> dict[str, int]:
+        """End the line; returns how often each fault was made."""
+        told, _ = self._process.communicate(timeout=10)
+        counts: dict[str, int] = json.loads(told)
+        return counts
+
+
+@dataclass(slots=True)
+class _Server:
+    setting: Setting
+    fd: int
+    written: dict[tuple[int, int], int] = field(default_factory=dict)
+    waiting: list[tuple[float, int, bytes]] = field(default_factory=list)
+    counts: dict[str, int] = field(default_factory=dict)
+    requests: int = 0
+    pending: bytes = b""
+
+    def serve(self) -> None:
+        """Answer until the input of the process ends."""
+        while True:
+            pause = max(0.0, self.waiting[0][0] - time.monotonic()) if self.waiting else 0.2
+            ready, _, _ = select.select([self.fd, sys.stdin], [], [], pause)
+            if sys.stdin in ready:
+                return
+            if self.fd in ready:
+                self._take(os.read(self.fd, 4096))
+            while self.waiting and self.waiting[0][0] <= time.monotonic():
+                os.write(self.fd, heapq.heappop(self.waiting)[2])
+
+    def _take(self, data: bytes) -> None:
+        self.pending += data
+        while len(self.pending) >= 8:
+            length = 9 + self.pending[6] if self.pending[1] == 16 else 8
+            if len(self.pending) < length:
+                return
+            request, self.pending = self.pending[:length], self.pending[length:]
+            if request == frame(request[0], request[1:-2]) and request[0] in DEVICES:
+                self.requests += 1
+                self._answer(request)
+            else:
+                self.pending = b""
+
+    def _answer(self, request: bytes) -> None:
+        right = frame(request[0], self._pdu(request))
+        kind = self._kind()
+        self.counts[kind or "good"] = self.counts.get(kind or "good", 0) + 1
+        wait = self.setting.turnaround + self.setting.character * (len(request) + len(right))
+        chance = self._chance()
+        for after, data in _spoilt(kind, right, chance, self.setting):
+            heapq.heappush(self.waiting, (time.monotonic() + wait + after, self.requests, data))
+
+    def _pdu(self, request: bytes) -> bytes:
+        device, address = request[0], int.from_bytes(request[2:4], "big")
+        number = int.from_bytes(request[4:6], "big")
+        if request[1] == 6:
+            self.written[device, address] = number
+            return request[1:6]
+        if request[1] == 16:
+            for at in range(number):
+                word = int.from_bytes(request[7 + 2 * at : 9 + 2 * at], "big")
+                self.written[device, address + at] = word
+            return request[1:6]
+        places = range(address, address + number)
+        words = [self.written.get((device, at & 0xFFFF), value_of(device, at)) for at in places]
+        return bytes([3, 2 * number]) + b"".join(word.to_bytes(2, "big") for word in words)
+
+    def _chance(self) -> random.Random:
+        return random.Random(self.setting.seed * 1_000_003 + self.requests)
+
+    def _kind(self) -> str:
+        if self.setting.slow_once:
+            return "late" if self.requests == 10 else ""
+        drawn = random.Random(self.setting.seed * 7_919 + self.requests).random()
+        for kind, share in self.setting.faults.shares().items():
+            if drawn < share:
+                return kind
+            drawn -= share
+        return ""
+
+
+def _spoilt(
+    kind: str, right: bytes, chance: random.Random, setting: Setting
+) -> list[tuple[float, bytes]]:
+    """What is sent in place of the right reply: seconds to wait yet, and bytes."""
+    cut = chance.randrange(1, len(right))
+    late = setting.slow_once or chance.uniform(setting.faults.late_from, setting.faults.late_to)
+    other = DEVICES[(DEVICES.index(right[0]) + 1) % len(DEVICES)]
+    wrong = bytes([right[cut] ^ 1 << chance.randrange(8)])
+    body = right[1:-2]
+    made: dict[str, list[tuple[float, bytes]]] = {
+        "": [(0.0, right)],
+        "late": [(late, right)],
+        "lost": [],
+        "duplicated": [(0.0, right), (0.004, right)],
+        "truncated": [(0.0, right[:cut])],
+        "corrupted": [(0.0, right[:cut] + wrong + right[cut + 1 :])],
+        "noise": [(0.0, chance.randbytes(chance.randrange(1, 6)) + right)],
+        "foreign": [(0.0, frame(other, body))],
+        "other_function": [(0.0, frame(right[0], bytes([4]) + body[1:]))],
+        "other_length": [(0.0, frame(right[0], bytes([3, 2]) + chance.randbytes(2)))],
+    }
+    return made[kind]
+
+
+def main() -> None:
+    """Serve the line that the only argument describes."""
+    told = json.loads(sys.argv[1])
+    setting = Setting(**(told | {"faults": Faults(**told["faults"])}))
+    master, slave = pty.openpty()
+    tty.setraw(slave)
+    print(json.dumps({"path": os.ttyname(slave)}), flush=True)
+    server = _Server(setting, master)
+    server.serve()
+    print(json.dumps(server.counts), flush=True)
+
+
+if __name__ == "__main__":
+    main()
