@@ -184,9 +184,16 @@ def _spoilt(
         "noise": [(0.0, chance.randbytes(chance.randrange(1, 6)) + right)],
         "foreign": [(0.0, frame(other, body))],
         "other_function": [(0.0, frame(right[0], bytes([4]) + body[1:]))],
-        "other_length": [(0.0, frame(right[0], bytes([3, 2]) + chance.randbytes(2)))],
+        "other_length": [(0.0, frame(right[0], _longer(body)))],
     }
     return made[kind]
+
+
+def _longer(body: bytes) -> bytes:
+    """A well-formed answer of one word more than was asked for, or to a write of one more."""
+    if body[0] == 3:
+        return bytes([3, body[1] + 2]) + body[2:] + body[-2:]
+    return body[:-1] + bytes([body[-1] + 1])
 
 
 def main() -> None:
