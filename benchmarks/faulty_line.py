@@ -67,7 +67,8 @@ class Setting:
     turnaround: float = 0.0005
     character: float = 0.0
     slow_once: float = 0.0
-    """Only the tenth reply is late, by so many seconds, and nothing else is wrong."""
+    """The drive is slow at the tenth request, by so many seconds, and then answers all that it
+    was sent meanwhile, in order; nothing else is wrong."""
 
 
 class FaultyLine:
@@ -101,6 +102,7 @@ class _Server:
     counts: dict[str, int] = field(default_factory=dict)
     requests: int = 0
     pending: bytes = b""
+    busy_until: float = 0.0
 
     def serve(self) -> None:
         """Answer until the input of the process ends."""
@@ -132,9 +134,15 @@ class _Server:
         kind = self._kind()
         self.counts[kind or "good"] = self.counts.get(kind or "good", 0) + 1
         wait = self.setting.turnaround + self.setting.character * (len(request) + len(right))
+        if self.setting.slow_once:
+            wait = max(wait, self.busy_until - time.monotonic())
+            self.busy_until += self.setting.turnaround
         chance = self._chance()
         for after, data in _spoilt(kind, right, chance, self.setting):
-            heapq.heappush(self.waiting, (time.monotonic() + wait + after, self.requests, data))
+            due = time.monotonic() + wait + after
+            heapq.heappush(self.waiting, (due, self.requests, data))
+            if self.setting.slow_once:
+                self.busy_until = max(self.busy_until, due)
 
     def _pdu(self, request: bytes) -> bytes:
         device, address = request[0], int.from_bytes(request[2:4], "big")

@@ -32,9 +32,9 @@ from rich.table import Table
 
 from benchmarks.faulty_line import DEVICES, LATE, MIXED, ROOT, Faults, FaultyLine, Setting, value_of
 from benchmarks.wire import share
-from tui.bus.errors import LineError
+from tui.bus.errors import LineError, NoAnswer
 from tui.bus.limits import Limits
-from tui.bus.line import Line, Timing
+from tui.bus.line import Line, Reply, Timing
 from tui.bus.link import SerialLink
 
 TIME_OUT = 0.05
@@ -69,16 +69,16 @@ class Tally:
     seconds: float = 0.0
     time_out: float = TIME_OUT
     recoveries: list[float] = field(default_factory=list)
-    """From the start of the first of some failed exchanges to the end of the next good one."""
+    """From the end of a failed exchange to the end of the next good one on the line."""
     _failing_since: float | None = None
 
-    def note(self, begun: float, answer: Sequence[int] | None, right: Sequence[int]) -> None:
+    def note(self, answer: Sequence[int] | None, right: Sequence[int]) -> None:
         """Count one exchange; no answer is an error that was told."""
         self.exchanges += 1
         if answer is None:
             self.errors += 1
             if self._failing_since is None:
-                self._failing_since = begun
+                self._failing_since = time.monotonic()
             return
         if list(answer) != list(right):
             self.wrong += 1
@@ -126,7 +126,7 @@ def right(device: int, address: int, words: int) -> list[int]:
 
 
 async def ours(path: str, job: Job) -> Tally:
-    """Our line: several askers at once, some of whom give up, some of whom write."""
+    """Our line: an asker for each drive, some requests given up on their way, some writes."""
     link = SerialLink(path, 19200 if job.real else 115200, "8N1")
     line = Line(link, timing=Timing() if job.real else FAST)
     tally = Tally(job.contestant, time_out=line.timing.first_timeout)
@@ -136,7 +136,6 @@ async def ours(path: str, job: Job) -> Tally:
     chance = random.Random(job.seed)
 
     async def one(device: int, address: int, words: int) -> None:
-        begun = time.monotonic()
         answer = None
         if chance.random() < CANCELLED:
             with suppress(TimeoutError, LineError):
@@ -145,16 +144,16 @@ async def ours(path: str, job: Job) -> Tally:
             tally.cancelled += 1
             return
         with suppress(LineError):
-            answer = (await line.read(device, address, words)).words
-        tally.note(begun, answer, right(device, address, words))
+            answer = (await asked(line, device, address, words)).words
+        tally.note(answer, right(device, address, words))
 
     async def write(device: int, at: int) -> None:
-        begun, values = time.monotonic(), [chance.randrange(65536) for _ in range(2)]
+        values = [chance.randrange(65536) for _ in range(2)]
         answer = None
         with suppress(LineError):
             await line.write(device, SCRATCH + 2 * at, values)
             answer = (await line.read(device, SCRATCH + 2 * at, 2)).words
-        tally.note(begun, answer, values)
+        tally.note(answer, values)
 
     async def asker(reads: list[tuple[int, int, int]], number: int) -> None:
         for at, read in enumerate(reads):
@@ -165,11 +164,23 @@ async def ours(path: str, job: Job) -> Tally:
 
     reads = plan(job.seed, job.count)
     begun = time.monotonic()
-    askers = 1 if job.real else 2
-    await asyncio.gather(*(asker(reads[n::askers], n) for n in range(askers)))
+    # each drive has a monitor of its own
+    share = ([read for read in reads if read[0] == device] for device in DEVICES)
+    await asyncio.gather(*(asker(each, number) for number, each in enumerate(share)))
     tally.seconds = time.monotonic() - begun
     line.close()
     return tally
+
+
+async def asked(line: Line, device: int, address: int, words: int) -> Reply:
+    """A read that waits while the line leaves the device alone, as monitoring does."""
+    while True:
+        try:
+            return await line.read(device, address, words)
+        except NoAnswer as silence:
+            if silence.retry_in is None:
+                raise
+            await asyncio.sleep(silence.retry_in)
 
 
 async def pymodbus(path: str, job: Job, retries: int) -> Tally:
@@ -182,7 +193,6 @@ async def pymodbus(path: str, job: Job, retries: int) -> Tally:
     await client.connect()
     begun_all = time.monotonic()
     for at, (device, address, words) in enumerate(_reads(job)):
-        begun = time.monotonic()
         call = client.read_holding_registers(address, count=words, device_id=device)
         if job.faults == MIXED and not job.slow_once and at % 100 == 99:
             with suppress(TimeoutError, ModbusException):
@@ -196,7 +206,7 @@ async def pymodbus(path: str, job: Job, retries: int) -> Tally:
         except ModbusException:
             if not client.connected:
                 await client.connect()
-        tally.note(begun, answer, right(device, address, words))
+        tally.note(answer, right(device, address, words))
     tally.seconds = time.monotonic() - begun_all
     client.close()
     return tally
@@ -216,11 +226,10 @@ def minimalmodbus(path: str, job: Job, *, cleared: bool) -> Tally:
         instruments[device] = instrument
     begun_all = time.monotonic()
     for device, address, words in _reads(job):
-        begun = time.monotonic()
         answer: list[int] | None = None
         with suppress(OSError, ValueError):
             answer = list(instruments[device].read_registers(address, words))
-        tally.note(begun, answer, right(device, address, words))
+        tally.note(answer, right(device, address, words))
     tally.seconds = time.monotonic() - begun_all
     return tally
 

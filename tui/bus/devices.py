@@ -23,8 +23,8 @@ LATE_MARGIN = 2.0
 LONGEST_WAIT = 10.0
 PILED_UP = 0.5
 """How much longer a reply is awaited for each other request without an answer."""
-QUIET_LONGEST = 0.3
-"""Longest that the whole line keeps quiet for one late device."""
+QUIET_SHARE = 0.3
+"""Longest that the whole line keeps quiet for one late device, as a share of the time-out."""
 FORGET = 0.99
 """What is left of the worst lateness after each reply in time."""
 CALM = 200
@@ -191,7 +191,8 @@ class Devices:
         expires = max(sent + self._timing.late_reply, now + self._timing.first_timeout, now + wait)
         record.outstanding.append(Outstanding(expectation, sent, now, expires))
         if record.lateness:
-            self.quiet_until = now + min(LATE_MARGIN * record.lateness, QUIET_LONGEST)
+            quiet = QUIET_SHARE * self._timing.first_timeout
+            self.quiet_until = now + min(LATE_MARGIN * record.lateness, quiet)
 
     def stray(self, piece: Piece, now: float) -> bool:
         """A whole frame came that was not the awaited one; True if it is a known late reply."""
