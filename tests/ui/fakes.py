@@ -16,6 +16,7 @@ from tui.session.drive_session import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.identify import DriveIdentity
 from tui.session.keeper import Keeper, Watch
+from tui.session.known import Known
 from tui.session.lines import OpenLine
 from tui.session.monitor import Snapshot, TrendPoint
 from tui.session.readings import Quality, Reading
@@ -98,6 +99,11 @@ class FakeMonitor:
     trend: tuple[TrendPoint, ...] = ()
     period: float = 0.5
     running: bool = False
+    known: Known = field(default_factory=Known)
+
+    def __post_init__(self) -> None:
+        if self.latest is not None:
+            self.known.note(self.latest.readings)
 
     def start(self, *_: Any, **__: Any) -> None:
         """Nothing to start."""
@@ -123,6 +129,7 @@ class FakeLine:
         )
     )
     heard: float = NOW - 0.2
+    read_only: bool = False
     trace: tuple[Frame, ...] = (
         Frame(NOW - 0.6, "out", bytes.fromhex("02030c1e0004276c")),
         Frame(NOW - 0.59, "in", bytes.fromhex("02030800280258 01f4000052b0".replace(" ", ""))),
@@ -161,6 +168,10 @@ class FakeKeeper:
         """No drive is about to trip."""
         return []
 
+    def under_command(self) -> list[Any]:
+        """No motor runs by an order from here."""
+        return []
+
     def left_alone(self) -> dict[int, float]:
         """No drive trips."""
         return {}
@@ -190,6 +201,7 @@ def session_of(snapshot: Snapshot | None, line: LineState = CONNECTED) -> DriveS
     session = DriveSession.__new__(DriveSession)
     session.line = cast("Line", FakeLine(line))
     session.device, session.profile, session.identity = 2, profile, ATV71
+    session.busy, session.commanded = None, False
     trend = tuple(
         TrendPoint(NOW - 60 + i / 2, (min(50.0, max(0.0, i - 20) * 0.8), 2.0 + (i % 30) * 0.1))
         for i in range(120)
