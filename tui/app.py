@@ -303,9 +303,8 @@ class DrivePanelApp(Panel):
             if watch is not None:
                 reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
                 does = f"acts {watch.timeout:g} s after the last request: {reaction}"
-            lines.append(
-                f"Device {session.device}, {session.profile.name}: left alone it {does.rstrip('.')}."
-            )
+            who = f"Device {session.device}, {session.profile.name}"
+            lines.append(f"{who}: left alone it {does.rstrip('.')}.")
         return "\n".join(lines)
 
     def _leave_motors(self, choice: Choice | None) -> None:

@@ -300,7 +300,7 @@ def test_what_must_never_be_written(profile: Profile, code: str) -> None:
     assert profile[code].forbidden
 
 
-UNPRINTED = "FMSL FM Fr dEC FH LL vL Pt vb OLM Sr1 Sr2 Sr3 Sr4 Sr5 Sr6 Sr7 F111 F500 F856 FE70"
+UNPRINTED = "FMSL FM Fr dEC FH LL vL Pt vb OLM Sr1 Sr2 Sr3 Sr4 Sr5 Sr6 Sr7 F118 F500 F856 FE70"
 
 
 def test_unverified_settings_are_raw_and_read_only(profile: Profile) -> None:
@@ -311,6 +311,14 @@ def test_unverified_settings_are_raw_and_read_only(profile: Profile) -> None:
     assert [profile[f"Sr{n}"].address for n in range(1, 8)] == [
         0x18, 0x19, 0x20, 0x21, 0x22, 0x23, 0x24,
     ]  # fmt: skip
+
+
+def test_inputs_take_the_two_functions_of_the_manual_once_confirmed(profile: Profile) -> None:
+    for code in ("F111", "F112", "F113"):
+        parameter = profile[code]
+        assert not is_verified(parameter)
+        assert parameter.access == "rw-stopped"
+        assert set(profile.names(parameter)) == {38, 48}
 
 
 def test_link_and_addresses(profile: Profile) -> None:

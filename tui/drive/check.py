@@ -156,6 +156,7 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
         "faults": [data.faults.parameter, *data.faults.history],
         "link": [setting.parameter for setting in data.link.settings],
         "communication_fault": [watch.timeout, watch.reaction] if watch else [],
+        "control_sources": [s.parameter for c in data.control_sources for s in c.settings],
         "identification": [
             data.identification.model_parameter,
             data.identification.class_parameter,

@@ -649,6 +649,34 @@ class CommunicationFault(Table, frozen=True, kw_only=True):
     source: str = ""
 
 
+class Setting(Table, frozen=True, kw_only=True):
+    """A parameter and the raw value that it is to hold."""
+
+    parameter: str
+    value: RawWord
+
+
+class Way(Table, frozen=True, kw_only=True):
+    """Where the command or the reference comes from, and what chooses between two sources."""
+
+    sources: Annotated[list[str], Meta(min_length=1, max_length=2)]
+    """One source, or two: that without the switch and that with it."""
+    switch: str = ""
+
+
+class ControlSource(Table, frozen=True, kw_only=True):
+    """A configuration of who commands the drive and who gives its reference."""
+
+    id: Identifier
+    name: str
+    command: Way
+    reference: Way
+    settings: list[Setting]
+    """What makes it, in the order in which it is written."""
+    note: str = ""
+    source: str = ""
+
+
 class Pin(Table, frozen=True, kw_only=True):
     """One pin of a connector."""
 
@@ -692,6 +720,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     references: list[Reference] = []
     faults: Faults = Faults()
     monitoring: Monitoring
+    control_sources: list[ControlSource] = []
     communication_fault: CommunicationFault | None = None
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 from textual.binding import Binding, BindingType
 
-CONNECTION, MONITOR, FRAMES = "connection", "monitor", "frames"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES)
+CONNECTION, MONITOR, FRAMES, SOURCES = "connection", "monitor", "frames", "control source"
+EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES)
 
 
 @dataclass(frozen=True, slots=True)
@@ -20,7 +20,7 @@ class Action:
     id: str
     """Name of the method, with its arguments as Textual writes them."""
     keys: str
-    """Keys as Textual names them, separated by commas."""
+    """Keys as Textual names them, separated by commas; none where a widget takes the key."""
     shown: str
     """The key as a person reads it."""
     label: str
@@ -102,7 +102,7 @@ ACTIONS: tuple[Action, ...] = (
         (CONNECTION,),
         line=False,
     ),
-    Action("arm", "a", "a", "arm", "Arm this drive for orders, or end that.", (MONITOR,)),
+    Action("arm", "a", "a", "arm", "Arm this drive for orders, or end that.", (MONITOR, SOURCES)),
     Action("order('forward')", "r", "r", "run", "Run forward.", (MONITOR,)),
     Action("order('reverse')", "v", "v", "reverse", "Run reverse.", (MONITOR,)),
     Action("reference", "f", "f", "ref", "Type a reference in Hz or rpm.", (MONITOR,)),
@@ -200,6 +200,24 @@ ACTIONS: tuple[Action, ...] = (
         (MONITOR,),
         line=False,
     ),
+    Action(
+        "control_source",
+        "c",
+        "c",
+        "",
+        "See and set up who commands the drive.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action(
+        "write_chosen",
+        "",
+        "Enter",
+        "write",
+        "Write the chosen configuration, armed and with the motor at rest.",
+        (SOURCES,),
+    ),
+    Action("leave", "escape,c,2", "Esc", "back", "Go back to Monitor.", (SOURCES,)),
     Action("leave", "escape,1", "Esc", "", "Go back to Connection.", (MONITOR,), line=False),
     Action(
         "step_drive(-1)",
@@ -256,7 +274,9 @@ def bindings(screen: str | None) -> list[BindingType]:
             priority=action.first,
         )
         for action in ACTIONS
-        if action.app == (screen is None) and (screen is None or screen in action.screens)
+        if action.keys
+        and action.app == (screen is None)
+        and (screen is None or screen in action.screens)
     ]
 
 

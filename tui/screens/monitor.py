@@ -266,6 +266,19 @@ class MonitorScreen(OrderKeys):
         )
         self.app.push_screen(Ask("Rated current in A", fault_of_rating, about=about), told)
 
+    def action_control_source(self) -> None:
+        """Who commands the drive, and how that is changed."""
+        from .control_source import ControlSourceScreen
+
+        if not self.session.profile.data.control_sources:
+            self.commander.refuse(
+                "The control source of this drive is set at its keypad; t takes the control,"
+                " g gives it back, where it has a word for that."
+            )
+            self.look()
+            return
+        self.app.push_screen(ControlSourceScreen(self.session))
+
     def action_frames(self) -> None:
         """The frames on the line."""
         from .frames import FramesScreen

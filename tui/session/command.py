@@ -28,9 +28,10 @@ from tui.drive.orders import (
     walk,
     with_options,
 )
-from tui.drive.schema import Chart, CommandOption, Order, OrderId, State
+from tui.drive.schema import Chart, CommandOption, ControlSource, Order, OrderId, State
 from tui.drive.values import from_words
 
+from .control_source import configure
 from .drive_session import DriveSession
 from .journal import Journal
 from .readings import Reading
@@ -131,6 +132,17 @@ class Commander:
     def choose_option(self, option: CommandOption, bits: int) -> None:
         """Set an option. Raises OrderRefused when not armed."""
         self._begin(lambda: self._option(option, bits))
+
+    def configure(self, source: ControlSource) -> None:
+        """Set up who commands the drive. Raises OrderRefused when not armed."""
+
+        async def work() -> str:
+            done = await configure(self.session, self._writer, source)
+            # words of another channel say nothing any more
+            self._written = {}
+            return done
+
+        self._begin(work)
 
     def lost_orders(self) -> str:
         """What the drive no longer holds of what was written from here, or nothing."""

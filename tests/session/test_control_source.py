@@ -1,0 +1,48 @@
+"""Setting up the control source of simulated drives over a real line."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.session.command import Kind
+
+from .test_command import ALTIVARS, bench
+
+
+@pytest.mark.parametrize("family", ALTIVARS)
+async def test_every_configuration_is_written_and_read_back(family: str) -> None:
+    async with bench(family) as made:
+        profile = made.commander.session.profile
+        for source in profile.data.control_sources:
+            made.commander.configure(source)
+            assert source.name in await made.done()
+            for setting in source.settings:
+                assert made.drive.raw(setting.parameter) == setting.value, setting.parameter
+
+
+async def test_only_what_differs_is_written() -> None:
+    async with bench("atv71") as made:
+        source = made.commander.session.profile.data.control_sources[1]
+        made.commander.configure(source)
+        assert "FR2, RFC" in await made.done()
+        made.commander.configure(source)
+        assert "nothing was to be changed" in await made.done()
+
+
+async def test_never_while_the_motor_turns() -> None:
+    async with bench("atv71") as made:
+        made.commander.refer("20Hz")
+        await made.done()
+        await made.order("forward")
+        before = made.writes()
+        made.commander.configure(made.commander.session.profile.data.control_sources[3])
+        assert "motor stopped only" in await made.done(Kind.REFUSED)
+        assert made.writes() == before
+
+
+async def test_a_word_that_cannot_be_read_changes_nothing() -> None:
+    async with bench("atv71", protects=frozenset({"RFC"})) as made:
+        before = made.writes()
+        made.commander.configure(made.commander.session.profile.data.control_sources[1])
+        assert "RFC cannot be read" in await made.done(Kind.REFUSED)
+        assert made.writes() == before

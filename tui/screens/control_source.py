@@ -1,0 +1,161 @@
+"""Control source: who commands the drive today, what another configuration would change."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.widgets import OptionList
+from textual.widgets.option_list import Option
+
+from tui.bus.errors import LineError
+from tui.drive.control_source import changes, source_codes, source_in_force
+from tui.drive.schema import ControlSource
+from tui.session.drive_session import DriveSession
+from tui.widgets.control_source import change_lines, diagram, note_lines
+from tui.widgets.drawing import key_line, rule
+from tui.widgets.lines import Lines
+from tui.widgets.monitor_orders import outcome_lines
+from tui.widgets.palette import ALARM, ATTENTION_BLOCK, FAINT, PLAIN, STRONG
+
+from .actions import SOURCES, bindings, keys_of
+from .orders import OrderKeys
+
+LOOK = 0.5
+
+
+class ControlSourceScreen(OrderKeys):
+    """The configurations of a family; Enter writes the chosen one, armed and at rest only."""
+
+    CSS_PATH = "control_source.tcss"
+    BINDINGS: ClassVar = bindings(SOURCES)
+    TITLE = "Control source"
+
+    def __init__(self, session: DriveSession) -> None:
+        super().__init__()
+        self.session = session
+        self._sources = session.profile.data.control_sources
+        self._raws: dict[str, int] = {}
+        self._trouble = "reading today's configuration"
+        self._seen: object = None
+
+    def compose(self) -> ComposeResult:
+        """The list above, what belongs to the chosen one below."""
+        yield Lines(id="title")
+        yield OptionList(id="sources", compact=True)
+        yield Lines(id="detail")
+        yield Lines(id="message")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Show the list, and read what the drive holds."""
+        self.query_one("#keys", Lines).show([key_line(keys_of(SOURCES))])
+        self._list()
+        self.query_one(OptionList).focus()
+        self.run_worker(self._read(), exclusive=True, group="sources")
+        self.set_interval(LOOK, self.look)
+
+    async def _read(self) -> None:
+        try:
+            readings = await self.session.read(source_codes(self.session.profile))
+        except LineError as error:
+            self._trouble = str(error)
+        else:
+            self._raws = {c: r.raw for c, r in readings.items() if r.raw is not None}
+            bad = [r for r in readings.values() if r.raw is None]
+            self._trouble = f"{bad[0].parameter.code}: {bad[0].error}" if bad else ""
+        self._list()
+        self.look()
+
+    def _list(self) -> None:
+        """The configurations, with a mark at today's."""
+        today = source_in_force(self.session.profile, self._raws)
+        options = self.query_one(OptionList)
+        at = options.highlighted
+        if at is None:
+            at = self._sources.index(today) if today else 0
+        options.clear_options()
+        for source in self._sources:
+            text = Text(no_wrap=True)
+            text.append(" ● " if source is today else " · ", STRONG if source is today else FAINT)
+            text.append(source.name, STRONG if source is today else PLAIN)
+            text.append("   today" if source is today else "", FAINT)
+            options.add_option(Option(text))
+        options.highlighted = at
+
+    @property
+    def _chosen(self) -> ControlSource:
+        return self._sources[self.query_one(OptionList).highlighted or 0]
+
+    def on_option_list_option_highlighted(self) -> None:
+        """Another one is looked at."""
+        self.look()
+
+    def look(self) -> None:
+        """Show the chosen configuration, and what became of the last order."""
+        if not self.is_current:
+            return
+        width = self.size.width
+        found = changes(self.session.profile, self._chosen, self._raws)
+        lines = [rule("So it works", width), *diagram(self._chosen)]
+        lines.append(rule("It would write", width))
+        if self._raws:
+            lines += change_lines(self.session.profile, found, width)
+        lines += [Text(""), *note_lines(self._chosen, found, width)]
+        self.query_one("#detail", Lines).show(lines)
+        self._head(width)
+        outcome = self.commander.outcome
+        if outcome is not None and outcome is not self._seen and outcome.kind != "working":
+            self._seen = outcome
+            self.run_worker(self._read(), exclusive=True, group="sources")
+
+    def _head(self, width: int) -> None:
+        title = rule(f"Control source · {self.session.profile.name}", width - 12)
+        armed = self.commander.armed_for
+        if armed is not None:
+            title.append(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
+        else:
+            title.append(" NOT ARMED", STRONG)
+        self.query_one("#title", Lines).show([title])
+        control = self.control(self.app.clock.monotonic())
+        if control.outcome is not None:
+            message = [Text(" ") + line for line in outcome_lines(control.outcome, width - 2)]
+        elif self._trouble:
+            message = [Text(f" {self._trouble}", ALARM)]
+        elif source_in_force(self.session.profile, self._raws) is None:
+            message = [Text(" Today's setting is none of these.", FAINT)]
+        else:
+            message = [Text("")]
+        self.query_one("#message", Lines).show(message)
+
+    def on_option_list_option_selected(self) -> None:
+        """Enter in the list."""
+        self.action_write_chosen()
+
+    def action_write_chosen(self) -> None:
+        """Say what follows, and write it."""
+        from .confirm import Confirm
+
+        found = changes(self.session.profile, self._chosen, self._raws)
+        if self.commander.armed_for is None:
+            self.commander.refuse("Not armed: a arms this drive.")
+        elif found and self._raws:
+            codes = ", ".join(change.parameter.code for change in found)
+            follows = (
+                f"Writes {codes}, each read back. A run order that waits at the new source"
+                " starts the motor."
+            )
+            source = self._chosen
+
+            def told(sure: bool | None) -> None:
+                if sure:
+                    self._give(lambda: self.commander.configure(source))
+
+            keys = "y or Enter writes   Esc leaves all as it is"
+            self.app.push_screen(Confirm(f"{source.name}?", follows, keys), told)
+        self.look()
+
+    def action_leave(self) -> None:
+        """Back to Monitor."""
+        self.app.pop_screen()
