@@ -21,6 +21,7 @@ from tui.bus.errors import LineClosed
 from tui.drive.schema import OrderId
 from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
+from tui.session.fault_record import Recorder
 from tui.session.journal import Journal
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
@@ -96,6 +97,7 @@ class DrivePanelApp(Panel):
         self._hungry: set[int] = set()
         self._told: StopSummary | None = None
         self._commanders: dict[int, Commander] = {}
+        self._recorders: dict[int, Recorder] = {}
 
     def get_driver_class(self) -> type[Driver]:
         """The driver of this platform, with the stop keys before everything else."""
@@ -143,6 +145,14 @@ class DrivePanelApp(Panel):
         known = self._commanders.get(session.device)
         if known is None or known.session is not session:
             known = self._commanders[session.device] = Commander(session, self.journal)
+        return known
+
+    def recorder(self, session: DriveSession) -> Recorder:
+        """What keeps the seconds before a trip of a drive of the open line."""
+        known = self._recorders.get(session.device)
+        if known is None or known.session is not session:
+            known = self._recorders[session.device] = Recorder(session, self.journal)
+            session.monitor.listen(known.take)
         return known
 
     def stop_drive(self, session: DriveSession, order: OrderId) -> None:
@@ -241,7 +251,7 @@ class DrivePanelApp(Panel):
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
-        self._commanders = {}
+        self._commanders, self._recorders = {}, {}
         self.keeper = Keeper(self.opened.line)
         self.stopper = Stopper(self.opened.line, self.journal)
         log.info("opened %s", self.opened.label)

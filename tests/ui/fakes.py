@@ -111,6 +111,9 @@ class FakeMonitor:
     def stop(self) -> None:
         """Nothing to stop."""
 
+    def listen(self, _: Any) -> None:
+        """Nothing will come."""
+
 
 @dataclass
 class FakeLine:

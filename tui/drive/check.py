@@ -153,7 +153,11 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
             *(end for end in ends if not end.lstrip("-").replace(".", "").isdecimal()),
             *((speed.frequency, speed.poles, speed.result) if speed else ()),
         ],
-        "faults": [data.faults.parameter, *data.faults.history],
+        "faults": [
+            data.faults.parameter,
+            *data.faults.history,
+            *(code for stored in data.faults.stored for code in stored),
+        ],
         "link": [setting.parameter for setting in data.link.settings],
         "communication_fault": [watch.timeout, watch.reaction] if watch else [],
         "control_sources": [s.parameter for c in data.control_sources for s in c.settings],

@@ -584,6 +584,8 @@ class Faults(Table, frozen=True, kw_only=True):
     shows_last: bool = False
     """True where it keeps the last fault after the fault is gone."""
     history: list[str] = []
+    stored: list[list[str]] = []
+    """What the drive keeps of the moment of each fault of its history, in the same order."""
     codes: list[FaultCode] = []
     none: int = 0
     note: str = ""

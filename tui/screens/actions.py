@@ -9,8 +9,9 @@ from dataclasses import dataclass
 
 from textual.binding import Binding, BindingType
 
-CONNECTION, MONITOR, FRAMES, SOURCES = "connection", "monitor", "frames", "control source"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES)
+CONNECTION, MONITOR, FRAMES = "connection", "monitor", "frames"
+SOURCES, FAULTS = "control source", "faults"
+EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,6 +218,19 @@ ACTIONS: tuple[Action, ...] = (
         "Write the chosen configuration, armed and with the motor at rest.",
         (SOURCES,),
     ),
+    Action(
+        "faults",
+        "h",
+        "h",
+        "",
+        "Faults: the last trip, the drive's history and what it stored.",
+        (MONITOR,),
+        line=False,
+    ),
+    Action("save", "s", "s", "save", "Save the record of the trip to a file.", (FAULTS,)),
+    Action("move_record(1)", "left_square_bracket", "[", "older", "Older values.", (FAULTS,)),
+    Action("move_record(-1)", "right_square_bracket", "]", "newer", "Newer values.", (FAULTS,)),
+    Action("leave", "escape,h,2", "Esc", "back", "Go back to Monitor.", (FAULTS,)),
     Action("leave", "escape,c,2", "Esc", "back", "Go back to Monitor.", (SOURCES,)),
     Action("leave", "escape,1", "Esc", "", "Go back to Connection.", (MONITOR,), line=False),
     Action(

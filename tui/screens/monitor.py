@@ -84,6 +84,7 @@ class MonitorScreen(OrderKeys):
 
     def on_mount(self) -> None:
         """Start watching."""
+        self.app.recorder(self.session)
         self.session.monitor.start(period=self.app.period, extra=self._extras())
         self._timer = self.set_interval(
             LOW_BANDWIDTH_REFRESH if self.app.low_bandwidth else REFRESH, self.look
@@ -145,6 +146,7 @@ class MonitorScreen(OrderKeys):
             control=self.control(now),
             stop=self._stop(now),
             was=self._was,
+            unseen=not self.app.recorder(self.session).seen,
         )
 
     def _stop(self, now: float) -> StopReport | None:
@@ -265,6 +267,12 @@ class MonitorScreen(OrderKeys):
             current.base or "not confirmed by a manual"
         )
         self.app.push_screen(Ask("Rated current in A", fault_of_rating, about=about), told)
+
+    def action_faults(self) -> None:
+        """The last trip and the drive's history."""
+        from .faults import FaultsScreen
+
+        self.app.push_screen(FaultsScreen(self.session))
 
     def action_control_source(self) -> None:
         """Who commands the drive, and how that is changed."""

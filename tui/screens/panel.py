@@ -9,6 +9,7 @@ from textual.app import App
 from tui.drive.schema import OrderId
 from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
+from tui.session.fault_record import Recorder
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine
 from tui.session.stop import Stopper
@@ -31,6 +32,10 @@ class Panel(App[None]):
     @abstractmethod
     def commander(self, session: DriveSession) -> Commander:
         """What commands a drive of the open line."""
+
+    @abstractmethod
+    def recorder(self, session: DriveSession) -> Recorder:
+        """What keeps the seconds before a trip of a drive of the open line."""
 
     @abstractmethod
     def stop_drive(self, session: DriveSession, order: OrderId) -> None:

@@ -35,6 +35,8 @@ STATE_STYLES: dict[str, Style] = {
     "unknown": ALARM,
     "stopping": PLAIN,
 }
+FLASH = 0.5
+"""Seconds for which a trip that nobody has seen is bright, and then dark."""
 HELD = 0.9
 """Share of the wished rate from which on it counts as held."""
 STATE_SIGNS = {"running": "▶", "fault": "■", "unknown": "?"}
@@ -67,6 +69,8 @@ def state_lines(view: View, width: int) -> list[Text]:
         lines.append(Text(cut(f"   was: {view.was or state.headline}", width), FAINT))
     else:
         style = STATE_STYLES.get(state.kind, STRONG)
+        if view.unseen and state.kind == "fault" and int(view.now / FLASH) % 2:
+            style = FAULT
         sign = STATE_SIGNS.get(state.kind, "□")
         lines.append(Text(cut(f" {sign} {_headline(state)} ", width), style))
         lines.append(Text(cut(f"   {_detail(state)}", width), PLAIN))
@@ -116,12 +120,14 @@ def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
 
 
 def message_lines(view: View, width: int) -> list[Text]:
-    """Two lines: what is wrong, or that nothing is; what a stop has come to before all."""
-    lines = _messages(view, width - 2)
-    if view.control.outcome is not None:
-        lines = [*outcome_lines(view.control.outcome, width - 2), lines[0]][:2]
-    if view.stop is not None:
-        lines = [_stop_line(view.stop, width - 2), lines[0]]
+    """Two lines: a fault before all, then what a stop or an order has come to, then the rest."""
+    lines, stop, outcome = _messages(view, width - 2), view.stop, view.control.outcome
+    fault = view.snapshot is not None and view.snapshot.state.kind == "fault" and not view.lost
+    said = [_stop_line(stop, width - 2)] if stop is not None else []
+    if outcome is not None and (stop is None or outcome.time > stop.time):
+        said = [*outcome_lines(outcome, width - 2), *said]
+    first = [lines[0]] if fault and (stop is None or stop.phase is not Phase.FAILED) else []
+    lines = [*first, *said, *lines[len(first) :]][:2]
     return [Text(" ") + line if line.plain else line for line in lines]
 
 
@@ -155,8 +161,9 @@ def _messages(view: View, width: int) -> list[Text]:
         fault = state.fault
         cause = fault.cause or "The profile gives no cause; see the drive's manual."
         remedy = f" Do: {fault.remedy}" if fault.remedy else ""
+        more = "   h: what happened before" if view.unseen else ""
         return [
-            Text(cut(f"FAULT {fault.code} ({fault.raw}) {fault.name}", width), FAULT),
+            Text(cut(f"FAULT {fault.code} ({fault.raw}) {fault.name}{more}", width), FAULT),
             Text(cut(cause + remedy, width), PLAIN),
         ]
     if _is_hungry(view):

@@ -58,6 +58,8 @@ class View:
     """What became of a stop that was ordered lately."""
     was: str = ""
     """What the drive did when it was last known."""
+    unseen: bool = False
+    """Whether the drive has tripped and nobody has said that he saw it."""
 
     def reading(self, code: str) -> Reading | None:
         """A reading as good as it is now, not as it was when it came."""

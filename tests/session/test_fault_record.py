@@ -1,0 +1,72 @@
+"""The seconds before a trip of a simulated drive, frozen when it trips."""
+
+from __future__ import annotations
+
+from tui.session.fault_record import Recorder, record_name, record_text
+
+from .test_command import Bench, bench
+
+
+def watched(made: Bench) -> Recorder:
+    session = made.commander.session
+    recorder = Recorder(session, made.commander._writer.journal)
+    session.monitor.listen(recorder.take)
+    return recorder
+
+
+async def test_a_trip_freezes_values_and_writes_of_the_seconds_before() -> None:
+    async with bench("atv71") as made:
+        recorder = watched(made)
+        made.commander.refer("20Hz")
+        await made.done()
+        await made.order("forward")
+        await made.until(lambda: made.drive.motor.frequency > 5)
+        assert recorder.latest is None
+        made.drive.provoke("ObF")
+        await made.until(lambda: recorder.latest is not None)
+        record = recorder.latest
+        assert record is not None
+        assert record.fault is not None
+        assert record.fault.code == "ObF"
+        assert not recorder.seen
+        at = record.codes.index("RFR")
+        speeds = [float(m.texts[at]) for m in record.moments if m.state == "running forward"]
+        assert speeds[0] < speeds[-1]
+        assert speeds[-1] > 4
+        commands = [e.new for e in record.writes if e.code == "CMD"]
+        assert commands == ["16#0006", "16#000F"]
+        assert record.moments[-1].state == "fault ObF"
+        await made.until(lambda: made.drive.fault is not None)
+        # what comes after belongs to the next trip
+        assert recorder.latest is record
+        recorder.acknowledge()
+        assert recorder.seen
+
+
+async def test_a_drive_found_in_fault_has_not_tripped_now() -> None:
+    async with bench("atv71", armed=False) as made:
+        made.drive.provoke("ObF")
+        session = made.commander.session
+        await made.until(lambda: session.monitor.latest.state.kind == "fault")  # type: ignore[union-attr]
+        recorder = watched(made)
+        first = session.monitor.latest
+        await made.until(lambda: session.monitor.latest is not first)
+        assert recorder.latest is None
+        assert recorder.seen
+
+
+async def test_the_record_as_a_text() -> None:
+    async with bench("atv21") as made:
+        recorder = watched(made)
+        await made.order("forward")
+        await made.until(lambda: recorder._kind == "running")
+        made.drive.provoke(17)
+        await made.until(lambda: recorder.latest is not None)
+        assert recorder.latest is not None
+        session = made.commander.session
+        text = record_text(session, recorder.latest, [("FE00", "Output frequency", "12.34 Hz")])
+        for part in ("E (17) Emergency stop", "| FE00 | Output frequency | 12.34 Hz |", "Run forw"):
+            assert part in text
+        rows = text.partition("## Values")[2].partition("## Written")[0].splitlines()
+        assert len({row.count("|") for row in rows if row.startswith("|")}) == 1
+        assert record_name(session, recorder.latest).endswith("-E.md")

@@ -1,0 +1,187 @@
+"""Faults: what tripped the drive, its history with what it stored, the seconds before."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Horizontal
+from textual.screen import Screen
+from textual.widgets import OptionList
+from textual.widgets.option_list import Option
+
+from tui.bus.errors import LineError
+from tui.session.drive_session import DriveSession
+from tui.session.fault_record import FaultRecord, Recorder, record_name, record_text
+from tui.session.readings import Reading
+from tui.session.state import state_folder
+from tui.widgets.drawing import key_line, rule
+from tui.widgets.fault_view import fault_lines, history_line, record_lines, stored_lines
+from tui.widgets.lines import Lines
+from tui.widgets.palette import ALARM, STRONG
+
+from .actions import FAULTS, bindings, keys_of
+from .panel import Panel
+
+LOOK = 0.5
+LEFT = 36
+STEP = 5
+"""Rows of the record that a key moves by."""
+
+
+class FaultsScreen(Screen[None]):
+    """Reads the history when it opens, and again after a trip."""
+
+    CSS_PATH = "faults.tcss"
+    BINDINGS: ClassVar = bindings(FAULTS)
+    TITLE = "Faults"
+
+    app: Panel
+
+    def __init__(self, session: DriveSession) -> None:
+        super().__init__()
+        self.session = session
+        self._readings: dict[str, Reading] = {}
+        self._shown: FaultRecord | None = None
+        self._message = Text(" reading the history", STRONG)
+        self._offset = 0
+
+    @property
+    def _recorder(self) -> Recorder:
+        return self.app.recorder(self.session)
+
+    def compose(self) -> ComposeResult:
+        """The fault, the history beside what was stored, the record."""
+        yield Lines(id="title")
+        yield Lines(id="fault")
+        with Horizontal(id="middle"):
+            yield OptionList(id="history", compact=True)
+            yield Lines(id="stored")
+        yield Lines(id="record")
+        yield Lines(id="message")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Read the history; who opens this screen has seen the trip."""
+        self._recorder.acknowledge()
+        self._shown = self._recorder.latest
+        self.query_one("#keys", Lines).show([key_line(keys_of(FAULTS))])
+        self._list()
+        self.query_one(OptionList).focus()
+        self._read_again()
+        self.set_interval(LOOK, self.look)
+
+    def _read_again(self) -> None:
+        self.run_worker(self._read(), exclusive=True, group="faults")
+
+    async def _read(self) -> None:
+        faults = self.session.profile.data.faults
+        codes = [*faults.history, *(code for stored in faults.stored for code in stored)]
+        try:
+            self._readings = await self.session.read(list(dict.fromkeys(codes)))
+        except LineError as error:
+            self._message = Text(f" {error}", ALARM)
+        else:
+            self._message = Text("")
+        self._list()
+        self.look()
+
+    def _list(self) -> None:
+        options = self.query_one(OptionList)
+        at = options.highlighted or 0
+        profile = self.session.profile
+        options.clear_options()
+        for number, code in enumerate(profile.data.faults.history, start=1):
+            options.add_option(
+                Option(history_line(profile, number, code, self._readings, LEFT - 2))
+            )
+        if profile.data.faults.history:
+            options.highlighted = at
+        else:
+            options.add_option(Option(Text(" not known on this drive"), disabled=True))
+
+    def on_option_list_option_highlighted(self) -> None:
+        """Another fault of the history is looked at."""
+        self.look()
+
+    def look(self) -> None:
+        """Show what there is; a new trip counts as seen."""
+        if not self.is_current:
+            return
+        record = self._recorder.latest
+        if record is not self._shown:
+            self._shown, self._offset = record, 0
+            self._recorder.acknowledge()
+            self._read_again()
+        width, height = self.size
+        latest = self.session.monitor.latest
+        present = latest is not None and latest.state.kind == "fault"
+        fault = latest.state.fault if latest and present else record.fault if record else None
+        who = f"Faults · {self.session.profile.name} · device {self.session.device}"
+        self.query_one("#title", Lines).show([rule(who, width, self.app.clock.time_of_day())])
+        self.query_one("#fault", Lines).show(fault_lines(fault, present, width))
+        self.query_one("#stored", Lines).show(
+            stored_lines(self.session.profile, self._stored(), self._readings, width - LEFT)
+        )
+        room = height - 1 - 4 - self.query_one("#middle").size.height - 2
+        self.query_one("#record", Lines).show(record_lines(record, width, room, self._offset))
+        self.query_one("#message", Lines).show([self._message])
+
+    def _stored(self) -> list[str]:
+        """Codes that the drive keeps of the chosen fault."""
+        stored = self.session.profile.data.faults.stored
+        at = self.query_one(OptionList).highlighted or 0
+        return stored[at] if at < len(stored) else []
+
+    def action_move_record(self, rows: int) -> None:
+        """Older or newer values of the record."""
+        most = len(self._shown.moments) + len(self._shown.writes) - 1 if self._shown else 0
+        self._offset = max(0, min(most, self._offset + rows * STEP))
+        self.look()
+
+    def action_save(self) -> None:
+        """Write the record to a file whose name the person may change."""
+        from .ask import Ask
+
+        record = self._recorder.latest
+        if record is None:
+            self._message = Text(" Nothing to save: no trip was seen.", ALARM)
+            self.look()
+            return
+        proposed = str(state_folder() / record_name(self.session, record))
+
+        def told(name: str | None) -> None:
+            if name:
+                self._write(Path(name).expanduser(), record)
+
+        about = "Markdown, with the values, what the drive stored, and what was written."
+        self.app.push_screen(Ask("Save the trip as", _taken, text=proposed, about=about), told)
+
+    def _write(self, path: Path, record: FaultRecord) -> None:
+        stored = self.session.profile.data.faults.stored
+        rows = [
+            (code, reading.parameter.name, f"{reading.text} {reading.unit}".rstrip())
+            for code in (stored[0] if stored else [])
+            if (reading := self._readings.get(code)) is not None
+        ]
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_text(record_text(self.session, record, rows), encoding="utf-8")
+        except OSError as error:
+            self._message = Text(f" Not saved: {error.strerror or error}: {path}", ALARM)
+        else:
+            self._message = Text(f" Saved: {path}", STRONG)
+        self.look()
+
+    def action_leave(self) -> None:
+        """Back to Monitor."""
+        self.app.pop_screen()
+
+
+def _taken(name: str) -> str:
+    """What is wrong with a file name."""
+    if not name.strip():
+        return "A name is needed."
+    return f"{name} is there already." if Path(name).expanduser().exists() else ""
