@@ -43,7 +43,8 @@ from tui.simulator import LineTiming
 KEY = b"\x1b[24~"
 """F12 as terminals send it."""
 WATCHED = 1
-READY = b"MONITORING"
+READY = b"Command"
+"""What Monitor says of a drive once its first values are there."""
 PATIENCE = 60.0
 SETTLING = 4.0
 STUCK_AFTER = 3.0
