@@ -18,7 +18,12 @@ COMMANDS = {
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "read": ("read", "Read parameters of a drive."),
+    "reference": ("orders", "Give a drive its reference."),
+    "reset": ("orders", "Reset a drive's fault."),
+    "run": ("run", "Run a motor until this command is ended."),
     "simulate": ("simulate", "Serve simulated drives."),
+    "status": ("status", "Tell what a drive does and who commands it."),
+    "stop": ("stop", "Stop a drive, or every drive of a line."),
     "watch": ("watch", "Watch parameters of a drive."),
 }
 

@@ -1,0 +1,242 @@
+"""`drivepanel status`: what a drive does, who commands it, and what it would do left alone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .errors import told
+from .options import (
+    Target,
+    connect,
+    drive_options,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+)
+
+if TYPE_CHECKING:
+    from tui.drive.profile import Profile
+    from tui.drive.schema import Quantity
+    from tui.session.drive_session import DriveSession
+    from tui.session.drive_state import DriveState
+    from tui.session.keeper import Watch
+    from tui.session.lines import OpenLine
+    from tui.session.readings import Reading
+
+SHOWN: dict[Quantity, str] = {
+    "output_frequency": "Output frequency",
+    "frequency_reference": "Reference",
+    "motor_current": "Current",
+}
+"""What tells how a motor turns, and how it is called here."""
+CHANNELS: dict[Quantity, str] = {
+    "command_channel": "Commanded by",
+    "reference_channel": "Reference from",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """All that `status` tells of one drive."""
+
+    session: DriveSession
+    state: DriveState
+    readings: Mapping[str, Reading]
+    channels: Mapping[str, str]
+    refused: str
+    """Why a run order from here would have no effect; empty where it would have one."""
+    watch: Watch | None
+
+
+def shown_codes(profile: Profile) -> list[str]:
+    """Codes of what is SHOWN, as far as the profile has them."""
+    found = (profile.quantity(quantity) for quantity in SHOWN)
+    return [parameter.code for parameter in found if parameter is not None]
+
+
+def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, str]:
+    """What is SHOWN by its name, with units; `-----` where it was not read just now."""
+    values = {}
+    for quantity, name in SHOWN.items():
+        parameter = profile.quantity(quantity)
+        if parameter is not None:
+            values[name] = _text(readings.get(parameter.code))
+    return values
+
+
+def _text(reading: Reading | None) -> str:
+    if reading is None or reading.raw is None or reading.quality != "good":
+        return "-----"
+    return f"{reading.text} {reading.unit}".strip()
+
+
+def fault_text(state: DriveState) -> str:
+    """The fault that a drive is in, with its name; empty where it is in none."""
+    return f"{state.fault.code}, {state.fault.name}" if state.fault else ""
+
+
+async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
+    """Read all that `status` tells. Raises the line's errors."""
+    from tui.session.drive_state import drive_state
+    from tui.session.keeper import Keeper
+
+    from .orders import watch_of
+
+    profile = session.profile
+    readings = await session.read(_codes(profile))
+    session.monitor.known.note(readings)
+    keeper = Keeper(opened.line)
+    keeper.keep(session)
+    try:
+        watch = await watch_of(session, keeper)
+    finally:
+        keeper.stop()
+    state = drive_state(profile, readings)
+    channels = _channels(profile, readings, state)
+    return Status(session, state, readings, channels, _refused(session), watch)
+
+
+def _codes(profile: Profile) -> list[str]:
+    from tui.drive.chart import watched_codes
+    from tui.drive.orders import deciding_codes, interlock_codes
+
+    channels = [profile.quantity(quantity) for quantity in CHANNELS]
+    codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
+    codes += [parameter.code for parameter in channels if parameter is not None]
+    codes += deciding_codes(profile)
+    for chart in profile.data.charts:
+        codes += interlock_codes(chart)
+    return list(dict.fromkeys(code for code in codes if code))
+
+
+def _channels(
+    profile: Profile, readings: Mapping[str, Reading], state: DriveState
+) -> dict[str, str]:
+    from tui.session.drive_state import channel_text
+
+    found = {}
+    for quantity, name in CHANNELS.items():
+        parameter = profile.quantity(quantity)
+        found[name] = channel_text(parameter, readings.get(parameter.code)) if parameter else ""
+    # some families tell who commands in their status word
+    found["Commanded by"] = state.channel or found["Commanded by"]
+    return found
+
+
+def _refused(session: DriveSession) -> str:
+    from tui.drive.orders import chart_in_force, interlock
+
+    raws = session.monitor.known.raws()
+    chart = chart_in_force(session.profile, raws)
+    if chart is None:
+        return "What decides about its commands could not be read."
+    if not chart.orders:
+        return f"This drive is not commanded from here: {chart.name}."
+    if session.line.read_only:
+        return "The line is read-only: nothing is written."
+    return interlock(chart, "forward", raws)
+
+
+def status_json(line_text: str, status: Status) -> dict[str, Any]:
+    """The object that `status --json` prints."""
+    state, watch = status.state, status.watch
+    fault = state.fault
+    return {
+        "line": line_text,
+        "device": status.session.device,
+        "profile": status.session.profile.id,
+        "state": {"id": state.id, "name": state.name, "kind": state.kind},
+        "direction": state.direction,
+        "fault": {"raw": fault.raw, "code": fault.code, "name": fault.name} if fault else None,
+        "alarms": [bit.name for bit in state.alarms],
+        "commanded_by": status.channels["Commanded by"] or None,
+        "reference_from": status.channels["Reference from"] or None,
+        "commandable": not status.refused,
+        "why_not": status.refused or None,
+        "watch": watch_json(watch),
+        "values": values_json(status.session.profile, status.readings),
+    }
+
+
+def watch_json(watch: Watch | None) -> dict[str, Any] | None:
+    """A drive's watch over the line; null where it has none."""
+    if watch is None:
+        return None
+    return {
+        "timeout_s": watch.timeout,
+        "reaction": watch.reaction.name if watch.reaction else None,
+        "does": watch.reaction.does if watch.reaction else None,
+        "begun": watch.active,
+    }
+
+
+def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
+    """What is SHOWN, by quantity; null where the family does not tell it or it was not read."""
+    from .output import reading_json
+
+    values: dict[str, Any] = {}
+    for quantity in SHOWN:
+        parameter = profile.quantity(quantity)
+        reading = readings.get(parameter.code) if parameter else None
+        values[quantity] = reading_json(reading) if reading is not None else None
+    return values
+
+
+def status_lines(status: Status) -> list[tuple[str, str]]:
+    """Titles and texts of `status` for a person."""
+    state, profile = status.state, status.session.profile
+    return [
+        ("Device", f"{status.session.device}, {profile.name}"),
+        ("State", f"{state.headline} ({state.name})"),
+        ("Direction", state.direction or ""),
+        ("Fault", fault_text(state) or "none"),
+        ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
+        *status.channels.items(),
+        ("From here", status.refused or "orders can have an effect"),
+        ("Line watch", _watch_text(status)),
+        *shown_values(profile, status.readings).items(),
+    ]
+
+
+def _watch_text(status: Status) -> str:
+    watch = status.watch
+    if watch is None:
+        return "none: it goes on when the line falls silent"
+    reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
+    begins = "" if watch.active else " It begins with the first command or reference."
+    return f"{watch.timeout:g} s, then: {reaction.rstrip('.')}.{begins}"
+
+
+@click.command()
+@line_argument
+@drive_options
+@read_only_option
+@json_option
+@told
+def status(
+    line_text: str,
+    device: int,
+    profile_id: str | None,
+    rated_current: float | None,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Tell what a drive does, who commands it, and what it does when the line falls silent."""
+    from .output import print_json
+
+    target = Target(line_text, device, profile_id, rated_current)
+
+    async def work(opened: OpenLine) -> Status:
+        return await status_of_drive(await connect(opened, target), opened)
+
+    found = on_line(line_text, work, read_only=read_only)
+    if as_json:
+        print_json(status_json(line_text, found))
+        return
+    for title, text in status_lines(found):
+        click.echo(f"{title:<17} {text or '-----'}")

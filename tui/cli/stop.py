@@ -1,0 +1,194 @@
+"""`drivepanel stop`: stop one drive, or every drive of a line. Needs no arming."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+import click
+
+from .errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
+from .options import Target, connect, drive_options, line_argument, on_line, read_only_option
+
+if TYPE_CHECKING:
+    from tui.drive.schema import OrderId
+    from tui.session.drive_session import DriveSession
+    from tui.session.lines import OpenLine
+    from tui.session.stop import Stopper, StopReport
+
+USUAL_ADDRESSES = "1-10"
+LOOK = 0.05
+
+
+@click.command()
+@line_argument
+@drive_options
+@click.option("--all", "every", is_flag=True, help="Stop every drive found on the line.")
+@click.option(
+    "--addresses",
+    metavar="LIST",
+    help=f"With --all: where to look, like 1-10 or 1,2,31; {USUAL_ADDRESSES} unless told"
+    " otherwise, or the drives of a simulated line.",
+)
+@click.option("--quick", is_flag=True, help="By the drive's quick stop.")
+@click.option("--freewheel", is_flag=True, help="Let the motor coast.")
+@read_only_option
+@told
+def stop(
+    line_text: str,
+    device: int,
+    profile_id: str | None,
+    rated_current: float | None,
+    every: bool,
+    addresses: str | None,
+    quick: bool,
+    freewheel: bool,
+    read_only: bool,
+) -> None:
+    """Stop a motor on its ramp and wait until it stands. Needs no arming."""
+    if quick and freewheel:
+        raise click.UsageError("Either --quick or --freewheel.")
+    if addresses and not every:
+        raise click.UsageError("--addresses goes with --all.")
+    if read_only:
+        raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
+    order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
+    target = Target(line_text, device, profile_id, rated_current)
+    devices = _devices(addresses) if every else None
+
+    async def work(opened: OpenLine) -> int:
+        if not every:
+            session = await connect(opened, target)
+            return await _stop_one(opened, session, order)
+        wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
+        return await _stop_all(opened, wanted, order, profile_id)
+
+    if worst := on_line(line_text, work):
+        raise click.exceptions.Exit(worst)
+
+
+def _devices(text: str | None) -> list[int]:
+    from tui.session.addresses import parse_addresses
+
+    return parse_addresses(text) if text is not None else []
+
+
+def has_order(session: DriveSession, order: OrderId) -> bool:
+    """Whether the family has such an order at all."""
+    charts = session.profile.data.charts
+    return any(one.id == order for chart in charts for one in chart.orders)
+
+
+async def ended(stopper: Stopper, device: int) -> StopReport:
+    """The report of a stop that was ordered, once nothing more is awaited."""
+    from tui.session.stop import Phase
+
+    while True:
+        report = stopper.reports[device]
+        if report.phase in (Phase.STOPPED, Phase.FAILED):
+            return report
+        await asyncio.sleep(LOOK)
+
+
+async def _stop_one(opened: OpenLine, session: DriveSession, order: OrderId) -> int:
+    from tui.session.journal import Journal
+    from tui.session.stop import Stopper
+
+    if not has_order(session, order):
+        raise Failure(
+            f"Device {session.device}, {session.profile.name}, has no {order.replace('-', ' ')};"
+            " stop it without that option.",
+            REFUSED_HERE,
+        )
+    journal = Journal()
+    try:
+        return await _seen_through(Stopper(opened.line, journal), session, order)
+    finally:
+        journal.close()
+
+
+async def _seen_through(stopper: Stopper, session: DriveSession, order: OrderId) -> int:
+    """Stop a drive, tell what became of it; returns the exit status."""
+    from tui.session.stop import Phase
+
+    stopper.stop([session], order)
+    report = await ended(stopper, session.device)
+    who = f"Device {session.device}, {session.profile.name}"
+    if report.phase is Phase.STOPPED:
+        click.echo(f"{who}: {report.text}.")
+        return 0
+    click.echo(f"drivepanel: {who}: {report.text}", err=True)
+    return await _why(session)
+
+
+async def _why(session: DriveSession) -> int:
+    """The status of a stop that failed: whether the drive answers at all."""
+    from tui.bus.errors import DeviceException, LineError
+    from tui.drive.chart import watched_codes
+
+    try:
+        await session.read(watched_codes(session.profile)[:1])
+    except DeviceException:
+        return DRIVE_REFUSED
+    except LineError:
+        return LINE_TROUBLE
+    return DRIVE_REFUSED
+
+
+async def _stop_all(
+    opened: OpenLine, devices: list[int] | tuple[int, ...], order: OrderId, profile_id: str | None
+) -> int:
+    """Stop each drive as soon as it is found; what one does holds up no other."""
+    from tui.session.journal import Journal
+    from tui.session.stop import Stopper
+
+    journal = Journal()
+    stopper = Stopper(opened.line, journal)
+    stops: list[asyncio.Task[int]] = []
+    silent: list[int] = []
+    worst = 0
+    try:
+        for device in devices:
+            found = await _found(opened, device, profile_id)
+            if isinstance(found, int):
+                worst = max(worst, found)
+            elif found is None:
+                silent.append(device)
+            else:
+                # a drive without the wished way is stopped all the same
+                way: OrderId = order if has_order(found, order) else "stop"
+                stops.append(asyncio.create_task(_seen_through(stopper, found, way)))
+        worst = max([worst, *await asyncio.gather(*stops)])
+    finally:
+        journal.close()
+    if silent:
+        click.echo(f"No answer at {', '.join(map(str, silent))}.", err=True)
+    return worst or (0 if stops else LINE_TROUBLE)
+
+
+async def _found(
+    opened: OpenLine, device: int, profile_id: str | None
+) -> DriveSession | int | None:
+    """The drive at an address; None where nobody answers, a status where it cannot be stopped."""
+    from tui.bus.errors import ExchangeError, NoAnswer
+    from tui.drive import library
+    from tui.session.drive_session import DriveSession
+    from tui.session.identify import identify
+
+    try:
+        identity = await identify(opened.line, device)
+    except NoAnswer:
+        return None
+    except ExchangeError as error:
+        click.echo(f"drivepanel: Device {device}: NOT STOPPED: {error}", err=True)
+        return LINE_TROUBLE
+    profile = identity.profile or profile_id
+    if profile is None:
+        fits = ", ".join(identity.candidates) or "drivepanel profiles"
+        click.echo(
+            f"drivepanel: Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
+            f" with -p ({fits}), or stop it at the machine.",
+            err=True,
+        )
+        return DRIVE_REFUSED
+    return DriveSession(opened.line, device, library.load(profile), identity)
