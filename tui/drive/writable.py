@@ -1,0 +1,177 @@
+"""Whether a parameter may be written as a setting now, and if not why; pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal
+
+from .profile import Profile, is_verified
+from .schema import Block, LinkSetting, Parameter, Quantity, StateKind
+
+Reason = Literal["read-only", "forbidden", "order", "unverified", "running"]
+
+ORDERS: frozenset[Quantity] = frozenset(
+    {
+        "command_word",
+        "command_word_2",
+        "extended_command_word",
+        "command_frequency",
+        "command_speed",
+        "save_settings",
+        "digital_inputs",
+        "digital_outputs",
+    }
+)
+"""Quantities that are orders: they have screens and commands of their own."""
+COMMAND_GROUP = "Command"
+"""The group of a profile that holds orders; only who commands is a setting there."""
+MEASURED_GROUPS = frozenset(
+    {"Monitoring", "Status", "Faults", "Fault history", "Input and output values"}
+)
+"""Groups of measurements and counters, though some can be written (set back)."""
+ORDER_CODES = frozenset({"fcs"})
+"""Codes, in small letters, of orders that no field of a profile tells from settings:
+FCS (Altivar 31, 312, 71) loads whole configurations over the present one."""
+AT_REST: frozenset[StateKind] = frozenset({"blocked", "ready", "stopped", "fault"})
+"""Kinds of state in which the motor surely is not commanded to turn."""
+CUTTING = frozenset({"address", "baud", "format", "parity", "protocol"})
+"""Roles of line settings that decide whether the drive hears this line at all."""
+
+
+@dataclass(frozen=True, slots=True)
+class Refusal:
+    """Why a parameter is not written, as a sentence, and as a word for decisions."""
+
+    reason: Reason
+    text: str
+
+
+def is_order(profile: Profile, parameter: Parameter) -> bool:
+    """Whether a word is an order (command, reference, output) rather than a setting."""
+    if parameter.access == "w" or parameter.storage == "ram" or parameter.quantity in ORDERS:
+        return True
+    if parameter.group == COMMAND_GROUP and parameter.quantity != "command_channel":
+        return True
+    if parameter.code.casefold() in ORDER_CODES:
+        return True
+    return parameter.code in _order_codes(profile)
+
+
+def is_setting(profile: Profile, parameter: Parameter) -> bool:
+    """Whether a parameter is a setting: kept by the drive, no measurement and no order."""
+    if parameter.access not in ("rw", "rw-stopped") or parameter.group in MEASURED_GROUPS:
+        return False
+    return not is_order(profile, parameter)
+
+
+def needs_standstill(profile: Profile, parameter: Parameter) -> bool:
+    """Whether the motor must be at rest, by the parameter's access or by its block's rule."""
+    block = slot_of(profile, parameter.code)
+    return parameter.access == "rw-stopped" or (block is not None and block.write_when == "stopped")
+
+
+def slot_of(profile: Profile, code: str) -> Block | None:
+    """The indirect block or scanner table in which a parameter chooses a place, or None."""
+    return next((block for block in profile.data.blocks if code in block.slots), None)
+
+
+def line_setting(profile: Profile, code: str) -> LinkSetting | None:
+    """What a parameter sets of the drive's side of a line, or None."""
+    return next((s for s in profile.data.link.settings if s.parameter == code), None)
+
+
+def refusal(
+    profile: Profile,
+    parameter: Parameter,
+    state: StateKind | None,
+    confirmed: Collection[str] = (),
+) -> Refusal | None:
+    """Why a parameter must not be written as a setting now; None when it may.
+
+    `state` is the kind of the drive's state, None while it is not known; `confirmed` holds codes
+    of unverified parameters that the user has confirmed.
+    """
+    code = parameter.code
+    if parameter.forbidden:
+        return Refusal("forbidden", f"{code} is not written from here: {parameter.forbidden}")
+    if parameter.access == "r":
+        return Refusal("read-only", f"{code} can only be read.")
+    if is_order(profile, parameter):
+        return Refusal(
+            "order", f"{code} is an order, not a setting: give it on Monitor or with run and stop."
+        )
+    if not is_verified(parameter) and code not in confirmed:
+        return Refusal(
+            "unverified",
+            f"{code} is unverified: no document of this family confirms its address"
+            f" {parameter.number}. Compare it with the keypad, then confirm it once.",
+        )
+    if needs_standstill(profile, parameter) and state not in AT_REST:
+        now = f"the drive is now {state}" if state else "its state is not known"
+        return Refusal(
+            "running", f"{code} is written with the motor stopped only; {now}. Stop it first."
+        )
+    return None
+
+
+_STORAGE = {
+    "ram": "lost at power-off",
+    "eeprom": "kept at once (EEPROM)",
+    "ram-until-saved": "lost at power-off until saved",
+    "unknown": "",
+}
+
+
+def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
+    """What a person should know of a parameter before it is written, each in a few words."""
+    block = slot_of(profile, parameter.code)
+    later = parameter.effective == "after-reset" or (
+        block is not None and block.effective == "after-reset"
+    )
+    setting = line_setting(profile, parameter.code)
+    found = (
+        "stopped only" if needs_standstill(profile, parameter) else "",
+        "in force after a reset of the drive" if later else "",
+        _STORAGE[parameter.storage],
+        "changes the line itself" if setting is not None and setting.role in CUTTING else "",
+        "" if is_verified(parameter) else "unverified",
+    )
+    return tuple(mark for mark in found if mark)
+
+
+def waits_for_reset(profile: Profile, parameter: Parameter) -> bool:
+    """Whether a written value comes into force only when the drive is reset or switched on."""
+    block = slot_of(profile, parameter.code)
+    if block is not None and block.effective == "after-reset":
+        return True
+    return parameter.effective == "after-reset"
+
+
+def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
+    """What is dangerous about a value of the drive's watch over the line; else empty."""
+    watch = profile.data.communication_fault
+    if watch is None:
+        return ""
+    lost = "a motor then runs on when the line is lost"
+    if parameter.code == watch.timeout and raw == watch.off:
+        return f"This switches the drive's watch over the line off: {lost}."
+    if parameter.code == watch.reaction:
+        reaction = next((r for r in watch.reactions if r.raw == raw), None)
+        if reaction is not None and reaction.motor_keeps_running:
+            return f"{reaction.name}: {lost}."
+    return ""
+
+
+def _order_codes(profile: Profile) -> frozenset[str]:
+    """Codes of command words, references, and of values that a block passes on."""
+    codes = {reference.parameter for reference in profile.data.references}
+    for chart in profile.data.charts:
+        codes.add(chart.command)
+        codes.update(option.parameter for option in chart.options)
+        codes.update(order.parameter for order in chart.orders)
+    for block in profile.data.blocks:
+        codes.update(block.values)
+    # who commands is chosen by a setting, though taking control writes it too
+    channel = profile.quantity("command_channel")
+    return frozenset(codes - {"", channel.code if channel else ""})
