@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
-from contextlib import asynccontextmanager
+from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -37,6 +37,12 @@ FAULT_GONE_WITHIN = 3.0
 arm_option = click.option(
     "--arm", is_flag=True, help="Let this command write to the drive; without it nothing is."
 )
+
+
+def complain(text: str) -> None:
+    """Say something on standard error, if anybody is there: what is under way goes on."""
+    with suppress(OSError):
+        click.echo(f"drivepanel: {text}", err=True)
 
 
 class TellingCommander(Commander):

@@ -27,7 +27,16 @@ from .options import (
     on_line,
     read_only_option,
 )
-from .orders import Desk, arm_option, carried_out, desk_of, left_alone, need_arming, watch_of
+from .orders import (
+    Desk,
+    arm_option,
+    carried_out,
+    complain,
+    desk_of,
+    left_alone,
+    need_arming,
+    watch_of,
+)
 from .status import fault_text, shown_values, values_json
 
 if TYPE_CHECKING:
@@ -138,12 +147,6 @@ class Voice:
                 self._lines.task_done()
 
 
-def complain(text: str) -> None:
-    """Say something on standard error, if anybody is there."""
-    with suppress(OSError):
-        click.echo(f"drivepanel: {text}", err=True)
-
-
 @dataclass(frozen=True, slots=True)
 class Wish:
     """What `run` was asked for; `seconds` is how long."""
@@ -167,6 +170,8 @@ class Run:
     trouble: float = 0.0
     """When the last cycle failed, time.monotonic()."""
     told: float = 0.0
+    ordering: bool = False
+    """Whether the run order is on its way, so that it may be sent at any time."""
 
     async def carry_out(self) -> None:
         """Run the motor until the end; stop it then, whatever went wrong, or leave it running."""
@@ -176,7 +181,7 @@ class Run:
                 await self._follow()
                 left = self.wish.leave_running
         finally:
-            if self.desk.moved and not left:
+            if (self.desk.moved or self.ordering) and not left:
                 await self._bring_to_rest()
         if left:
             self._tell("left-running", left_alone(self.desk.session, self.watch))
@@ -201,9 +206,15 @@ class Run:
             text = wish.reference
             outcome = await carried_out(commander, lambda: commander.refer(text))
             self._tell("reference", outcome.text)
-        outcome = await carried_out(commander, lambda: commander.order(wish.order))
-        self._tell("order", outcome.text)
         self.watch = await watch_of(self.desk.session, self.desk.keeper)
+        self.ordering = True
+        try:
+            outcome = await carried_out(commander, lambda: commander.order(wish.order))
+        except Exception:
+            self.ordering = False
+            raise
+        self.ordering = False
+        self._tell("order", outcome.text)
 
     async def _follow(self) -> None:
         """Tell about the motor until the end; raises Failure where it stops by itself."""
@@ -216,7 +227,9 @@ class Run:
                 self._show(latest)
                 rest = rest + 1 if self._at_rest(latest) else 0
             if rest >= AT_REST:
-                raise Failure(self._stopped_by_itself(latest), DRIVE_REFUSED)
+                text = self._stopped_by_itself(latest)
+                self._tell("ended", text)
+                raise Failure(text, DRIVE_REFUSED)
             if self.wish.seconds is not None and time.monotonic() - begun >= self.wish.seconds:
                 self.ending.end(f"after {self.wish.seconds:g} s")
             with suppress(TimeoutError):
@@ -293,7 +306,9 @@ class Run:
             report = await ended(desk.stopper, desk.session.device)
             if report.phase is Phase.STOPPED:
                 return self._tell("stopped", f"Device {desk.session.device}: stopped.")
-            if not await self._line_was_bad(ordered):
+            bad = await self._line_was_bad(ordered)
+            # a ramp may be longer than a stop is followed
+            if not bad and desk.latest.state.kind != "stopping":
                 failed += 1
             if failed == STOPS:
                 raise Failure(f"Device {desk.session.device}: {report.text}", DRIVE_REFUSED)

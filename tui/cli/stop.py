@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 import click
 
 from .errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
 from .options import Target, connect, drive_options, line_argument, on_line, read_only_option
+from .orders import complain
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
@@ -115,9 +117,10 @@ async def _seen_through(stopper: Stopper, session: DriveSession, order: OrderId)
     report = await ended(stopper, session.device)
     who = f"Device {session.device}, {session.profile.name}"
     if report.phase is Phase.STOPPED:
-        click.echo(f"{who}: {report.text}.")
+        with suppress(OSError):  # a reader that went away must not end the other stops
+            click.echo(f"{who}: {report.text}.")
         return 0
-    click.echo(f"drivepanel: {who}: {report.text}", err=True)
+    complain(f"{who}: {report.text}")
     return await _why(session)
 
 
@@ -162,7 +165,7 @@ async def _stop_all(
     finally:
         journal.close()
     if silent:
-        click.echo(f"No answer at {', '.join(map(str, silent))}.", err=True)
+        complain(f"No answer at {', '.join(map(str, silent))}.")
     return worst or (0 if stops else LINE_TROUBLE)
 
 
@@ -170,7 +173,7 @@ async def _found(
     opened: OpenLine, device: int, profile_id: str | None
 ) -> DriveSession | int | None:
     """The drive at an address; None where nobody answers, a status where it cannot be stopped."""
-    from tui.bus.errors import ExchangeError, NoAnswer
+    from tui.bus.errors import LineError, NoAnswer
     from tui.drive import library
     from tui.session.drive_session import DriveSession
     from tui.session.identify import identify
@@ -179,16 +182,15 @@ async def _found(
         identity = await identify(opened.line, device)
     except NoAnswer:
         return None
-    except ExchangeError as error:
-        click.echo(f"drivepanel: Device {device}: NOT STOPPED: {error}", err=True)
+    except LineError as error:
+        complain(f"Device {device}: NOT STOPPED: {error}")
         return LINE_TROUBLE
     profile = identity.profile or profile_id
     if profile is None:
         fits = ", ".join(identity.candidates) or "drivepanel profiles"
-        click.echo(
-            f"drivepanel: Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
-            f" with -p ({fits}), or stop it at the machine.",
-            err=True,
+        complain(
+            f"Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
+            f" with -p ({fits}), or stop it at the machine."
         )
         return DRIVE_REFUSED
     return DriveSession(opened.line, device, library.load(profile), identity)

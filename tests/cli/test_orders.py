@@ -1,0 +1,407 @@
+"""Commands that move motors: run, reference, reset, stop and status, as processes of their own.
+
+The simulator is in the test's own process, so that the motor itself tells what became of it.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import select
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.programs import DRIVEPANEL, PATIENCE, Served, drivepanel, served, wait_until
+from tui.simulator import DriveSpec, Simulation
+
+SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
+ALTIVARS = ["atv21", "atv31", "atv312", "atv71"]
+"""Families that take a reference in Hz."""
+
+
+@contextmanager
+def bench(*specs: DriveSpec) -> Iterator[tuple[Simulation, str]]:
+    """Simulated drives and the LINE to them; an Altivar 71 at address 1 unless told otherwise."""
+    with Simulation(list(specs) or [DriveSpec("atv71", 1)]) as simulation:
+        yield simulation, f"serial:{simulation.serve_pty()},19200,8N1"
+
+
+@contextmanager
+def running(line: str, *extra: str) -> Iterator[Served]:
+    """`run` at work, begun once the motor was said to run."""
+    command = (*DRIVEPANEL, "run", line, "--reference", "20Hz", "--arm", *extra)
+    with served(command, ready="running forward") as program:
+        yield program
+
+
+def turns(simulation: Simulation, device: int = 1) -> bool:
+    return abs(simulation.drive(device).motor.frequency) > 3
+
+
+def stands(simulation: Simulation, device: int = 1) -> bool:
+    return simulation.drive(device).motor.frequency == 0
+
+
+# run: its ends
+
+
+@pytest.mark.parametrize("ending", SIGNALS)
+def test_a_signal_stops_the_motor_on_its_ramp(ending: signal.Signals) -> None:
+    with bench() as (simulation, line), running(line) as program:
+        wait_until(lambda: turns(simulation), "the motor turns")
+        program.process.send_signal(ending)
+        said, error = program.process.communicate(timeout=PATIENCE)
+        assert (program.process.returncode, error) == (0, "")
+        assert f"ended by {ending.name}" in said
+        assert said.rstrip().endswith("Device 1: stopped.")
+        assert stands(simulation)
+        assert simulation.drive(1).fault is None
+
+
+def test_a_second_ctrl_c_does_not_leave_the_motor_running() -> None:
+    with (
+        bench(DriveSpec("atv71", 1, sets={"DEC": 50})) as (simulation, line),
+        running(line) as program,
+    ):
+        wait_until(lambda: turns(simulation), "the motor turns")
+        for _ in range(3):
+            program.process.send_signal(signal.SIGINT)
+            time.sleep(0.1)
+        assert program.process.poll() is None, "the ramp takes longer"
+        said, error = program.process.communicate(timeout=PATIENCE)
+        assert (program.process.returncode, error) == (0, "")
+        assert "Device 1: stopped." in said
+        assert stands(simulation)
+
+
+def test_a_ctrl_c_before_the_motor_runs_leaves_none_running() -> None:
+    with bench() as (simulation, line):
+        command = (*DRIVEPANEL, "run", line, "--reference", "20Hz", "--arm")
+        with served(command, ready="Reference 20") as program:
+            assert program.end(signal.SIGINT) == (0, "")
+        wait_until(lambda: stands(simulation), "the motor stands")
+        assert simulation.drive(1).fault is None
+
+
+def test_a_closed_output_stops_the_motor() -> None:
+    with bench() as (simulation, line), running(line) as program:
+        wait_until(lambda: turns(simulation), "the motor turns")
+        assert program.process.stdout is not None
+        program.process.stdout.close()
+        assert program.process.wait(timeout=PATIENCE) == 0
+        assert stands(simulation)
+        program.process.stdout = None
+
+
+def test_an_output_that_nobody_reads_holds_up_no_stop() -> None:
+    """A terminal held by Ctrl-S takes nothing; here a pipe that is full from the start."""
+    reading, writing = os.pipe()
+    with bench() as (simulation, line):
+        os.set_blocking(writing, False)
+        while select.select([], [writing], [], 0)[1]:
+            os.write(writing, b"x" * 4096)
+        os.set_blocking(writing, True)
+        command = (*DRIVEPANEL, "run", line, "--reference", "20Hz", "--arm")
+        process = subprocess.Popen(command, stdout=writing, stderr=subprocess.DEVNULL)
+        try:
+            wait_until(lambda: turns(simulation), "the motor turns")
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(timeout=PATIENCE) == 0
+            assert stands(simulation)
+        finally:
+            process.kill()
+            process.wait(timeout=PATIENCE)
+            os.close(reading)
+            os.close(writing)
+
+
+@pytest.mark.parametrize("family", ALTIVARS)
+def test_run_for_some_time(family: str) -> None:
+    with bench(DriveSpec(family, 1)) as (simulation, line):
+        run = ("run", line, "-p", family, "--reference", "20Hz", "--arm", "--for", "2")
+        done = drivepanel(*run)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "running forward  Output frequency" in done.stdout
+        assert "stopping (after 2 s)" in done.stdout
+        assert done.stdout.rstrip().endswith("Device 1: stopped.")
+        assert stands(simulation)
+        assert simulation.drive(1).fault is None
+
+
+def test_run_reverse_in_json() -> None:
+    with bench() as (simulation, line):
+        run = ("run", line, "--reference", "20Hz", "--reverse", "--arm", "--for", "3", "--json")
+        done = drivepanel(*run)
+        assert (done.returncode, done.stderr) == (0, "")
+        told: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
+        events = [one["event"] for one in told]
+        assert events[:2] == ["reference", "order"]
+        assert events[-2:] == ["stopping", "stopped"]
+        last = [one for one in told if one["event"] == "state"][-1]
+        assert (last["state"], last["direction"]) == ("running", "reverse")
+        assert last["values"]["output_frequency"]["value"] < -3
+        assert last["values"]["frequency_reference"]["unit"] == "Hz"
+        assert stands(simulation)
+
+
+def test_the_watch_of_the_drive_is_fed() -> None:
+    """A time-out of 0.5 s passes several times between two lines of output."""
+    with bench(DriveSpec("atv71", 1, sets={"TTO": 5})) as (simulation, line):
+        done = drivepanel("run", line, "--reference", "20Hz", "--arm", "--for", "3")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert simulation.drive(1).fault is None
+
+
+def test_leave_running_leaves_it_running_and_says_what_the_drive_does() -> None:
+    with bench(DriveSpec("atv71", 1, sets={"SLL": 0})) as (simulation, line):
+        run = ("run", line, "--reference", "20Hz", "--arm", "--for", "2", "--leave-running")
+        done = drivepanel(*run)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert "left alone it acts 10 s after the last request" in done.stdout
+        assert "stopp" not in done.stdout
+        assert turns(simulation)
+        done = drivepanel("stop", line)
+        assert (done.returncode, done.stdout) == (0, "Device 1, Altivar 71: stopped.\n")
+        assert stands(simulation)
+
+
+# run: what goes wrong
+
+
+def test_a_trip_ends_it_and_is_told() -> None:
+    with bench() as (simulation, line), running(line) as program:
+        wait_until(lambda: turns(simulation), "the motor turns")
+        simulation.drive(1).provoke("OCF")
+        _, error = program.process.communicate(timeout=PATIENCE)
+        assert program.process.returncode == 4
+        assert "Device 1 tripped: OCF" in error
+        assert stands(simulation)
+
+
+def test_a_motor_that_others_stop_ends_it() -> None:
+    with bench() as (simulation, line), running(line) as program:
+        wait_until(lambda: turns(simulation), "the motor turns")
+        simulation.drive(1).power_cycle()
+        _, error = program.process.communicate(timeout=PATIENCE)
+        assert program.process.returncode == 4
+        assert "Device 1 no longer runs" in error
+        assert stands(simulation)
+
+
+def test_a_lost_line_is_told_and_the_motor_is_stopped_when_it_is_back(tmp_path: Path) -> None:
+    spec = DriveSpec("atv71", 1, sets={"SLL": 0})
+    with Simulation([spec]) as simulation:
+        link = simulation.serve_pty(str(tmp_path / "line"))
+        with running(f"serial:{link},19200,8N1") as program:
+            wait_until(lambda: turns(simulation), "the motor turns")
+            simulation.unplug()
+            assert program.process.stderr is not None
+            said = [program.process.stderr.readline() for _ in range(2)]
+            assert "left alone it acts 10 s after the last request" in said[1]
+            program.process.send_signal(signal.SIGINT)
+            assert "NOT STOPPED yet" in program.process.stderr.readline()
+            assert program.process.poll() is None
+            assert turns(simulation)
+            simulation.replug()
+            out, _ = program.process.communicate(timeout=PATIENCE)
+            assert program.process.returncode == 0
+            assert "Device 1: stopped." in out
+            assert stands(simulation)
+
+
+# Refusals
+
+NOT_ARMED = [("run",), ("reference", "30Hz"), ("reset",)]
+
+
+@pytest.mark.parametrize("command", NOT_ARMED, ids=lambda command: command[0])
+def test_5_nothing_is_commanded_without_arming(command: tuple[str, ...]) -> None:
+    done = drivepanel(command[0], "sim:atv71", *command[1:])
+    assert (done.returncode, done.stdout) == (5, "")
+    assert "Not armed" in done.stderr
+    assert "--arm lets this one command write" in done.stderr
+
+
+@pytest.mark.parametrize("command", [*NOT_ARMED, ("stop",)], ids=lambda command: command[0])
+def test_5_a_read_only_line_is_not_written(command: tuple[str, ...]) -> None:
+    arm = () if command == ("stop",) else ("--arm",)
+    done = drivepanel(command[0], "sim:atv71", *command[1:], *arm, "--read-only")
+    assert done.returncode == 5
+    assert "read-only" in done.stderr
+
+
+REFUSED = {
+    "interlock": ("atv31", {"LAC": 1}, ("run",), r"below L3"),
+    "channel": ("atv71", {"CD1": 0, "CHCF": 2}, ("run",), "not commanded by Modbus"),
+    "limit": ("atv71", {"HSP": 500}, ("reference", "90Hz"), "above HSP"),
+    "no reference": ("atv71", {}, ("reference", "fast"), "is no reference"),
+    "run at a limit": ("atv71", {"HSP": 500}, ("run", "--reference", "90Hz"), "above HSP"),
+    "no fault": ("atv71", {}, ("reset",), "possible in the states: Fault"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_5_the_commander_refuses(case: str) -> None:
+    family, sets, command, text = REFUSED[case]
+    with bench(DriveSpec(family, 1, sets=sets)) as (simulation, line):
+        done = drivepanel(command[0], line, *command[1:], "-p", family, "--arm")
+        assert done.returncode == 5, done.stderr
+        assert text in done.stderr
+        assert "topp" not in done.stdout
+        assert stands(simulation)
+
+
+COMMANDS = [("run", "--arm"), ("reference", "30Hz", "--arm"), ("reset", "--arm"), ("stop",)]
+
+
+@pytest.mark.parametrize("command", [*COMMANDS, ("status",)], ids=lambda command: command[0])
+def test_3_nobody_answers(command: tuple[str, ...]) -> None:
+    done = drivepanel(command[0], "sim:atv71@2", *command[1:], "-p", "atv71", "-d", "9")
+    assert done.returncode == 3, done.stderr
+    assert "evice 9" in done.stderr
+
+
+def test_4_the_drive_refuses_the_reference() -> None:
+    with bench() as (simulation, line):
+        simulation.drive(1).registers.protect([simulation.drive(1).profile["LFR"]])
+        done = drivepanel("reference", line, "30Hz", "--arm")
+        assert done.returncode == 4, done.stdout + done.stderr
+        assert "xception" in done.stderr
+
+
+# reference and reset
+
+
+def test_reference_is_written_and_starts_nothing() -> None:
+    with bench() as (simulation, line):
+        done = drivepanel("reference", line, "30Hz", "--arm")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout == "Reference 30.0 Hz (LFR)\n"
+        assert simulation.drive(1).raw("LFR") == 300
+        assert stands(simulation)
+
+
+def test_reset_ends_a_fault_whose_cause_is_gone() -> None:
+    with bench(DriveSpec("atv71", 1, run_hz=20.0)) as (simulation, line):
+        drive = simulation.drive(1)
+        drive.provoke("OCF")
+        wait_until(lambda: drive.fault is not None and drive.motor.rotor == 0, "it tripped")
+        drive.clear_cause()
+        done = drivepanel("reset", line, "--arm")
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout.startswith("Fault reset: ")
+        assert drive.fault is None
+
+
+def test_4_a_fault_whose_cause_stays() -> None:
+    with bench() as (simulation, line):
+        drive = simulation.drive(1)
+        drive.provoke("OCF", persists=True)
+        wait_until(lambda: drive.fault is not None, "it tripped")
+        done = drivepanel("reset", line, "--arm")
+        assert done.returncode == 4, done.stdout
+        assert "its cause is not gone" in done.stderr
+        assert drive.fault is not None
+
+
+# stop
+
+
+@pytest.mark.parametrize("way", [(), ("--quick",), ("--freewheel",)])
+def test_stop_needs_no_arming(way: tuple[str, ...]) -> None:
+    with bench(DriveSpec("atv71", 1, run_hz=30.0)) as (simulation, line):
+        wait_until(lambda: turns(simulation), "the motor turns")
+        done = drivepanel("stop", line, *way)
+        assert (done.returncode, done.stderr) == (0, "")
+        assert done.stdout == "Device 1, Altivar 71: stopped.\n"
+        assert stands(simulation)
+
+
+def test_stop_all_stops_each() -> None:
+    specs = [DriveSpec(one, n, run_hz=20.0) for n, one in enumerate(("atv71", "atv21"), start=1)]
+    with bench(*specs) as (simulation, line):
+        wait_until(lambda: all(turns(simulation, n) for n in (1, 2)), "the motors turn")
+        done = drivepanel("stop", line, "--all", "--addresses", "1-3")
+        assert done.returncode == 0, done.stderr
+        assert "Device 1, Altivar 71: stopped." in done.stdout
+        assert "Device 2, Altivar 21: stopped." in done.stdout
+        assert "No answer at 3." in done.stderr
+        assert all(stands(simulation, n) for n in (1, 2))
+
+
+def test_stop_all_tells_which_it_could_not_stop_and_stops_the_others() -> None:
+    specs = [DriveSpec("powerdrive", 1), DriveSpec("atv71", 2, run_hz=20.0)]
+    with bench(*specs) as (simulation, line):
+        wait_until(lambda: turns(simulation, 2), "the motor turns")
+        done = drivepanel("stop", line, "--all", "--addresses", "1,2")
+        assert done.returncode == 4, done.stdout + done.stderr
+        assert "Device 1: NOT STOPPED" in done.stderr
+        assert "with -p" in done.stderr
+        assert "Device 2, Altivar 71: stopped." in done.stdout
+        assert stands(simulation, 2)
+
+
+def test_3_stop_all_where_nobody_answers() -> None:
+    done = drivepanel("stop", "sim:atv71@2", "--all", "--addresses", "5,6")
+    assert done.returncode == 3
+    assert "No answer at 5, 6." in done.stderr
+
+
+def test_5_a_way_to_stop_that_the_family_lacks() -> None:
+    done = drivepanel("stop", "sim:powerdrive", "-p", "powerdrive", "--quick")
+    assert done.returncode == 5, done.stdout + done.stderr
+    assert "has no quick stop" in done.stderr
+
+
+@pytest.mark.parametrize(
+    "extra", [("--quick", "--freewheel"), ("--addresses", "1"), ("--all", "--addresses", "x")]
+)
+def test_2_stop_usage(extra: tuple[str, ...]) -> None:
+    assert drivepanel("stop", "sim:atv71", *extra).returncode == 2
+
+
+# status
+
+
+def test_status_of_a_running_drive() -> None:
+    with bench(DriveSpec("atv71", 1, run_hz=30.0)) as (simulation, line):
+        wait_until(lambda: simulation.drive(1).motor.frequency > 29, "the motor turns")
+        done = drivepanel("status", line, "--json")
+        assert (done.returncode, done.stderr) == (0, "")
+        told = json.loads(done.stdout)
+        assert (told["state"]["kind"], told["direction"]) == ("running", "forward")
+        assert told["fault"] is None
+        assert told["values"]["output_frequency"]["value"] == pytest.approx(30, abs=1.5)
+        assert told["watch"]["timeout_s"] == 10
+        assert "freewheel" in told["watch"]["does"]
+
+
+def test_status_tells_a_fault_and_why_orders_have_no_effect() -> None:
+    with bench(DriveSpec("atv71", 1, sets={"CD1": 0, "CHCF": 2})) as (simulation, line):
+        simulation.drive(1).provoke("OCF")
+        wait_until(lambda: simulation.drive(1).fault is not None, "it tripped")
+        told = json.loads(drivepanel("status", line, "--json").stdout)
+        assert told["fault"]["code"] == "OCF"
+        assert told["commandable"] is False
+        assert "not commanded by Modbus" in told["why_not"]
+        text = drivepanel("status", line).stdout
+        assert "OCF" in text
+        assert "not commanded by Modbus" in text
+
+
+@pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "powerdrive", "proxidrive"])
+def test_status_of_every_family(family: str) -> None:
+    done = drivepanel("status", f"sim:{family}", "-p", family)
+    assert (done.returncode, done.stderr) == (0, "")
+    titles = [line[:17].strip() for line in done.stdout.splitlines()]
+    assert titles[:9] == [
+        "Device", "State", "Direction", "Fault", "Alarms", "Commanded by", "Reference from",
+        "From here", "Line watch",
+    ]  # fmt: skip
