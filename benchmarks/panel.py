@@ -85,6 +85,9 @@ class Bench:
             "COLORTERM": "truecolor",
             "TEXTUAL_ANIMATIONS": "none",
             "PYTHONPATH": str(ROOT),
+            # as installed: what the first start compiles is kept, whatever is set outside
+            "PYTHONDONTWRITEBYTECODE": "",
+            "PYTHONPYCACHEPREFIX": str(folder / "compiled"),
             "DRIVEPANEL_STATE": str(folder),
             "HTOPRC": str(folder / "htoprc"),
         }

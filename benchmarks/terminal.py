@@ -8,16 +8,18 @@ import os
 import pty
 import random
 import re
-import select
 import signal
 import struct
+import sys
 import termios
+import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from queue import Empty, Queue
 from statistics import median
 from typing import Any
 
@@ -26,6 +28,8 @@ from benchmarks.wire import share
 CHUNK = 65536
 SLOW_CHUNK = 100
 """Bytes taken at once where the terminal is slow; small against a picture."""
+SWITCH = 0.0005
+"""Seconds after which a thread of the benchmark gives way to another one."""
 LONGEST = 8.0
 """Seconds after which a key counts as lost."""
 MOST_LOST = 10
@@ -161,12 +165,30 @@ class Terminal:
     ) -> None:
         self.picture = Picture(*size)
         self.written = 0
-        self._rate = rate
-        self._free = 0.0
+        self._come: Queue[tuple[float, bytes]] = Queue()
+        # the reader must not wait for the picture to be brought up to date
+        sys.setswitchinterval(SWITCH)
         self.started = time.monotonic()
         self._process, self._terminal = pty.fork()
         if self._process == 0:
             self._become(command, size, folder, environment)
+        self._reader = threading.Thread(target=self._read, args=(rate,), daemon=True)
+        self._reader.start()
+
+    def _read(self, rate: float | None) -> None:
+        """Take what the program writes, and note when it had come; ends with the program."""
+        free = 0.0
+        while True:
+            try:
+                data = os.read(self._terminal, CHUNK if rate is None else SLOW_CHUNK)
+            except OSError:
+                data = b""
+            if rate is not None:
+                free = max(free, time.monotonic()) + len(data) / rate
+                time.sleep(max(0.0, free - time.monotonic()))
+            self._come.put((time.monotonic(), data))
+            if not data:
+                return
 
     @staticmethod
     def _become(
@@ -189,17 +211,12 @@ class Terminal:
 
     def look(self, within: float) -> float | None:
         """Take what comes next; when it had come, or None if nothing came within so many s."""
-        wait = max(within, 0.0)
-        if not select.select([self._terminal], [], [], wait)[0]:
-            return None
         try:
-            data = os.read(self._terminal, CHUNK if self._rate is None else SLOW_CHUNK)
-        except OSError as error:
-            raise NotShown(f"the program ended: {self.picture.text()}") from error
-        if self._rate is not None:
-            self._free = max(self._free, time.monotonic()) + len(data) / self._rate
-            time.sleep(max(0.0, self._free - time.monotonic()))
-        come = time.monotonic()
+            come, data = self._come.get(timeout=max(within, 0.0))
+        except Empty:
+            return None
+        if not data:
+            raise NotShown(f"the program ended: {self.picture.text()}")
         self.written += len(data)
         self.picture.feed(data)
         return come
@@ -237,8 +254,9 @@ class Terminal:
     def close(self) -> None:
         """End the program, and take the terminal away from it."""
         os.kill(self._process, signal.SIGTERM)
-        os.close(self._terminal)
         os.waitpid(self._process, 0)
+        self._reader.join()
+        os.close(self._terminal)
 
 
 @dataclass(frozen=True, slots=True)
