@@ -20,6 +20,7 @@ import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, Served, drivepanel, served, wait_until
 from tui.simulator import DriveSpec, Simulation
+from tui.simulator.spec import FaultRates
 
 SIGNALS = [signal.SIGINT, signal.SIGTERM, signal.SIGHUP]
 ALTIVARS = ["atv21", "atv31", "atv312", "atv71"]
@@ -195,24 +196,40 @@ def test_a_motor_that_others_stop_ends_it() -> None:
         assert stands(simulation)
 
 
-def test_a_lost_line_is_told_and_the_motor_is_stopped_when_it_is_back(tmp_path: Path) -> None:
+def silence(simulation: Simulation) -> None:
+    simulation.faults.rates = FaultRates(lost=1.0)
+
+
+def speech(simulation: Simulation) -> None:
+    simulation.faults.rates = FaultRates()
+
+
+LOSSES = {"unplugged": (Simulation.unplug, Simulation.replug), "silent": (silence, speech)}
+
+
+@pytest.mark.parametrize("loss", LOSSES)
+def test_a_lost_line_is_told_and_the_motor_is_stopped_when_it_is_back(
+    loss: str, tmp_path: Path
+) -> None:
+    lose, give_back = LOSSES[loss]
     spec = DriveSpec("atv71", 1, sets={"SLL": 0})
     with Simulation([spec]) as simulation:
         link = simulation.serve_pty(str(tmp_path / "line"))
         with running(f"serial:{link},19200,8N1") as program:
             wait_until(lambda: turns(simulation), "the motor turns")
-            simulation.unplug()
+            lose(simulation)
             assert program.process.stderr is not None
             said = [program.process.stderr.readline() for _ in range(2)]
             assert "left alone it acts 10 s after the last request" in said[1]
             program.process.send_signal(signal.SIGINT)
             assert "NOT STOPPED yet" in program.process.stderr.readline()
             assert program.process.poll() is None
-            assert turns(simulation)
-            simulation.replug()
+            # a stop reaches a drive whose replies are lost; one that is cut off turns on
+            assert turns(simulation) or loss == "silent"
+            give_back(simulation)
             out, _ = program.process.communicate(timeout=PATIENCE)
             assert program.process.returncode == 0
-            assert "Device 1: stopped." in out
+            assert out.rstrip().endswith(("Device 1: stopped.", "Device 1: it stands."))
             assert stands(simulation)
 
 
@@ -274,6 +291,17 @@ def test_4_the_drive_refuses_the_reference() -> None:
         done = drivepanel("reference", line, "30Hz", "--arm")
         assert done.returncode == 4, done.stdout + done.stderr
         assert "xception" in done.stderr
+
+
+def test_4_the_drive_refuses_the_run_order_and_stands() -> None:
+    with bench() as (simulation, line):
+        simulation.drive(1).registers.protect([simulation.drive(1).profile["CMD"]])
+        done = drivepanel("run", line, "--reference", "30Hz", "--arm")
+        assert done.returncode == 4, done.stdout + done.stderr
+        assert "xception" in done.stderr
+        assert "NOT STOPPED" not in done.stderr
+        assert "it stands" in done.stdout
+        assert stands(simulation)
 
 
 # reference and reset

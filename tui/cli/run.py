@@ -307,11 +307,20 @@ class Run:
             if report.phase is Phase.STOPPED:
                 return self._tell("stopped", f"Device {desk.session.device}: stopped.")
             bad = await self._line_was_bad(ordered)
+            if self._stands():
+                return self._tell("stopped", f"Device {desk.session.device}: it stands.")
             # a ramp may be longer than a stop is followed
             if not bad and desk.latest.state.kind != "stopping":
                 failed += 1
             if failed == STOPS:
                 raise Failure(f"Device {desk.session.device}: {report.text}", DRIVE_REFUSED)
+
+    def _stands(self) -> bool:
+        """Whether the motor is seen at rest, though the drive did not take the stop."""
+        latest, session = self.desk.latest, self.desk.session
+        frequency = session.profile.quantity("output_frequency")
+        reading = latest.readings.get(frequency.code) if frequency else None
+        return self._at_rest(latest) and reading is not None and reading.number == 0
 
     async def _line_was_bad(self, since: float) -> bool:
         """Wait until the drive answers; whether it failed to at any time since."""

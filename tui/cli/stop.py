@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import AsyncIterator, Iterable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
@@ -139,9 +140,12 @@ async def _why(session: DriveSession) -> int:
 
 
 async def _stop_all(
-    opened: OpenLine, devices: list[int] | tuple[int, ...], order: OrderId, profile_id: str | None
+    opened: OpenLine, devices: Iterable[int], order: OrderId, profile_id: str | None
 ) -> int:
-    """Stop each drive as soon as it is found; what one does holds up no other."""
+    """Stop each drive as soon as it is found; what one does holds up no other.
+
+    Drives that say at once who they are come first: a silent address takes seconds to rule out.
+    """
     from tui.session.journal import Journal
     from tui.session.stop import Stopper
 
@@ -151,7 +155,7 @@ async def _stop_all(
     silent: list[int] = []
     worst = 0
     try:
-        for device in devices:
+        async for device in _soonest_first(opened, devices):
             found = await _found(opened, device, profile_id)
             if isinstance(found, int):
                 worst = max(worst, found)
@@ -161,12 +165,32 @@ async def _stop_all(
                 # a drive without the wished way is stopped all the same
                 way: OrderId = order if has_order(found, order) else "stop"
                 stops.append(asyncio.create_task(_seen_through(stopper, found, way)))
-        worst = max([worst, *await asyncio.gather(*stops)])
     finally:
+        # whatever went wrong with the search: stops that were begun are seen through
+        worst = max([worst, *await asyncio.gather(*stops)])
         journal.close()
     if silent:
         complain(f"No answer at {', '.join(map(str, silent))}.")
     return worst or (0 if stops else LINE_TROUBLE)
+
+
+async def _soonest_first(opened: OpenLine, devices: Iterable[int]) -> AsyncIterator[int]:
+    """Addresses, those where somebody answers one short question before all others."""
+    from tui.bus.errors import LineError, NoAnswer
+    from tui.bus.line import Priority
+
+    later: list[int] = []
+    for device in devices:
+        try:
+            await opened.line.identify(device, priority=Priority.OPERATOR_READ)
+        except NoAnswer:
+            later.append(device)
+            continue
+        except LineError:
+            pass  # who it is, or what is wrong, is found out next
+        yield device
+    for device in later:
+        yield device
 
 
 async def _found(
