@@ -55,6 +55,8 @@ IMPATIENT = 0.25
 GIVEN_UP = 0.1
 KEPT = 50
 """Wrong values that are told in full."""
+BEFORE, AFTER = 2.5, 0.05
+"""Seconds before and after a wrong value of which the frames are told."""
 SAMPLES = 9
 """Least number of looks at the memory; else one a minute."""
 
@@ -146,8 +148,17 @@ class Watched:
                         "want": want,
                         "belongs_to": self._owners.get(reading.raw),
                         "way": way,
+                        "frames": self._frames(reading.time),
                     }
                 )
+
+    def _frames(self, time: float) -> list[str]:
+        """What passed on the line before a reply that ended at this time."""
+        return [
+            f"{frame.time - time:+.4f} {frame.direction} {frame.data.hex()} {frame.note}".strip()
+            for frame in self.line.trace
+            if time - BEFORE <= frame.time <= time + AFTER
+        ]
 
     async def operate(self) -> None:
         """Read as an operator does, until it is cancelled."""
@@ -298,7 +309,8 @@ def show(console: Console, found: Mapping[str, Any]) -> None:
     console.print(table)
     for one in found["lines"]:
         for wrong in one["wrong_ones"]:
-            console.print(f"wrong on {one['line']}: {wrong}")
+            told = {key: value for key, value in wrong.items() if key != "frames"}
+            console.print(f"wrong on {one['line']}: {told}", *wrong["frames"], sep="\n    ")
     show_memory(console, found)
 
 
