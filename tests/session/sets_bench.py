@@ -1,0 +1,79 @@
+"""A simulated drive on a real line with what writes its settings, for tests of settings."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from tui.bus.line import Line
+from tui.bus.link import SerialLink
+from tui.drive import library
+from tui.drive.edits import Edits
+from tui.drive.profile import Profile
+from tui.session.applying import Applied, apply_edits
+from tui.session.asking import Asker
+from tui.session.drive_session import DriveSession
+from tui.session.journal import Journal
+from tui.simulator import DriveSpec, FaultRates, Simulation
+from tui.simulator.drive import SimulatedDrive
+
+FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
+
+
+@dataclass(slots=True)
+class Bench:
+    """A drive, the session with it, and the journal."""
+
+    drive: SimulatedDrive
+    session: DriveSession
+    journal: Journal
+    simulation: Simulation
+
+    @property
+    def profile(self) -> Profile:
+        """The drive's profile."""
+        return self.session.profile
+
+    async def stage(self, **typed: str) -> Edits:
+        """Edits as typed, against what the drive holds."""
+        asker = Asker(self.session)
+        codes = [*typed, *(p.code for p in self.profile.parameters if p.quantity in SOURCES)]
+        raws = await asker.ask_raws(codes)
+        edits = Edits()
+        for code, text in typed.items():
+            edits = edits.stage(self.profile, code, text, raws, asker.lacking)
+        return edits
+
+    async def apply(self, **typed: str) -> Applied:
+        """Stage and apply."""
+        return await apply_edits(self.session, self.journal, await self.stage(**typed))
+
+    def writes(self) -> list[tuple[int, int]]:
+        """Registers and words of all writes of one word so far."""
+        line = self.session.line
+        sent = [f.data for f in line.trace if f.direction == "out" and f.data[1] == 6]
+        return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
+
+
+SOURCES = {"ramp_increment", "high_speed", "low_speed", "max_frequency"}
+
+
+@contextmanager
+def bench(
+    family: str, *, read_only: bool = False, faults: FaultRates | None = None, **spec: object
+) -> Iterator[Bench]:
+    """A simulated drive behind a pseudo-terminal."""
+    drive = DriveSpec(family, 1, **spec)  # type: ignore[arg-type]
+    simulation = Simulation([drive], faults=faults, seed=3)
+    simulation.start()
+    line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
+    journal = Journal()
+    try:
+        line.open(wait=5.0)
+        session = DriveSession(line, 1, library.load(family))
+        yield Bench(simulation.drive(1), session, journal, simulation)
+    finally:
+        journal.close()
+        line.close()
+        simulation.stop()

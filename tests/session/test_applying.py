@@ -1,0 +1,306 @@
+"""Applying edits to simulated drives: written once, read back, never over somebody's change."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+
+import pytest
+
+from tests.session.sets_bench import Bench, bench
+from tui.bus.errors import NoAnswer, RequestRefused
+from tui.drive.memory_orders import MemoryRefused
+from tui.session.applying import Applied, Outcome, Result, apply_edits
+from tui.session.memory import factory_reset, save_to_eeprom
+from tui.simulator import FaultRates
+
+
+def outcomes(applied: Applied) -> dict[str, Outcome]:
+    return {result.edit.code: result.outcome for result in applied.results}
+
+
+def text(applied: Applied, code: str) -> str:
+    return next(result.text for result in applied.results if result.edit.code == code)
+
+
+async def test_edits_are_written_read_back_and_recorded() -> None:
+    with bench("atv71") as made:
+        told: list[tuple[int, int, str]] = []
+
+        def progress(done: int, of: int, result: Result) -> None:
+            told.append((done, of, result.text))
+
+        edits = await made.stage(ACC="5 s", DEC="7,25")
+        applied = await apply_edits(made.session, made.journal, edits, progress=progress)
+        assert outcomes(applied) == {"ACC": Outcome.DONE, "DEC": Outcome.DONE}
+        assert (made.drive.raw("ACC"), made.drive.raw("DEC")) == (50, 73)
+        assert told == [(1, 2, "ACC: 3.0 s -> 5.0 s"), (2, 2, "DEC: 3.0 s -> 7.3 s")]
+        assert len(applied.left) == 0
+        assert applied.unsaved == ("ACC", "DEC")
+        entries = made.journal.recent
+        assert [(e.code, e.old, e.new, e.answer, e.read_back, e.why) for e in entries] == [
+            ("ACC", "3.0 s", "5.0 s", "ok", 50, "setting"),
+            ("DEC", "3.0 s", "7.3 s", "ok", 73, "setting"),
+        ]
+
+
+async def test_a_scale_and_a_ramp_at_once() -> None:
+    with bench("atv312") as made:
+        applied = await made.apply(ACC="2.55 s", Inr="0.01 s")
+        assert outcomes(applied) == {"Inr": Outcome.DONE, "ACC": Outcome.DONE}
+        assert made.drive.raw("ACC") == 255
+
+
+async def test_limits_are_moved_before_what_they_limit() -> None:
+    with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
+        applied = await made.apply(LSP="70", HSP="75", TFR="80")
+        assert all(result.done for result in applied.results), applied.results
+        assert [made.drive.raw(c) for c in ("LSP", "HSP", "TFR")] == [700, 750, 800]
+
+
+async def test_a_value_past_another_is_not_sent() -> None:
+    with bench("atv71", sets={"HSP": 500}) as made:
+        applied = await made.apply(LSP="55", ACC="4")
+        assert outcomes(applied) == {"LSP": Outcome.REFUSED, "ACC": Outcome.DONE}
+        assert "above HSP = 50.0 Hz" in text(applied, "LSP")
+        assert "LSP" in applied.left
+        assert 3105 not in [register for register, _ in made.writes()]
+
+
+async def test_a_change_by_somebody_else_is_not_overwritten() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s", DEC="7 s")
+        made.drive.set("ACC", 90)
+        applied = await apply_edits(made.session, made.journal, edits)
+        assert outcomes(applied) == {"ACC": Outcome.CHANGED, "DEC": Outcome.DONE}
+        assert "was 3.0 s and is now 9.0 s" in text(applied, "ACC")
+        assert made.drive.raw("ACC") == 90
+        (left,) = applied.left
+        assert (left.old, left.new) == (90, 50)
+        again = await apply_edits(made.session, made.journal, applied.left)
+        assert outcomes(again) == {"ACC": Outcome.DONE}
+        assert made.drive.raw("ACC") == 50
+
+
+async def test_a_scale_that_somebody_else_changes_is_seen() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s")
+        made.drive.set("INR", 0)
+        applied = await apply_edits(made.session, made.journal, edits)
+        assert outcomes(applied) == {"ACC": Outcome.CHANGED}
+        assert "INR was changed" in text(applied, "ACC")
+        assert made.writes() == []
+        (left,) = applied.left
+        assert left.new == 500
+
+
+async def test_what_the_drive_holds_already_is_not_written() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s")
+        made.drive.set("ACC", 50)
+        applied = await apply_edits(made.session, made.journal, edits)
+        assert outcomes(applied) == {"ACC": Outcome.DONE}
+        assert made.writes() == []
+
+
+async def test_stopped_only_is_checked_against_the_state_of_now() -> None:
+    with bench("atv312", run_hz=20.0) as made:
+        applied = await made.apply(FrS="60", ACC="4")
+        assert outcomes(applied) == {"FrS": Outcome.REFUSED, "ACC": Outcome.DONE}
+        assert "motor stopped only" in text(applied, "FrS")
+        assert "FrS" in applied.left
+        made.drive.halt()
+        await rest(made)
+        again = await apply_edits(made.session, made.journal, applied.left)
+        assert outcomes(again) == {"FrS": Outcome.DONE}
+
+
+async def test_unverified_ones_are_written_once_confirmed() -> None:
+    with bench("atv21") as made:
+        edits = await made.stage(F111="Forced local")
+        refused = await apply_edits(made.session, made.journal, edits)
+        assert outcomes(refused) == {"F111": Outcome.REFUSED}
+        assert "unverified" in text(refused, "F111")
+        assert made.writes() == []
+        done = await apply_edits(made.session, made.journal, refused.left, confirmed={"F111"})
+        assert outcomes(done) == {"F111": Outcome.DONE}
+
+
+async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s", DEC="6 s")
+        made.drive.busy = True
+        applied = await apply_edits(made.session, made.journal, edits)
+        assert outcomes(applied) == {"ACC": Outcome.DRIVE_REFUSED, "DEC": Outcome.DRIVE_REFUSED}
+        told = text(applied, "ACC")
+        assert "exception 4, Not completed" in told
+        assert "The drive is ready" in told or "The drive is not ready" in told
+        assert "Check whether the parameter can be written" in told
+        assert {edit.code for edit in applied.left} == {"ACC", "DEC"}
+        assert [e.answer.startswith("Device 1 refused") for e in made.journal.recent] == [
+            True,
+            True,
+        ]
+
+
+async def test_a_protected_parameter_is_not_written_blindly() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s")
+        made.drive.registers.protect([made.profile["ACC"]])
+        applied = await apply_edits(made.session, made.journal, edits)
+        assert outcomes(applied) == {"ACC": Outcome.REFUSED}
+        assert "cannot be read" in text(applied, "ACC")
+        assert made.writes() == []
+
+
+async def test_a_silent_refusal_is_found_by_reading() -> None:
+    with bench("powerdrive") as made:
+        edits = await made.stage(**{"15.07": "5"})
+        made.drive.busy = True
+        applied = await apply_edits(made.session, made.journal, edits)
+        assert outcomes(applied) == {"15.07": Outcome.NOT_TAKEN}
+        assert "refuses by silence" in text(applied, "15.07")
+        assert "15.07" in applied.left
+
+
+async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
+
+        def progress(done: int, of: int, result: Result) -> None:
+            if done == 1:
+                made.simulation.unplug()
+
+        applied = await apply_edits(made.session, made.journal, edits, progress=progress)
+        first, *others = applied.results
+        assert first.outcome is Outcome.DONE
+        assert [result.outcome for result in others] == [Outcome.NOT_SENT] * 2
+        assert applied.stopped
+        assert {edit.code for edit in applied.left} == {r.edit.code for r in others}
+        made.simulation.replug()
+
+
+async def test_lost_replies_do_not_write_twice_nor_forget() -> None:
+    with bench("atv71", faults=FaultRates(lost=0.15)) as made:
+        edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
+        applied = await apply_edits(made.session, made.journal, edits)
+        for result in applied.results:
+            held = made.drive.raw(result.edit.code)
+            assert result.done == (held == result.edit.new), result.text
+        registers = [register for register, _ in made.writes()]
+        assert len(registers) == len(set(registers))
+
+
+async def test_a_read_only_line_writes_nothing() -> None:
+    with bench("atv71", read_only=True) as made:
+        edits = await made.stage(ACC="5 s")
+        with pytest.raises(RequestRefused, match="read-only"):
+            await apply_edits(made.session, made.journal, edits)
+
+
+async def test_nobody_answers_before_anything_was_written() -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s")
+        made.drive.power_off()
+        with pytest.raises(NoAnswer):
+            await apply_edits(made.session, made.journal, edits)
+
+
+# Line settings
+
+
+async def test_an_address_at_once_is_sent_last_and_the_new_place_is_named() -> None:
+    with bench("atv21") as made:
+        applied = await made.apply(F802="7", F803="5", F800="9600")
+        assert [result.edit.code for result in applied.results] == ["F803", "F800", "F802"]
+        assert outcomes(applied)["F802"] is Outcome.SENT
+        assert made.drive.address == 7
+        later, now = applied.links
+        assert (later.code, later.at_once) == ("F800", False)
+        assert ",9600," in later.line
+        assert (now.code, now.at_once, now.device) == ("F802", True, 7)
+        assert "-d 7" in now.text
+        assert applied.after_reset == ("F800",)
+        assert made.drive.raw("F803") == 5
+
+
+async def test_after_a_change_of_the_line_nothing_more_is_sent_to_the_old_place() -> None:
+    with bench("atv71") as made:
+        applied = await made.apply(TBR="9600 bit/s", ADD="5", TTO="5")
+        assert outcomes(applied) == {
+            "TTO": Outcome.DONE, "TBR": Outcome.SENT, "ADD": Outcome.NOT_SENT,
+        }  # fmt: skip
+        assert "ADD" in applied.left
+        assert applied.links[0].code == "TBR"
+        assert made.drive.raw("TBR") == 28
+
+
+# EEPROM and factory settings
+
+
+@pytest.mark.parametrize("family", ["atv31", "atv312", "atv71"])
+async def test_saved_settings_outlast_a_power_off(family: str) -> None:
+    with bench(family) as made:
+        code = next(p.code for p in made.profile.parameters if p.quantity == "acceleration")
+        await made.apply(**{code: "5 s"})
+        made.drive.power_cycle()
+        assert made.drive.raw(code) == 30
+        await made.apply(**{code: "5 s"})
+        assert "saved to EEPROM" in await save_to_eeprom(made.session, made.journal)
+        made.drive.power_cycle()
+        assert made.drive.raw(code) == 50
+        assert made.journal.recent[-1].why == "save to EEPROM"
+
+
+@pytest.mark.parametrize("family", ["atv21", "powerdrive", "proxidrive", "varmeca"])
+async def test_families_without_a_known_order_are_refused_with_words(family: str) -> None:
+    with bench(family) as made:
+        with pytest.raises(MemoryRefused, match=r"nothing is to be saved|keypad"):
+            await save_to_eeprom(made.session, made.journal)
+        with pytest.raises(MemoryRefused, match="keypad"):
+            await factory_reset(made.session, made.journal, confirmed={"CMI"})
+        assert made.writes() == []
+
+
+@pytest.mark.parametrize(("family", "confirmed"), [("atv31", {"CMI"}), ("atv312", set())])
+async def test_factory_settings_come_back(family: str, confirmed: set[str]) -> None:
+    with bench(family, sets={"ACC": 99, "HSP": 400, "SP2": 333}) as made:
+        told = await factory_reset(made.session, made.journal, confirmed=confirmed)
+        assert "recalled in working memory" in told
+        factory = made.profile["SP2"].factory
+        assert (made.drive.raw("ACC"), made.drive.raw("SP2")) == (30, factory)
+        assert made.drive.raw("LAC") == 0
+        made.drive.power_cycle()
+        assert made.drive.raw("ACC") == 99
+
+
+async def test_an_unverified_order_needs_to_be_confirmed() -> None:
+    with bench("atv31") as made:
+        with pytest.raises(MemoryRefused, match="unverified"):
+            await factory_reset(made.session, made.journal)
+        assert made.writes() == []
+
+
+async def test_an_altivar_71_recalls_the_groups_that_were_chosen() -> None:
+    with bench("atv71", sets={"ACC": 99}) as made:
+        with pytest.raises(MemoryRefused, match="FRY selects no group"):
+            await factory_reset(made.session, made.journal)
+        made.drive.set("FRY", 1)
+        await factory_reset(made.session, made.journal)
+        assert made.drive.raw("ACC") == made.profile["ACC"].factory or made.drive.raw("ACC") == 30
+
+
+@pytest.mark.parametrize("family", ["atv312", "atv71"])
+async def test_neither_is_ordered_while_the_motor_runs(family: str) -> None:
+    with bench(family, run_hz=20.0, sets={} if family == "atv312" else {"FRY": 1}) as made:
+        for order in (save_to_eeprom, factory_reset):
+            with pytest.raises(MemoryRefused, match="motor stopped"):
+                await order(made.session, made.journal)
+        assert made.writes() == []
+
+
+async def rest(made: Bench) -> None:
+    end = time.monotonic() + 20
+    while made.drive.motor.frequency:
+        assert time.monotonic() < end, "the motor does not come to rest"
+        await asyncio.sleep(0.05)

@@ -1,0 +1,94 @@
+"""Reading raw values for work that must not stop at one lost reply, with the drive's state."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+
+from tui.bus.errors import ChecksumFault, NoAnswer, WrongReply
+from tui.bus.line import Priority
+from tui.drive.chart import watched_codes
+from tui.drive.schema import StateKind
+
+from .drive_session import DriveSession
+from .drive_state import drive_state
+from .reader import Reader
+from .readings import Reading
+
+TRIES = 3
+"""How often a read is tried when its reply is lost or damaged."""
+LONGEST_REST = 3.0
+"""Seconds that are waited at most for a drive that the line leaves alone for a while."""
+
+
+class OwnReader(Reader):
+    """A reader that tells which parameters the drive said it does not have."""
+
+    def lacks(self, code: str) -> bool:
+        """Whether the drive itself answered that it has no such word."""
+        refused = self._refused.get(code)
+        return refused is not None and refused.absent
+
+
+@dataclass(slots=True)
+class Asker:
+    """Reads of one drive by a reader of its own, so that no other work is disturbed."""
+
+    session: DriveSession
+    priority: Priority = Priority.OPERATOR_READ
+    raws: dict[str, int] = field(default_factory=dict)
+    """Raw values by code as last read."""
+    absent: dict[str, str] = field(default_factory=dict)
+    """Codes that have no value, and what the drive or the line said instead."""
+    lacking: set[str] = field(default_factory=set)
+    """Codes that the drive itself said it does not have."""
+    headline: str = "not known"
+    """The drive's state in words, as last read."""
+    reader: OwnReader = field(init=False)
+
+    def __post_init__(self) -> None:
+        session = self.session
+        self.reader = OwnReader(session.line, session.device, session.profile)
+
+    async def ask(self, codes: Iterable[str]) -> dict[str, Reading]:
+        """Read, again where a reply was lost; raises the line's errors when that does not help."""
+        wanted = list(dict.fromkeys(codes))
+        for tried in range(1, TRIES + 1):
+            try:
+                readings = await self.reader.read(wanted, priority=self.priority)
+            except (NoAnswer, ChecksumFault, WrongReply) as error:
+                if tried == TRIES:
+                    raise
+                # only behind everything else a drive that fell silent is left alone for a while
+                if self.priority >= Priority.POLL and isinstance(error, NoAnswer):
+                    await asyncio.sleep(min(error.retry_in or 0.0, LONGEST_REST))
+            else:
+                self._note(readings)
+                return readings
+        raise AssertionError  # the last try returns or raises
+
+    async def ask_raws(self, codes: Iterable[str]) -> dict[str, int]:
+        """The raw values of those that the drive tells."""
+        readings = await self.ask(codes)
+        return {code: one.raw for code, one in readings.items() if one.raw is not None}
+
+    async def ask_state(self) -> StateKind:
+        """The kind of the drive's state now."""
+        profile = self.session.profile
+        codes = [*watched_codes(profile), profile.data.faults.parameter]
+        state = drive_state(profile, await self.ask(code for code in codes if code))
+        self.headline = state.headline or state.kind
+        return state.kind
+
+    def _note(self, readings: dict[str, Reading]) -> None:
+        self.session.monitor.known.note(readings)
+        for code, reading in readings.items():
+            if reading.raw is None:
+                self.raws.pop(code, None)
+                self.absent[code] = reading.error
+                if self.reader.lacks(code):
+                    self.lacking.add(code)
+            else:
+                self.absent.pop(code, None)
+                self.raws[code] = reading.raw
