@@ -35,6 +35,7 @@ from .screens.actions import ACTIONS, CONNECTION, bindings
 from .screens.confirm import Confirm
 from .screens.connection import ConnectionScreen
 from .screens.help import HelpScreen
+from .screens.in_turn import KeysInTurn
 from .screens.leave import Choice, Leave
 from .screens.panel import Panel
 from .screens.stop_keys import STOP_ALL_ANYWHERE, STOP_ANYWHERE, STOP_OUTSIDE_TEXT, with_stop_keys
@@ -94,6 +95,7 @@ class DrivePanelApp(Panel):
         self._gone = False
         self._settled = leave_running
         """Whether it was decided what becomes of motors that run by an order from here."""
+        self._keys = KeysInTurn(self)
         self._hungry: set[int] = set()
         self._told: StopSummary | None = None
         self._commanders: dict[int, Commander] = {}
@@ -162,8 +164,10 @@ class DrivePanelApp(Panel):
                 self.stopper.stop([session], order)
 
     async def on_event(self, event: Event) -> None:
-        """A key keeps an armed drive armed."""
-        if isinstance(event, Key):
+        """A key keeps an armed drive armed; the next one waits for it."""
+        if isinstance(event, Key) and not event.is_forwarded:
+            if not self._keys.admit(event):
+                return
             for commander in self._commanders.values():
                 commander.touch()
         await super().on_event(event)

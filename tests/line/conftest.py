@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import os
+import shlex
 import subprocess
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
 from tests.conftest import need_peer
 from tests.programs import PATIENCE
+
+from .terminal import Terminal
 
 HERE = Path(__file__).parent
 Peer = Callable[[str, str], str]
@@ -62,3 +66,25 @@ def node(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> str:
         )
     monkeypatch.setenv("NODE_PATH", modules)
     return program
+
+
+@pytest.fixture
+def terminal_with(peer: Peer, tmp_path: Path) -> Iterator[Callable[[list[str]], Terminal]]:
+    """Opens a terminal in which a command runs."""
+    tmux = (peer("tmux", "tmux"), "-S", str(tmp_path / "tmux"), "-f", os.devnull)
+    started: list[Terminal] = []
+
+    def start(command: list[str]) -> Terminal:
+        terminal = Terminal(tmux)
+        started.append(terminal)
+        # what the program said stays readable where it ends at once
+        terminal.run(
+            *("new-session", "-d", "-x", "80", "-y", "24", f"exec {shlex.join(command)}"),
+            *(";", "set-option", "-g", "remain-on-exit", "on"),
+        )
+        return terminal
+
+    yield start
+    for terminal in started:
+        with suppress(subprocess.CalledProcessError):
+            terminal.run("kill-server")

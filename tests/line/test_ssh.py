@@ -26,6 +26,7 @@ from tests.conftest import need_peer
 from tests.programs import PATIENCE, free_port, port_of, simulated, wait_until
 
 from .conftest import Peer
+from .terminal import Terminal, runs
 
 ROOT = Path(__file__).resolve().parents[2]
 STALL = 10.0
@@ -34,43 +35,6 @@ DRIVE_ROW = re.compile(r" +\d+ (\S+)")
 """A drive on Connection: its address and its reference."""
 MORE_REQUESTS = 20
 """Requests that must still come while it stands still."""
-
-
-@dataclass(frozen=True, slots=True)
-class Terminal:
-    """An 80 x 24 terminal in tmux."""
-
-    tmux: tuple[str, ...]
-
-    def run(self, *arguments: str) -> str:
-        """A tmux command on it; what it printed."""
-        done = subprocess.run(
-            [*self.tmux, *arguments],
-            capture_output=True,
-            text=True,
-            timeout=PATIENCE,
-            check=True,
-        )
-        return done.stdout
-
-    def text(self) -> str:
-        """What stands on it."""
-        return self.run("capture-pane", "-p")
-
-    def press(self, *keys: str) -> None:
-        """Press keys, by tmux's names."""
-        self.run("send-keys", *keys)
-
-    def wait_for(self, *words: str) -> None:
-        """Wait until all the words stand on it."""
-        try:
-            wait_until(lambda: all(word in self.text() for word in words), f"{words} on screen")
-        except AssertionError as late:
-            raise AssertionError(f"{late}; the screen:\n{self.text()}") from None
-
-    def client(self) -> int:
-        """Process id of what runs in it: the SSH client."""
-        return int(self.run("display-message", "-p", "#{pane_pid}"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -123,28 +87,6 @@ def ssh_host(peer: Peer, tmp_path: Path) -> Iterator[SshHost]:
         log.close()
 
 
-@pytest.fixture
-def terminal_with(peer: Peer, tmp_path: Path) -> Iterator[Callable[[list[str]], Terminal]]:
-    """Opens a terminal in which a command runs."""
-    tmux = (peer("tmux", "tmux"), "-S", str(tmp_path / "tmux"), "-f", os.devnull)
-    started: list[Terminal] = []
-
-    def start(command: list[str]) -> Terminal:
-        terminal = Terminal(tmux)
-        started.append(terminal)
-        # what the program said stays readable where it ends at once
-        terminal.run(
-            *("new-session", "-d", "-x", "80", "-y", "24", f"exec {shlex.join(command)}"),
-            *(";", "set-option", "-g", "remain-on-exit", "on"),
-        )
-        return terminal
-
-    yield start
-    for terminal in started:
-        with suppress(subprocess.CalledProcessError):
-            terminal.run("kill-server")
-
-
 def panel_over(host: SshHost, tmp_path: Path, *arguments: str) -> list[str]:
     """The command that logs in and starts the panel there, which leaves its process id behind."""
     environment = {
@@ -172,7 +114,7 @@ def test_the_demo_over_ssh(
     terminal.wait_for("Leave the panel?", "device 1 after 3 s")
     terminal.press("q")
     pid = int((tmp_path / "pid").read_text())
-    wait_until(lambda: not _runs(pid), "the panel left on its key")
+    wait_until(lambda: not runs(pid), "the panel left on its key")
 
 
 def test_a_terminal_that_stands_still_does_not_stop_the_polling(
@@ -204,7 +146,7 @@ def test_a_terminal_that_stands_still_does_not_stop_the_polling(
         stale = terminal.text()
         wait_until(lambda: terminal.text() != stale, "the screen goes on after the stall")
         terminal.press("q")
-        wait_until(lambda: not _runs(panel), "the panel left on its key")
+        wait_until(lambda: not runs(panel), "the panel left on its key")
 
 
 class Counter:
@@ -299,12 +241,6 @@ def _written(pid: int) -> int:
 
 def _parent(pid: int) -> int:
     return int(Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[1])
-
-
-def _runs(pid: int) -> bool:
-    with suppress(OSError):
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    return False
 
 
 def _listens(port: int) -> bool:

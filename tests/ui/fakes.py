@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any, ClassVar, cast
 
 from tui.app import DrivePanelApp
@@ -38,6 +39,13 @@ RUNNING = {
 READY = {**RUNNING, "ETA": 0x0231, "RFR": 0, "RFRD": 0, "LCR": 0, "OTR": 0, "OPR": 0, "UOP": 0}
 FAULT = {**READY, "ETA": 0x0218, "LFT": 18}
 ALARM = {**RUNNING, "ETA": 0x06B7, "LRS6": 1 << 11}
+
+CHANNELS = {"CHCF": 1, "FR1": 164, "FR2": 0, "RFC": 0, "CD1": 1, "CD2": 10, "CCS": 98, "FR1B": 0}
+STORED = {
+    "RFP0": 488, "LCP0": 84, "ULP0": 3980, "THP0": 50, "RTP0": 2483,
+    "EP0": 0x0637, "IP0": 0x0812, "CMP0": 0x000F, "CRP0": 0x0015,
+}  # fmt: skip
+FOLDER = Path("/home/pump/.local/state/drivepanel")
 
 
 class StillClock(Clock):
@@ -204,7 +212,7 @@ def session_of(snapshot: Snapshot | None, line: LineState = CONNECTED) -> DriveS
     session = DriveSession.__new__(DriveSession)
     session.line = cast("Line", FakeLine(line))
     session.device, session.profile, session.identity = 2, profile, ATV71
-    session.busy, session.commanded = None, False
+    session.busy, session.commanded_at = None, None
     trend = tuple(
         TrendPoint(NOW - 60 + i / 2, (min(50.0, max(0.0, i - 20) * 0.8), 2.0 + (i % 30) * 0.1))
         for i in range(120)

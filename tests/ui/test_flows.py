@@ -15,6 +15,8 @@ from tui.screens.actions import ACTIONS, EVERYWHERE
 from tui.screens.ask import Ask
 from tui.screens.confirm import Confirm
 from tui.screens.connection import ConnectionScreen
+from tui.screens.control_source import ControlSourceScreen
+from tui.screens.faults import FaultsScreen
 from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
 from tui.screens.monitor import MonitorScreen
@@ -184,7 +186,8 @@ async def test_a_line_and_a_device_on_the_command_line_open_its_monitor() -> Non
 
 
 def test_every_action_has_a_method_and_words() -> None:
-    owners = {"connection": ConnectionScreen, "monitor": MonitorScreen, "frames": FramesScreen}
+    screens = (ConnectionScreen, MonitorScreen, FramesScreen, ControlSourceScreen, FaultsScreen)
+    owners = {(screen.TITLE or "connection").lower(): screen for screen in screens}
     for action in ACTIONS:
         name = f"action_{action.id.partition('(')[0]}"
         for screen in action.screens:

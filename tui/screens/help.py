@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
+from rich.table import Table
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
@@ -45,17 +46,15 @@ class HelpScreen(ModalScreen[None]):
             yield Static(help_text(self._of))
 
 
-def help_text(screen: str) -> Text:
-    """Keys and signs of a screen."""
-    text = Text()
-    text.append(f"Keys on {screen.capitalize()}", TITLE)
-    text.append("   Esc closes\n", FAINT)
+def help_text(screen: str) -> Table:
+    """Keys and signs of a screen, each sentence in a column of its own."""
+    table = Table.grid(padding=(0, 2, 0, 0))
+    head = Text.assemble((f"Keys on {screen.capitalize()}", TITLE), ("   Esc closes", FAINT))
+    table.add_row(Text("", no_wrap=True), head)
     for action in of_screen(screen):
-        text.append(f"  {action.shown:<7}", KEY)
-        text.append(f"{action.help}\n", PLAIN)
-    text.append("\nSigns\n", TITLE)
+        table.add_row(Text(action.shown, KEY, no_wrap=True), Text(action.help, PLAIN))
+    table.add_row("", "")
+    table.add_row("", Text("Signs", TITLE))
     for sign, colour, meaning in SIGNS:
-        text.append(f"  {sign:<7}", STYLES[colour])
-        text.append(f"{meaning}\n", PLAIN)
-    text.rstrip()
-    return text
+        table.add_row(Text(sign, STYLES[colour], no_wrap=True), Text(meaning, PLAIN))
+    return table

@@ -7,8 +7,9 @@ and `outcome` tells what it has come to. A stop needs none of this: see stop.py.
 from __future__ import annotations
 
 import asyncio
+import threading
 import time
-from collections.abc import Awaitable, Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
@@ -34,6 +35,7 @@ from tui.drive.values import from_words
 from .control_source import configure
 from .drive_session import DriveSession
 from .journal import Journal
+from .order_queue import OrderQueue, Work
 from .readings import Reading
 from .reference import Reference, parse_reference, reference_codes
 from .writing import NotTaken, Writer
@@ -75,6 +77,10 @@ class Commander:
         self._ended = ""
         self._wanted: Reference | None = None
         self._written: dict[str, int] = {}
+        self._queue = OrderQueue(session, self._one, self._ended_by_stop)
+        self._lock = threading.Lock()
+        self._steps = Decimal(0)
+        self._stepping = False
 
     # Arming
 
@@ -127,7 +133,16 @@ class Commander:
 
     def step(self, hertz: Decimal) -> None:
         """Raise or lower the reference. Raises OrderRefused when not armed."""
-        self._begin(lambda: self._step(hertz))
+        with self._lock:
+            self._steps += hertz
+            if self._stepping:
+                return
+            self._stepping = True
+        try:
+            self._begin(self._step)
+        except OrderRefused:
+            self._take_steps()
+            raise
 
     def choose_option(self, option: CommandOption, bits: int) -> None:
         """Set an option. Raises OrderRefused when not armed."""
@@ -156,27 +171,32 @@ class Commander:
             return ""
         return f"Reset, switched off or commanded by others: {', '.join(lost)}."
 
-    def _begin(self, work: Callable[[], Awaitable[str]]) -> None:
+    def _begin(self, work: Work) -> None:
+        """Carry out an order behind those before it."""
         if self.armed_for is None:
             raise OrderRefused("Not armed: a arms this drive.")
         self.touch()
-        if self.session.busy is not None:
-            self.session.busy.cancel()
+        self._queue.put(work)
 
-        async def guarded() -> None:
-            try:
-                self._say(Kind.DONE, await work())
-            except Superseded:
-                return
-            except (LineError, DriveError, NotTaken) as error:
-                self._say(Kind.REFUSED, str(error))
-            except asyncio.CancelledError:
-                self._say(Kind.REFUSED, "ended by a newer order or a stop")
-                raise
-            finally:
-                self.session.monitor.refresh()
+    async def _one(self, work: Work) -> None:
+        """One order; where it fails, those behind it are not carried out."""
+        try:
+            self._say(Kind.DONE, await work())
+        except Superseded:
+            return
+        except (LineError, DriveError, NotTaken) as error:
+            rest = " The orders behind it were dropped." if self._queue.drop() else ""
+            self._take_steps()
+            self._say(Kind.REFUSED, f"{error}{rest}")
+        except asyncio.CancelledError:
+            self._ended_by_stop()
+            raise
+        finally:
+            self.session.monitor.refresh()
 
-        self.session.busy = self.session.line.spawn(guarded, f"order {self.session.device}")
+    def _ended_by_stop(self) -> None:
+        self._take_steps()
+        self._say(Kind.REFUSED, "ended by a stop")
 
     def refuse(self, text: str) -> None:
         """Tell why an order was not given."""
@@ -243,7 +263,7 @@ class Commander:
         raw = self._wanted.raw if self._wanted is not None else reading.raw
         if raw is not None:
             await self._writer.write(parameter, raw, why="reference before the run order")
-            self.session.commanded = True
+            self.session.note_command()
 
     async def _walk(self, chart: Chart, run: Order) -> None:
         """From the state now to the running one, each state seen before the next command."""
@@ -276,7 +296,7 @@ class Commander:
         parameter = self.session.profile[chart.command]
         # the state of the drive tells whether it was taken; the word itself is kept on record
         await self._writer.write(parameter, from_words(parameter, [word]), why=why, check=0)
-        self.session.commanded = True
+        self.session.note_command()
         self._written = {parameter.code: word}
         self.session.monitor.also = (parameter.code,)
 
@@ -308,7 +328,14 @@ class Commander:
         readings = await self._read(reference_codes(self.session.profile))
         return await self._give(parse_reference(self.session.profile, text, readings))
 
-    async def _step(self, hertz: Decimal) -> str:
+    def _take_steps(self) -> Decimal:
+        """The steps that were ordered and not yet given."""
+        with self._lock:
+            steps, self._steps, self._stepping = self._steps, Decimal(0), False
+        return steps
+
+    async def _step(self) -> str:
+        hertz = self._take_steps()
         profile = self.session.profile
         readings = await self._read(reference_codes(profile))
         parameter = profile.quantity("command_frequency")
@@ -322,7 +349,7 @@ class Commander:
         await self._writer.write(
             reference.parameter, reference.raw, why="reference", replaceable=True
         )
-        self.session.commanded = True
+        self.session.note_command()
         self._wanted = reference
         rounded = ", rounded to what the drive can hold" if reference.rounded else ""
         return f"Reference {reference.text} ({reference.parameter.code}){rounded}"
@@ -340,7 +367,7 @@ class Commander:
         await self._writer.write(
             parameter, from_words(parameter, [word]), why=option.name, check=option.mask
         )
-        self.session.commanded = True
+        self.session.note_command()
         if parameter.code in self._written:
             self._written[parameter.code] = word
         name = next(choice.name for choice in option.choices if choice.bits == bits)

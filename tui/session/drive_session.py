@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Sequence
 
 from tui.bus.line import Line, Priority, Worker
@@ -29,10 +30,19 @@ class DriveSession:
         self.identity = identity
         self.busy: Worker | None = None
         """The order that is being carried out; a stop ends it."""
-        self.commanded = False
-        """Whether a command or reference was sent to the drive from here."""
+        self.commanded_at: float | None = None
+        """When a command or reference was last sent to the drive from here (monotonic)."""
         self.monitor = Monitor(line, device, profile)
         self._reader = Reader(line, device, profile)
+
+    @property
+    def commanded(self) -> bool:
+        """Whether a command or reference was sent to the drive from here."""
+        return self.commanded_at is not None
+
+    def note_command(self) -> None:
+        """A command or reference was sent."""
+        self.commanded_at = time.monotonic()
 
     @property
     def line_text(self) -> str:

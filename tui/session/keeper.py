@@ -125,17 +125,26 @@ class Keeper:
         return [
             kept.session
             for device, kept in self._kept.items()
-            if kept.session.commanded and self.runs(device)
+            if kept.session.commanded and (self.runs(device) or self._unseen(kept))
         ]
 
     def runs(self, device: int) -> bool:
-        """Whether a motor runs, by its drive's own monitor where that is the newer."""
-        look, monitor = self._looks.get(device), self._kept[device].session.monitor
-        latest = monitor.latest if monitor.running else None
+        """Whether a motor runs, as far as anybody saw it last."""
+        state, _ = self._last_seen(device)
+        return state is not None and state.kind == "running"
+
+    def _unseen(self, kept: _Kept) -> bool:
+        """Whether an order went out that nobody has seen the effect of yet."""
+        ordered = kept.session.commanded_at
+        return ordered is not None and self._last_seen(kept.session.device)[1] <= ordered
+
+    def _last_seen(self, device: int) -> tuple[DriveState | None, float]:
+        """The newest state of a drive, by its own monitor or by a look; and when that was."""
+        look, latest = self._looks.get(device), self._kept[device].session.monitor.latest
         state, seen = (look.state, look.time) if look else (None, 0.0)
         if latest is not None and latest.time > seen and not latest.error:
-            state = latest.state
-        return state is not None and state.kind == "running"
+            return latest.state, latest.time
+        return state, seen
 
     def hungry(self) -> list[Hunger]:
         """Drives that are about to act on their time-out, or have, for want of an answer."""

@@ -69,7 +69,7 @@ def stored_line(profile: Profile, code: str, reading: Reading | None, width: int
     """One stored value; its name without the words that all of them share."""
     parameter = profile[code]
     name = parameter.name
-    for tail in (" before the last fault", " on last fault", " at the last fault"):
+    for tail in (" before the last fault", ", last fault"):
         name = name.removesuffix(tail)
     value = f"{reading.text} {reading.unit}".rstrip() if reading else NOT_AVAILABLE
     text = Text(no_wrap=True)

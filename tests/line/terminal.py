@@ -1,0 +1,54 @@
+"""A terminal of its own for a program: a private tmux."""
+
+from __future__ import annotations
+
+import subprocess
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.programs import PATIENCE, wait_until
+
+
+@dataclass(frozen=True, slots=True)
+class Terminal:
+    """An 80 x 24 terminal in tmux."""
+
+    tmux: tuple[str, ...]
+
+    def run(self, *arguments: str) -> str:
+        """A tmux command on it; what it printed."""
+        done = subprocess.run(
+            [*self.tmux, *arguments],
+            capture_output=True,
+            text=True,
+            timeout=PATIENCE,
+            check=True,
+        )
+        return done.stdout
+
+    def text(self) -> str:
+        """What stands on it."""
+        return self.run("capture-pane", "-p")
+
+    def press(self, *keys: str) -> None:
+        """Press keys, by tmux's names."""
+        self.run("send-keys", *keys)
+
+    def wait_for(self, *words: str) -> None:
+        """Wait until all the words stand on it."""
+        try:
+            wait_until(lambda: all(word in self.text() for word in words), f"{words} on screen")
+        except AssertionError as late:
+            raise AssertionError(f"{late}; the screen:\n{self.text()}") from None
+
+    def client(self) -> int:
+        """Process id of what runs in it: the SSH client."""
+        return int(self.run("display-message", "-p", "#{pane_pid}"))
+
+
+def runs(pid: int) -> bool:
+    """Whether a process is still at work; one that only waits to be noticed is not."""
+    with suppress(OSError):
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    return False

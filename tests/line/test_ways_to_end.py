@@ -1,0 +1,109 @@
+"""Every way in which the panel can end while a motor runs by its order, in a real terminal."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import NamedTuple
+
+import pytest
+
+from tests.programs import wait_until
+from tui.simulator import DriveSpec, Simulation
+
+from .terminal import Terminal, runs
+
+Start = Callable[[list[str]], Terminal]
+
+
+class Running(NamedTuple):
+    """A panel in its terminal, whose motor turns."""
+
+    simulation: Simulation
+    terminal: Terminal
+    pid: int
+
+    @property
+    def speed(self) -> float:
+        return self.simulation.drive(1).motor.frequency
+
+    def ended(self) -> None:
+        wait_until(lambda: not runs(self.pid), "the panel ended")
+
+    def stopped(self) -> None:
+        wait_until(lambda: self.speed == 0, "the motor stopped")
+
+
+@contextmanager
+def running(start: Start, *options: str, family: str = "atv71") -> Iterator[Running]:
+    """The panel on a simulated drive of this process, its motor running by keys."""
+    # the drive's own watch acts after a minute, long after everything that is looked at here
+    simulation = Simulation([DriveSpec(family, 1, sets={"TTO": 300} if family == "atv71" else {})])
+    simulation.start()
+    try:
+        line = f"serial:{simulation.serve_pty()},19200,8N1"
+        terminal = start([sys.executable, "-m", "tui", line, "-d", "1", *options])
+        terminal.wait_for("NOT ARMED", "READY")
+        # all at once: what is typed ahead goes where it was meant to go
+        terminal.press("a", "f", "3", "0", "Enter", "r")
+        wait_until(lambda: simulation.drive(1).motor.frequency > 2, "the motor runs")
+        terminal.wait_for("RUNNING")
+        yield Running(simulation, terminal, terminal.client())
+    finally:
+        simulation.stop()
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
+@pytest.mark.parametrize("family", ["atv71", "atv21"])
+def test_a_signal_stops_the_motor_first(
+    terminal_with: Start, number: signal.Signals, family: str
+) -> None:
+    with running(terminal_with, family=family) as made:
+        os.kill(made.pid, number)
+        made.stopped()
+        assert made.simulation.drive(1).fault is None
+        made.ended()
+
+
+def test_a_terminal_that_is_closed_stops_the_motor_first(terminal_with: Start) -> None:
+    with running(terminal_with) as made:
+        made.terminal.run("kill-session")
+        made.stopped()
+        assert made.simulation.drive(1).fault is None
+        made.ended()
+
+
+def test_leaving_it_running_is_a_choice(terminal_with: Start) -> None:
+    with running(terminal_with, "--on-hangup", "leave-running") as made:
+        os.kill(made.pid, signal.SIGHUP)
+        made.ended()
+        assert made.speed > 2
+
+
+def test_ctrl_c_in_the_terminal_ends_nothing(terminal_with: Start) -> None:
+    with running(terminal_with) as made:
+        made.terminal.press("C-c")
+        made.terminal.wait_for("RUNNING")
+        assert made.speed > 2
+        made.terminal.press("Space")
+        made.stopped()
+
+
+def test_leaving_by_key_asks_and_stops(terminal_with: Start) -> None:
+    with running(terminal_with) as made:
+        made.terminal.press("q")
+        made.terminal.wait_for("A motor runs by your order", "s or Enter")
+        made.terminal.press("s")
+        made.ended()
+        assert made.speed == 0
+
+
+def test_against_a_kill_only_the_drives_own_watch_helps(terminal_with: Start) -> None:
+    with running(terminal_with) as made:
+        made.simulation.drive(1).set("TTO", 10)
+        os.kill(made.pid, signal.SIGKILL)
+        wait_until(lambda: made.simulation.drive(1).fault is not None, "the drive's own time-out")
+        made.stopped()

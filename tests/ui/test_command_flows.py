@@ -1,0 +1,298 @@
+"""Commanding by keys: simulated drives of every family over a real line, the whole panel above."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from typing import NamedTuple
+
+import pytest
+from textual.events import Key
+from textual.pilot import Pilot
+from textual.widgets import Input, OptionList
+
+from tui.app import DrivePanelApp
+from tui.screens.ask import Ask
+from tui.screens.connection import ConnectionScreen
+from tui.screens.control_source import ControlSourceScreen
+from tui.screens.faults import FaultsScreen
+from tui.screens.help import HelpScreen
+from tui.screens.leave import Leave
+from tui.screens.monitor import MonitorScreen
+from tui.screens.options import OptionsScreen
+from tui.session.lines import OpenLine, open_line
+from tui.session.stop import Phase
+from tui.simulator import DriveSpec, Simulation
+from tui.simulator.drive import SimulatedDrive
+
+from .test_flows import shown, until
+
+FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
+
+
+class Bench(NamedTuple):
+    """The panel on one or more drives, the first of them on Monitor."""
+
+    app: DrivePanelApp
+    pilot: Pilot[None]
+    simulation: Simulation
+
+    def drive(self, device: int = 1) -> SimulatedDrive:
+        return self.simulation.drive(device)
+
+    def speed(self, device: int = 1) -> float:
+        return self.drive(device).motor.frequency
+
+    async def message(self, *parts: str) -> None:
+        """Wait until the message of Monitor says all of this."""
+        await until(self.pilot, lambda: all(p in shown(self.app, "message") for p in parts))
+
+    async def armed(self) -> None:
+        await self.pilot.press("a")
+        await until(self.pilot, lambda: "ARMED" in shown(self.app, "status").split("NOT ARMED")[0])
+        await until(self.pilot, lambda: " ARMED" in shown(self.app, "status"))
+
+    async def refer(self, text: str) -> None:
+        await self.pilot.press("f")
+        await until(self.pilot, lambda: isinstance(self.app.screen, Ask))
+        await self.pilot.press(*text, "enter")
+        await self.message("DONE Reference")
+
+    async def running(self) -> None:
+        """Armed, with a reference, running forward."""
+        await self.armed()
+        if self.drive().profile.id.startswith("atv"):
+            await self.refer("30")
+        await self.pilot.press("r")
+        await until(self.pilot, lambda: self.speed() > 2)
+
+    async def commanded(self) -> None:
+        """Wait until it is known that the motor runs by an order from here."""
+        app = self.app
+        await until(self.pilot, lambda: bool(app.keeper and app.keeper.under_command()))
+
+    async def stopped(self, device: int = 1) -> None:
+        await until(self.pilot, lambda: self.speed(device) == 0)
+        stopper = self.app.stopper
+        assert stopper is not None
+        await until(self.pilot, lambda: stopper.reports[device].phase is Phase.STOPPED)
+
+
+@asynccontextmanager
+async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]:
+    """The panel on simulated drives of these families, at the addresses 1, 2, ...
+
+    Of several all are found first, then the first one is watched.
+    """
+    specs = [
+        DriveSpec(family, device, sets={} if family.startswith("atv") else {"6.43": 1})
+        for device, family in enumerate(families, start=1)
+    ]
+    simulation = Simulation(specs)
+    simulation.start()
+    text = f"serial:{simulation.serve_pty()},19200,8N1"
+
+    def opener(_: str, **how: object) -> OpenLine:
+        opened = open_line(text, **how)  # type: ignore[arg-type]
+        opened.devices = tuple(range(1, len(families) + 1))
+        return opened
+
+    app = DrivePanelApp(open_line=opener, start=text, read_only=read_only)
+    try:
+        async with app.run_test(size=(80, 24)) as pilot:
+            await until(pilot, lambda: len(app.connection.found) == len(families))
+            drives = app.connection.query_one("#drives", OptionList)
+            drives.focus()
+            drives.highlighted = 0
+            await pilot.press("enter")
+            await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+            await until(pilot, lambda: "waiting" not in shown(app, "state") and shown(app, "state"))  # type: ignore[arg-type, return-value]
+            yield Bench(app, pilot, simulation)
+            if isinstance(app.screen, Leave):
+                await pilot.press("escape")
+    finally:
+        simulation.stop()
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
+    async with bench(family) as made:
+        await made.running()
+        await until(made.pilot, lambda: "RUNNING" in shown(made.app, "state"))
+        await made.pilot.press("v")
+        await until(made.pilot, lambda: made.speed() < -2)
+        await made.pilot.press("space")
+        await made.stopped()
+        await made.message("STOPPED")
+        code = (
+            next(f.raw for f in made.drive().profile.data.faults.codes if f.raw)
+            if (made.drive().profile.data.faults.codes)
+            else 1
+        )
+        made.drive().provoke(code)
+        await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
+        await made.pilot.press("x")
+        await until(made.pilot, lambda: made.drive().fault is None)
+        await until(made.pilot, lambda: "FAULT" not in shown(made.app, "state"))
+        assert made.speed() == 0
+
+
+async def test_nothing_is_commanded_before_arming() -> None:
+    async with bench("atv71") as made:
+        for key in ("r", "v", "x", "up", "b", "t"):
+            await made.pilot.press(key)
+            await made.message("NOT DONE", "a arms this drive")
+        assert made.drive().raw("CMD") == 0
+        assert made.drive().raw("LFR") == 0
+
+
+async def test_a_read_only_line_is_not_armed() -> None:
+    async with bench("atv71", read_only=True) as made:
+        await made.pilot.press("a")
+        await made.message("NOT DONE", "read-only")
+
+
+async def test_reference_by_steps_and_its_limit() -> None:
+    async with bench("atv71") as made:
+        await made.armed()
+        await made.refer("20")
+        await made.pilot.press("up")
+        await until(made.pilot, lambda: made.drive().raw("LFR") == 210)
+        await made.pilot.press("pagedown")
+        await until(made.pilot, lambda: made.drive().raw("LFR") == 160)
+        await made.pilot.press("f")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+        await made.pilot.press(*"80", "enter")
+        fault = made.app.screen.query_one("#fault")
+        await until(made.pilot, lambda: "80 Hz is above" in str(fault.render()))
+        assert made.drive().raw("LFR") == 160
+
+
+async def test_what_is_typed_ahead_reaches_the_dialog_that_it_was_meant_for() -> None:
+    async with bench("atv71") as made:
+        for key, character in [("a", "a"), ("f", "f"), ("3", "3"), ("0", "0"), ("enter", "\r")]:
+            made.app.post_message(Key(key, character))
+        made.app.post_message(Key("r", "r"))
+        await until(made.pilot, lambda: made.speed() > 2)
+        assert made.drive().raw("LFR") == 300
+
+
+SCREENS = {
+    "help": ("question_mark", HelpScreen),
+    "options": ("o", OptionsScreen),
+    "control source": ("c", ControlSourceScreen),
+    "faults": ("h", FaultsScreen),
+    "reference": ("f", Ask),
+    "leave": ("q", Leave),
+}
+
+
+@pytest.mark.parametrize("screen", SCREENS)
+async def test_stop_works_on_every_screen(screen: str) -> None:
+    key, kind = SCREENS[screen]
+    async with bench("atv71") as made:
+        await made.running()
+        await made.commanded()
+        await made.pilot.press(key)
+        await until(made.pilot, lambda: isinstance(made.app.screen, kind))
+        await made.pilot.press("f12")
+        await made.stopped()
+        assert isinstance(made.app.screen, kind)
+
+
+async def test_space_stops_outside_texts_only() -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        await made.pilot.press("f", *"3 0")
+        field = made.app.screen.query_one(Input)
+        assert field.value == "3 0"
+        assert made.speed() > 2
+        assert not (made.app.stopper and made.app.stopper.reports)
+        await made.pilot.press("escape", "space")
+        await made.stopped()
+
+
+async def test_stop_works_in_the_palette() -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        await made.pilot.press("ctrl+p", *"stop")
+        await made.pilot.press("f12")
+        await made.stopped()
+
+
+async def test_one_key_stops_every_drive() -> None:
+    async with bench("atv71", "atv21", "atv312") as made:
+        for device in (2, 3):
+            made.drive(device).run(30.0)
+        await made.running()
+        await made.pilot.press("f9")
+        assert made.app.stopper is not None
+        await until(made.pilot, lambda: len(made.app.stopper.reports) == 3)  # type: ignore[union-attr]
+        await made.stopped(1)
+
+
+async def test_arming_ends_when_another_drive_is_shown() -> None:
+    async with bench("atv71", "atv21") as made:
+        await made.armed()
+        await made.pilot.press("right_square_bracket")
+        await until(made.pilot, lambda: "device 2" in shown(made.app, "header"))
+        assert "NOT ARMED" in shown(made.app, "status")
+        await made.pilot.press("left_square_bracket")
+        await until(made.pilot, lambda: "device 1" in shown(made.app, "header"))
+        assert "NOT ARMED" in shown(made.app, "status")
+
+
+@pytest.mark.parametrize(("key", "turns"), [("s", False), ("l", True)])
+async def test_leaving_with_a_motor_of_ours(key: str, turns: bool) -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        app = made.app
+        await made.commanded()
+        await made.pilot.press("q")
+        await until(made.pilot, lambda: isinstance(app.screen, Leave))
+        await made.pilot.press("escape")
+        await until(made.pilot, lambda: isinstance(app.screen, MonitorScreen))
+        assert made.speed() > 2
+        await made.pilot.press("q")
+        await until(made.pilot, lambda: isinstance(app.screen, Leave))
+        await made.pilot.press(key)
+        await until(made.pilot, lambda: app._exit, 60)
+        assert (made.speed() != 0) is turns
+
+
+async def test_back_to_connection_asks_nothing_and_keeps_the_drive_fed() -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        await made.pilot.press("escape")
+        await until(made.pilot, lambda: isinstance(made.app.screen, ConnectionScreen))
+        made.drive().raw("ETA")
+        await made.pilot.pause(1.0)
+        assert made.speed() > 2
+        await made.pilot.press("space")
+        await made.stopped()
+
+
+async def test_an_error_of_the_panel_stops_its_motor() -> None:
+    ran = []
+
+    async def breaks() -> None:
+        async with bench("atv71") as made:
+            await made.running()
+            await made.commanded()
+            ran.append(made.simulation)
+            made.app.call_later(broken)
+            await until(made.pilot, lambda: made.app._exception is not None)
+
+    with pytest.raises(RuntimeError, match="upside down"):
+        await breaks()
+    assert ran[0].drive(1).motor.frequency == 0
+
+
+def broken() -> None:
+    """What a screen should never do."""
+    raise RuntimeError("the screen is upside down")

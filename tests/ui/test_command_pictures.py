@@ -1,0 +1,194 @@
+"""Pictures of commanding: armed, ordered, refused, stopping, tripped; and its screens."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from typing import Any, cast
+
+import pytest
+from textual.pilot import Pilot
+
+from tui.drive import library
+from tui.screens.monitor import MonitorScreen
+from tui.session.command import Commander, Kind, Outcome
+from tui.session.fault_record import FaultRecord, Moment, Recorder
+from tui.session.journal import Entry
+from tui.session.keeper import Keeper
+from tui.session.stop import Phase, Stopper, StopReport, StopSummary
+
+from . import fakes
+from .test_pictures import SIZES, WATCH, Compare
+
+
+@dataclass
+class FakeCommander:
+    """A commander in a given state."""
+
+    armed_for: float | None = None
+    outcome: Outcome | None = None
+    why_disarmed: str = ""
+    lost: str = ""
+
+    def lost_orders(self) -> str:
+        """What the drive no longer holds."""
+        return self.lost
+
+    def touch(self) -> None:
+        """The countdown of a picture stands still."""
+
+    def disarm(self) -> None:
+        """The screen closes."""
+
+
+@dataclass
+class FakeStopper:
+    """A stopper with given reports."""
+
+    reports: dict[int, StopReport] = field(default_factory=dict)
+
+    def stop(self, *_: Any) -> None:
+        """Nothing turns."""
+
+    def wait(self, *_: Any) -> StopSummary:
+        """Every motor stands."""
+        return StopSummary([])
+
+
+def stop(phase: Phase, text: str) -> StopReport:
+    return StopReport(2, phase, text, fakes.NOW - 1, fakes.NOW - 1)
+
+
+def outcome(kind: Kind, text: str) -> Outcome:
+    return Outcome(kind, text, fakes.NOW - 0.5)
+
+
+REMOTE = {**fakes.READY, "CCC": 1, "CRC": 1}
+RUNNING = {"raws": fakes.RUNNING}
+STATES: dict[str, tuple[dict[str, Any], FakeCommander, StopReport | None, bool]] = {
+    "armed": ({"raws": fakes.READY}, FakeCommander(57), None, False),
+    "done": (
+        RUNNING,
+        FakeCommander(59, outcome(Kind.DONE, "Run forward: Operation enabled")),
+        None,
+        False,
+    ),
+    "refused": (
+        {"raws": fakes.READY},
+        FakeCommander(
+            41, outcome(Kind.REFUSED, "LFR: 80.0 Hz is above the high speed HSP, 60.0 Hz.")
+        ),
+        None,
+        False,
+    ),
+    "no-effect": ({"raws": REMOTE}, FakeCommander(57), None, False),
+    "stopping": (RUNNING, FakeCommander(57), stop(Phase.STOPPING, "Ramp stop, 31.5 Hz"), False),
+    "not-stopped": (
+        RUNNING,
+        FakeCommander(),
+        stop(Phase.FAILED, "NOT STOPPED: Device 2 did not answer. Stop it at the machine."),
+        False,
+    ),
+    "lost-orders": (
+        {"raws": fakes.READY},
+        FakeCommander(
+            lost="Reset, switched off or commanded by others: CMD 16#000F is now 16#0000."
+        ),
+        None,
+        False,
+    ),
+    "tripped": ({"raws": fakes.FAULT}, FakeCommander(31), None, True),
+}
+
+
+def trip() -> FaultRecord:
+    """A trip after a run of some seconds."""
+    profile = library.load("atv71")
+    codes = ("RFR", "FRH", "RFRD", "LCR", "OTR")
+    headings = tuple(f"{code} {profile[code].unit}" for code in codes)
+    wall = 1_795_259_250.4
+    moments = tuple(
+        Moment(0.0, wall - 0.5 * n, "running forward", (f"{50 - n}.0", "50.0", "1480", "8.4", "72"))
+        for n in range(20, 0, -1)
+    )
+    end = Moment(0.0, wall, "fault ObF", ("0.0", "50.0", "0", "0.0", "0"))
+    entry = Entry(
+        time="2026-11-21T11:07:29.937+00:00", line="", device=2, profile="atv71", code="LFR",
+        address=8502, old_raw=0, old="0.0 Hz", new_raw=500, new="50.0 Hz", answer="ok",
+        read_back=500, why="reference",
+    )  # fmt: skip
+    return FaultRecord(0.0, wall, profile.fault(18), codes, headings, (*moments, end), (entry,))
+
+
+def panel(name: str) -> tuple[Any, MonitorScreen]:
+    """The panel on a drive in that state."""
+    how, commander, report, unseen = STATES[name]
+    session = fakes.session_of(fakes.snapshot_of(library.load("atv71"), **how))
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+    app.keeper = cast("Keeper", fakes.FakeKeeper(WATCH))
+    app.stopper = cast("Stopper", FakeStopper({2: report} if report else {}))
+    app._commanders[2] = cast("Commander", commander)
+    commander.session = session  # type: ignore[attr-defined]
+    app._recorders[2] = Recorder(session, app.journal, trip() if unseen else None, not unseen)
+    return app, MonitorScreen(session)
+
+
+@SIZES
+@pytest.mark.parametrize("state", STATES)
+def test_commanded(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+    app, screen = panel(state)
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(screen)
+        await pilot.pause()
+        screen.look()
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+OVER = {
+    "reference": ("armed", ["f", *"80"]),
+    "options": ("armed", ["o"]),
+    "hand-back": ("armed", ["g"]),
+    "control-source": ("armed", ["c", "down"]),
+    "control-source-sure": ("armed", ["c", "down", "enter"]),
+    "faults": ("tripped", ["h"]),
+    "faults-none": ("armed", ["h"]),
+    "save": ("tripped", ["h", "s"]),
+    "leave-running": ("done", ["q"]),
+}
+
+
+@SIZES
+@pytest.mark.parametrize("screen", OVER)
+def test_screens_of_commanding(
+    snap_compare: Compare,
+    screen: str,
+    size: tuple[int, int],
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    state, keys = OVER[screen]
+    monkeypatch.setenv("TZ", "UTC")
+    time.tzset()
+    app, monitor = panel(state)
+    held = {**fakes.RUNNING, **fakes.CHANNELS, **fakes.STORED}
+
+    async def read(codes: list[str], **_: Any) -> Any:
+        profile = monitor.session.profile
+        return fakes.readings_of(profile, {code: held.get(code, 0) for code in codes}, fakes.NOW)
+
+    monitor.session.read = read  # type: ignore[method-assign, assignment]
+    if screen == "leave-running":
+        app.keeper.under_command = lambda: [monitor.session]
+    monkeypatch.setattr("tui.screens.faults.state_folder", lambda: fakes.FOLDER)
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(monitor)
+        await pilot.pause()
+        await pilot.press(*keys)
+        await pilot.pause()
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
