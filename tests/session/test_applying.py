@@ -10,6 +10,7 @@ import pytest
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import NoAnswer, RequestRefused
 from tui.drive.memory_orders import MemoryRefused
+from tui.session import asking
 from tui.session.applying import Applied, Outcome, Result, apply_edits
 from tui.session.memory import factory_reset, save_to_eeprom
 from tui.simulator import FaultRates
@@ -198,7 +199,10 @@ async def test_a_read_only_line_writes_nothing() -> None:
             await apply_edits(made.session, made.journal, edits)
 
 
-async def test_nobody_answers_before_anything_was_written() -> None:
+async def test_nobody_answers_before_anything_was_written(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(asking, "TRIES", 1)
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.power_off()

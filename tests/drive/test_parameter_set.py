@@ -1,0 +1,257 @@
+"""Parameter sets as text: every parameter there and back, and every fault with its line."""
+
+from __future__ import annotations
+
+import os
+import re
+import stat
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tui.drive import library
+from tui.drive.compare import Side, compare, factory_side, side_of, told
+from tui.drive.errors import UnknownProfile
+from tui.drive.parameter_set import Head, ParameterSet, SetError, dumps
+from tui.drive.profile import Profile
+from tui.drive.schema import Parameter
+from tui.drive.set_file import FileThere, read_set, write_file
+from tui.drive.set_reading import loads
+from tui.drive.values import is_enumeration, raw_range, type_range
+
+FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
+HEAD = Head("atv71", "1.0", "Altivar 71", "2024-05-01T10:00:00+00:00", "serial:/dev/x", 2, "0.1")
+SMALL = {"INR": 1, "ACC": 30, "HSP": 500, "CHCF": 1, "ETA": 0x21, "RFR": -503}
+
+
+def small(**more: int) -> str:
+    return dumps(library.load("atv71"), ParameterSet(HEAD, {**SMALL, **more}))
+
+
+def read(text: str) -> ParameterSet:
+    return loads(text, "set.toml", library.load)
+
+
+@settings(max_examples=25)
+@given(data=st.data())
+def test_every_parameter_of_every_profile_there_and_back(data: st.DataObject) -> None:
+    """Any word that a drive may answer, also one that the profile does not know a name of."""
+    profile = library.load(data.draw(st.sampled_from(FAMILIES)))
+    seed = data.draw(st.randoms(use_true_random=False))
+    raws = {p.code: seed.randint(*type_range(p)) for p in profile.parameters}
+    head = Head(profile.id, "1", 'a "name"\\ with\tall\x7f', "t", "l", 7, "0", {"reference": "ATV"})
+    values = ParameterSet(head, raws)
+    text = dumps(profile, values)
+    back = loads(text, "set.toml", library.load)
+    assert dict(back.raws) == raws
+    assert back.head == head
+    assert dumps(profile, back) == text
+
+
+@settings(max_examples=25)
+@given(data=st.data())
+def test_a_value_without_its_raw_word_is_the_same(data: st.DataObject) -> None:
+    """What a person reads can stand alone, for every value in its range."""
+    profile = library.load(data.draw(st.sampled_from(FAMILIES)))
+    seed = data.draw(st.randoms(use_true_random=False))
+    raws = {p.code: seed.choice(allowed(profile, p)) for p in profile.parameters if not p.unit_by}
+    text = dumps(profile, ParameterSet(Head(profile.id), raws))
+    alone = re.sub(r"raw = -?\d+, ", "", text)
+    assert "raw =" not in alone.replace("# `raw`", "")
+    assert dict(loads(alone, "set.toml", library.load).raws) == raws
+
+
+def allowed(profile: Profile, parameter: Parameter) -> list[int]:
+    """Some raw values that a person may type for a parameter."""
+    names = profile.names(parameter)
+    if is_enumeration(parameter) and names:
+        return sorted(names)
+    low, high = raw_range(parameter)
+    reserved = sum(1 << bit for bit in parameter.reserved)
+    some = [low, high, (low + high) // 2, min(max(0, low), high)]
+    return [raw for raw in some if not raw & reserved] or [0]
+
+
+def test_a_line_a_parameter_in_a_stable_order() -> None:
+    text = small()
+    assert 'ACC = { raw = 30, value = "3.0 s", name = "Acceleration time" }\n' in text
+    assert text == small()
+    other = small(ACC=31)
+    assert sum(a != b for a, b in zip(text.splitlines(), other.splitlines(), strict=True)) == 1
+    places = [text.index(f"\n{code} = ") for code in ("ETA", "RFR", "ACC", "CHCF")]
+    order = [p.code for p in library.load("atv71").parameters]
+    wanted = sorted(("ETA", "RFR", "ACC", "CHCF"), key=order.index)
+    assert [("ETA", "RFR", "ACC", "CHCF")[places.index(p)] for p in sorted(places)] == wanted
+
+
+def test_what_could_not_be_read_is_listed_with_why() -> None:
+    profile = library.load("powerdrive")
+    values = ParameterSet(Head("powerdrive"), {"15.07": 50}, {"15.03": 'no "answer"'})
+    text = dumps(profile, values)
+    assert '"15.07" = { raw = 50, ' in text
+    assert loads(text, "f", library.load).absent == {"15.03": 'no "answer"'}
+
+
+def test_a_value_edited_by_hand_counts_once_raw_is_taken_out() -> None:
+    text = small().replace('raw = 30, value = "3.0 s"', 'value = "4,25 s"')
+    with_scale = text.replace('raw = 1, value = "0.1 s"', 'value = "0.01 s"')
+    assert read(with_scale).raws["ACC"] == 425
+    assert read(with_scale).raws["INR"] == 0
+    assert read(small().replace('raw = 30, value = "3.0 s"', "value = 4.5")).raws["ACC"] == 45
+
+
+FAULTS = [
+    # what is written, what it becomes, the line that counts, what the person is told
+    ('value = "3.0 s"', 'value = "5.0 s"', "ACC", "raw 30 is 3.0 s, and value says 5.0 s"),
+    ("raw = 30", "raw = 300", "ACC", "Which is meant?"),
+    ("raw = 30", "raw = 70000", "ACC", "does not fit uint16"),
+    ("raw = 30", "raw = 3.0", "ACC", "whole number"),
+    ("raw = 30", "raw = true", "ACC", "whole number"),
+    ("raw = 30", "row = 30", "ACC", "'row' is no field"),
+    ('raw = 30, value = "3.0 s"', 'value = "soon"', "ACC", "'soon'"),
+    ('raw = 30, value = "3.0 s", ', "", "ACC", "neither raw nor value"),
+    ('value = "3.0 s"', "value = true", "ACC", "text or a number"),
+    ('value = "3.0 s"', 'value = "3.0 s', "ACC", "no parameter set"),
+    ("format = 1", "format = 9", "[set]", "format 9"),
+    ('profile = "atv71"', "profile = 5", "[set]", "no parameter set"),
+    ("parameters = 6", "parameters = 7", "[set]", "tells of 7 parameters, and 6"),
+]
+
+
+@pytest.mark.parametrize(("right", "wrong", "place", "expected"), FAULTS)
+def test_a_fault_is_told_with_its_line(right: str, wrong: str, place: str, expected: str) -> None:
+    text = small().replace(right, wrong, 1)
+    assert text != small()
+    start = "[set]" if place == "[set]" else f"{place} = "
+    line = next(n for n, row in enumerate(text.splitlines(), 1) if row.startswith(start))
+    with pytest.raises(SetError) as caught:
+        read(text)
+    assert str(caught.value).startswith(f"set.toml:{line}: ")
+    assert expected in str(caught.value)
+
+
+def test_a_parameter_named_twice() -> None:
+    line = next(row for row in small().splitlines() if row.startswith("ACC = "))
+    doubled = small().replace("[end]", f'[parameters."Another"]\n{line}\n\n[end]')
+    with pytest.raises(SetError, match=r"set\.toml:\d+: ACC stands in line \d+ already"):
+        read(doubled)
+
+
+@given(share=st.floats(0, 0.999))
+def test_a_file_that_was_cut_short_is_always_noticed(share: float) -> None:
+    """At any character, also between two lines."""
+    text = small()
+    # without its last line break it is whole yet
+    cut = text[: int((len(text) - 1) * share)]
+    with pytest.raises(SetError):
+        read(cut)
+
+
+@pytest.mark.parametrize("text", ["", "\x00\x01", "a = 1\n", "[profile]\nid = 'atv71'\n", "{}"])
+def test_foreign_files_are_refused(text: str) -> None:
+    with pytest.raises(SetError, match=r"set\.toml:\d+: this is no parameter set"):
+        read(text)
+
+
+def test_a_profile_that_is_not_here() -> None:
+    with pytest.raises(UnknownProfile):
+        read(small().replace('profile = "atv71"', 'profile = "atv99"'))
+
+
+def test_codes_that_the_profile_has_not_are_kept_apart() -> None:
+    text = small().replace("ACC = {", "AXX = {")
+    found = read(text)
+    assert found.unknown == {"AXX": "3.0 s"}
+    assert "AXX" not in found.raws
+
+
+# On disk
+
+
+def test_a_file_is_written_whole_and_read_back(tmp_path: Path) -> None:
+    path = tmp_path / "pump.toml"
+    write_file(path, small())
+    assert read_set(path).raws == SMALL
+    assert [p.name for p in tmp_path.iterdir() if p.is_file()] == ["pump.toml"]
+    if os.name == "posix":
+        fresh = tmp_path / "fresh"
+        fresh.touch()
+        assert stat.S_IMODE(path.stat().st_mode) == stat.S_IMODE(fresh.stat().st_mode)
+
+
+def test_no_file_is_overwritten_unasked(tmp_path: Path) -> None:
+    path = tmp_path / "pump.toml"
+    path.write_text("mine", encoding="utf-8")
+    with pytest.raises(FileThere, match="--force"):
+        write_file(path, small())
+    assert path.read_text(encoding="utf-8") == "mine"
+    write_file(path, small(), force=True)
+    assert read_set(path).raws == SMALL
+    assert [p.name for p in tmp_path.iterdir() if p.is_file()] == ["pump.toml"]
+
+
+def test_a_folder_that_takes_no_file(tmp_path: Path) -> None:
+    with pytest.raises(SetError, match="cannot be written"):
+        write_file(tmp_path / "no" / "pump.toml", small())
+    with pytest.raises(SetError, match="cannot be read"):
+        read_set(tmp_path / "nothing.toml")
+    (tmp_path / "latin").write_bytes(b"\xe9")
+    with pytest.raises(SetError, match="UTF-8"):
+        read_set(tmp_path / "latin")
+
+
+# Comparing
+
+
+def test_differences_leave_measurements_out() -> None:
+    profile = library.load("atv71")
+    a = Side("a", SMALL)
+    b = Side("b", {**SMALL, "ACC": 50, "RFR": 100, "ETA": 0x27, "CMD": 15})
+    assert [(row.code, row.a, row.b) for row in compare(profile, a, b)] == [
+        ("ACC", "3.0 s", "5.0 s")
+    ]
+    every = compare(profile, a, b, all_rows=True)
+    assert {row.code for row in every} == {*SMALL, "CMD"}
+    assert [row.code for row in every if row.differs] == ["ACC"]
+
+
+def test_a_ramp_under_another_scale_is_the_same_ramp() -> None:
+    profile = library.load("atv71")
+    a, b = Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 0, "ACC": 300})
+    assert [row.code for row in compare(profile, a, b)] == ["INR"]
+    c = Side("c", {"INR": 0, "ACC": 30})
+    assert [row.code for row in compare(profile, a, c)] == ["INR", "ACC"]
+
+
+def test_what_one_side_could_not_read_differs_and_what_it_does_not_know_does_not() -> None:
+    profile = library.load("atv71")
+    a = Side("a", SMALL)
+    b = Side("b", {k: v for k, v in SMALL.items() if k != "ACC"}, {"ACC": "refused"})
+    (row,) = compare(profile, a, b)
+    assert (row.code, row.b, row.note) == ("ACC", "-", "refused")
+    bare = Side("c", {k: v for k, v in SMALL.items() if k != "ACC"})
+    assert compare(profile, a, bare) == []
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_factory_settings_differ_from_themselves_in_nothing(family: str) -> None:
+    profile = library.load(family)
+    side = factory_side(profile)
+    assert compare(profile, side, side) == []
+    assert compare(profile, side, side_of("f", ParameterSet(Head(family), side.raws))) == []
+
+
+def test_the_formats() -> None:
+    profile = library.load("atv71")
+    rows = compare(profile, Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 1, "ACC": 50}))
+    labels = ("old.toml", "sim:atv71")
+    text = told(rows, labels, "text")
+    assert re.search(r"^\*  ACC   Acceleration time  3\.0 s     5\.0 s$", text, re.MULTILINE), text
+    markdown = told(rows, labels, "markdown")
+    assert "| yes | ACC | Acceleration time | 3.0 s | 5.0 s |  |" in markdown
+    assert told(rows, labels, "csv").splitlines()[1] == (
+        "ACC,Acceleration time,Settings,3.0 s,5.0 s,30,50,yes,"
+    )
+    assert "No setting differs" in told([], labels, "text")

@@ -1,0 +1,172 @@
+"""Comparing two parameter sets: of files, of a drive, of the factory settings."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from decimal import Decimal
+from typing import Literal
+
+from .parameter_set import ParameterSet, lacking
+from .profile import Profile
+from .schema import Parameter
+from .shown import shown
+from .values import Value
+from .writable import is_setting
+
+Format = Literal["text", "markdown", "csv"]
+NOTHING = "-"
+
+
+@dataclass(frozen=True, slots=True)
+class Side:
+    """One of the two things that are compared."""
+
+    label: str
+    raws: Mapping[str, int]
+    absent: Mapping[str, str] = field(default_factory=dict)
+    """Codes without a value, and why."""
+    texts: Mapping[str, str] = field(default_factory=dict)
+    """What stands for a value that is no number: a factory setting that depends on the rating."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One parameter on both sides."""
+
+    code: str
+    name: str
+    group: str
+    a: str
+    b: str
+    a_raw: int | None
+    b_raw: int | None
+    differs: bool
+    note: str = ""
+
+
+def side_of(label: str, values: ParameterSet) -> Side:
+    """A parameter set as a side."""
+    return Side(label, values.raws, values.absent)
+
+
+def factory_side(profile: Profile) -> Side:
+    """The factory settings of a profile as a side."""
+    return Side(
+        "factory",
+        {p.code: p.factory for p in profile.parameters if p.factory is not None},
+        texts={p.code: p.factory_text for p in profile.parameters if p.factory_text},
+    )
+
+
+def compare(profile: Profile, a: Side, b: Side, *, all_rows: bool = False) -> list[Row]:
+    """Differences of the settings in the profile's order; every parameter with `all_rows`.
+
+    Measurements, orders and counters never differ: they are no settings. A factory setting that
+    is not known differs from nothing.
+    """
+    rows = [
+        _row(profile, parameter, a, b)
+        for parameter in profile.parameters
+        if any(parameter.code in known for side in (a, b) for known in (side.raws, side.absent))
+    ]
+    return [row for row in rows if row.differs or all_rows]
+
+
+def _row(profile: Profile, parameter: Parameter, a: Side, b: Side) -> Row:
+    code = parameter.code
+    values = [_value(profile, parameter, side) for side in (a, b)]
+    texts = [_text(parameter, side, value) for side, value in zip((a, b), values, strict=True)]
+    setting = is_setting(profile, parameter)
+    note = "" if setting else "no setting"
+    if setting and values.count(None) == 1:
+        bare = a if values[0] is None else b
+        known = code in bare.absent
+        note = bare.absent.get(code, "") if known else _missing(bare)
+        differs = known
+    else:
+        differs = setting and not _same(*values)
+    return Row(
+        code, parameter.name, parameter.group, texts[0], texts[1],
+        a.raws.get(code), b.raws.get(code), differs, note,
+    )  # fmt: skip
+
+
+def _missing(side: Side) -> str:
+    return "factory setting not known" if side.texts or side.label == "factory" else "not in it"
+
+
+def _value(profile: Profile, parameter: Parameter, side: Side) -> Value | None:
+    raw = side.raws.get(parameter.code)
+    if raw is None:
+        return None
+    return shown(profile, parameter, raw, side.raws, lacking(profile, side.raws))
+
+
+def _text(parameter: Parameter, side: Side, value: Value | None) -> str:
+    if value is not None:
+        return value.display
+    return side.texts.get(parameter.code) or NOTHING
+
+
+def _same(a: Value | None, b: Value | None) -> bool:
+    """Whether two values mean the same: 3.0 s is 3.00 s, whatever the words are."""
+    if a is None or b is None:
+        return a is b
+    if a.number is not None and b.number is not None and a.unit == b.unit:
+        return _plain(a.number) == _plain(b.number)
+    return (a.raw, a.text, a.unit) == (b.raw, b.text, b.unit)
+
+
+def _plain(number: Decimal) -> Decimal:
+    return number.normalize()
+
+
+# As text
+
+
+def told(rows: Sequence[Row], labels: tuple[str, str], format_: Format) -> str:
+    """The rows as aligned text, as a Markdown table, or as CSV with raw values."""
+    if format_ == "csv":
+        return _csv(rows, labels)
+    return _markdown(rows, labels) if format_ == "markdown" else _plain_text(rows, labels)
+
+
+def _plain_text(rows: Sequence[Row], labels: tuple[str, str]) -> str:
+    if not rows:
+        return f"No setting differs between {labels[0]} and {labels[1]}.\n"
+    table = [("", "Code", "Name", *labels, ""), *(_cells(row) for row in rows)]
+    widths = [max(len(cells[column]) for cells in table) for column in range(6)]
+    lines = (
+        "  ".join(cell.ljust(width) for cell, width in zip(cells, widths, strict=True)).rstrip()
+        for cells in table
+    )
+    return "\n".join(lines) + "\n"
+
+
+def _cells(row: Row) -> tuple[str, str, str, str, str, str]:
+    return ("*" if row.differs else "", row.code, row.name, row.a, row.b, row.note)
+
+
+def _markdown(rows: Sequence[Row], labels: tuple[str, str]) -> str:
+    head = ("differs", "code", "name", *labels, "remark")
+    lines = [_bar(head), "|" + "---|" * len(head)]
+    lines += [_bar(("yes" if row.differs else "", *_cells(row)[1:])) for row in rows]
+    return "\n".join(lines) + "\n"
+
+
+def _bar(cells: Iterable[str]) -> str:
+    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def _csv(rows: Sequence[Row], labels: tuple[str, str]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["code", "name", "group", *labels, "raw a", "raw b", "differs", "remark"])
+    for row in rows:
+        raws = ("" if raw is None else raw for raw in (row.a_raw, row.b_raw))
+        differs = "yes" if row.differs else "no"
+        writer.writerow([row.code, row.name, row.group, row.a, row.b, *raws, differs, row.note])
+    return text.getvalue()

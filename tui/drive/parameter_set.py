@@ -1,0 +1,129 @@
+"""A parameter set as text: one line a parameter, in the order of the profile, made for a diff.
+
+It is TOML. A person may edit the `value` of a line by hand after taking its `raw` out; with
+both in a line they must agree. Header and end tell how many parameters there are, so that a
+file that was cut short is noticed.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+
+from .errors import DriveError
+from .profile import Profile
+from .schema import Parameter
+from .shown import scale_sources, shown
+
+FORMAT = 1
+HEADER = "set"
+END = "end"
+ABSENT = "absent"
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+
+
+class SetError(DriveError):
+    """A parameter set cannot be used; the text names the file, the line and the fault."""
+
+
+@dataclass(frozen=True, slots=True)
+class Head:
+    """Where a parameter set comes from."""
+
+    profile: str
+    profile_version: str = ""
+    family: str = ""
+    time: str = ""
+    """Local time with its zone, ISO 8601."""
+    line: str = ""
+    device: int = 0
+    panel: str = ""
+    """Version of the panel that wrote it."""
+    identity: Mapping[str, str] = field(default_factory=dict)
+    """What the drive said of itself: vendor, reference, version, name."""
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """Raw values of one drive by code, with what could not be read."""
+
+    head: Head
+    raws: Mapping[str, int]
+    absent: Mapping[str, str] = field(default_factory=dict)
+    """Codes without a value, and why."""
+    unknown: Mapping[str, str] = field(default_factory=dict)
+    """Codes in the file that the profile does not have, with their values as written."""
+    lines: Mapping[str, int] = field(default_factory=dict)
+    """Where each code stands in its file."""
+
+
+def dumps(profile: Profile, values: ParameterSet) -> str:
+    """The text of a parameter set; the same values give the same text but for time and line."""
+    head = values.head
+    known = [p for p in profile.parameters if p.code in values.raws]
+    lines = [
+        "# Parameter set of a drive. To change a value by hand, write it into `value` and take",
+        "# `raw` out of that line; to leave a parameter as it is in the drive, delete its line",
+        "# and correct `parameters` at the top and at the end.",
+        "",
+        f"[{HEADER}]",
+        f"format = {FORMAT}",
+        *(f"{key} = {_text(text)}" for key, text in _head_texts(head)),
+        f"device = {head.device}",
+        f"parameters = {len(known)}",
+    ]
+    if head.identity:
+        lines += ["", "[identity]"]
+        lines += [f"{_key(key)} = {_text(text)}" for key, text in sorted(head.identity.items())]
+    for group in profile.groups:
+        members = [p for p in known if p.group == group]
+        if members:
+            lines += ["", f"[parameters.{_key(group)}]"]
+            lines += [_line(profile, p, values) for p in members]
+    if values.absent:
+        lines += ["", f"[{ABSENT}]"]
+        order = [p.code for p in profile.parameters if p.code in values.absent]
+        lines += [f"{_key(code)} = {_text(values.absent[code])}" for code in order]
+    return "\n".join([*lines, "", f"[{END}]", f"parameters = {len(known)}", ""])
+
+
+def _head_texts(head: Head) -> list[tuple[str, str]]:
+    return [
+        ("panel", head.panel),
+        ("profile", head.profile),
+        ("profile_version", head.profile_version),
+        ("family", head.family),
+        ("time", head.time),
+        ("line", head.line),
+    ]
+
+
+def _line(profile: Profile, parameter: Parameter, values: ParameterSet) -> str:
+    raw = values.raws[parameter.code]
+    value = shown(profile, parameter, raw, values.raws, lacking(profile, values.raws)).display
+    return (
+        f"{_key(parameter.code)} = {{ raw = {raw}, value = {_text(value)},"
+        f" name = {_text(parameter.name)} }}"
+    )
+
+
+def lacking(profile: Profile, raws: Mapping[str, int]) -> frozenset[str]:
+    """Scale sources without a value: the drive does not have them, as far as a set can tell."""
+    return frozenset(code for code in scale_sources(profile) if code not in raws)
+
+
+def _key(text: str) -> str:
+    return text if _BARE.fullmatch(text) else _text(text)
+
+
+def _text(text: str) -> str:
+    """A basic string of TOML: JSON's, with the one character more that TOML wants escaped."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def without(values: ParameterSet, codes: Collection[str]) -> ParameterSet:
+    """The same set without some parameters."""
+    kept = {code: raw for code, raw in values.raws.items() if code not in codes}
+    return ParameterSet(values.head, kept, values.absent, values.unknown, values.lines)

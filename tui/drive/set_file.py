@@ -1,0 +1,79 @@
+"""Parameter sets on disk: written whole or not at all, never over another file unasked."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from . import library
+from .parameter_set import ParameterSet, SetError
+from .set_reading import loads
+
+
+class FileThere(SetError):
+    """A file of this name exists and was not to be overwritten."""
+
+
+def read_set(path: Path) -> ParameterSet:
+    """The parameter set in a file; raises SetError, UnknownProfile and ProfileError."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        raise SetError(f"{path}: cannot be read: {error.strerror or error}.") from error
+    except UnicodeDecodeError as error:
+        raise SetError(
+            f"{path}: byte {error.start} is not UTF-8 text: no parameter set."
+        ) from error
+    return loads(text, str(path), library.load)
+
+
+def write_file(path: Path, text: str, *, force: bool = False) -> None:
+    """Write a text to a file so that it is there whole, on the disk, or as it was before.
+
+    Raises FileThere where the file exists and `force` is not given, SetError where the folder
+    does not take it.
+    """
+    if not force and path.exists():
+        raise FileThere(f"{path} is there already. Use another name, or --force to replace it.")
+    part = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        with part.open("x", encoding="utf-8", newline="\n") as file:
+            file.write(text)
+            file.flush()
+            os.fsync(file.fileno())
+        _put(part, path, force=force)
+        _sync_folder(path.parent)
+    except OSError as error:
+        raise SetError(f"{path}: cannot be written: {error.strerror or error}.") from error
+    finally:
+        with suppress(OSError):
+            part.unlink()
+
+
+def _put(part: Path, path: Path, *, force: bool) -> None:
+    """Give the file its name; without `force` in one step with seeing that it is free."""
+    if force:
+        part.replace(path)
+        return
+    try:
+        os.link(part, path)
+    except FileExistsError as error:
+        raise FileThere(
+            f"{path} is there already. Use another name, or --force to replace it."
+        ) from error
+    except (OSError, NotImplementedError):
+        # a file system without links; the name was free when it was looked at
+        part.replace(path)
+
+
+def _sync_folder(folder: Path) -> None:
+    """Make the name last, where the system can do that."""
+    if os.name != "posix":
+        return
+    with suppress(OSError):
+        handle = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
