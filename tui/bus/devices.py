@@ -27,8 +27,10 @@ QUIET_SHARE = 0.3
 """Longest that the whole line keeps quiet for one late device, as a share of the time-out."""
 FORGET = 0.99
 """What is left of the worst lateness after each reply in time."""
-CALM = 200
+CALM = 50
 """Exchanges without a surplus reply after which a device is trusted again."""
+CALM_SECONDS = 30.0
+"""The same in time, where there are few exchanges."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +61,8 @@ class Device:
     settle: float = 0.0
     """Quiet time after each reply of a device that repeats its replies later."""
     calm: int = 0
+    repeated: float = 0.0
+    """When a reply last came twice."""
     heard: float | None = None
     last: Expectation | None = None
     last_time: float = 0.0
@@ -165,7 +169,7 @@ class Devices:
         record.lateness *= FORGET
         if record.settle and self._mistakable:
             record.calm += 1
-            if record.calm > CALM:
+            if record.calm > CALM or now - record.repeated > CALM_SECONDS:
                 record.settle = 0.0
             else:
                 late = Outstanding(expectation, now, now, now + record.settle)
@@ -205,6 +209,8 @@ class Devices:
                 record.outstanding.remove(late)
                 record.lateness = max(record.lateness, now - late.due)
                 record.answers = record.ever_answered = True
+                # should it come once more, it is known
+                record.last, record.last_time = late.expectation, now
                 # the next time-out allows for it
                 _remember(record, late.expectation.function, now - late.sent)
                 return True
@@ -212,7 +218,7 @@ class Devices:
             # the reply before came twice: from now on wait as long before asking the same again
             after = min(LATE_MARGIN * (now - record.last_time), self._timing.late_reply)
             record.settle = max(record.settle, after)
-            record.calm = 0
+            record.calm, record.repeated = 0, now
             again = Outstanding(record.last, record.last_time, now, now + record.settle)
             record.outstanding.append(again)
             return True

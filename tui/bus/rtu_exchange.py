@@ -90,6 +90,12 @@ class RtuExchange:
             return self._answered(match)
         return None
 
+    def pass_over(self, verdict: Verdict) -> Verdict | None:
+        """The reply just found cannot be that of this request; the next one, if it is there."""
+        assert self._expectation is not None
+        self._skipped_to = self.buffer.find(verdict.pdu, self._skipped_to) + len(verdict.pdu) + 2
+        return self.feed(b"")
+
     def _find(self, expectation: Expectation) -> Match | None:
         start = max(self._after_echo(), self._skipped_to)
         return find_reply(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from collections import deque
 from collections.abc import Callable
 
 from .errors import LineLost
@@ -16,6 +17,10 @@ BABBLE = 1.0
 """Seconds to wait for silence on a line that never falls silent, before sending all the same."""
 LEAD = 0.0004
 """Seconds before the end of the silence at which the next request is chosen and made ready."""
+TOLERANCE = 0.001
+"""Seconds by which the end of a request is uncertain."""
+REMEMBERED, JUDGED, SELDOM = 64, 8, 0.15
+"""Replies looked back at; how many are enough; the share of early ones on a line with a baud."""
 IDLE_LIMIT = 4096
 """Bytes kept of what comes in while nothing is due."""
 
@@ -48,6 +53,8 @@ class RtuMaster:
         self._timer: asyncio.TimerHandle | None = None
         self._sent = 0.0
         self._idle = bytearray()
+        self._early: deque[bool] = deque(maxlen=REMEMBERED)
+        """Of the last replies, whether each began before its request was over."""
         transport.start(self)
 
     def close(self) -> None:
@@ -65,11 +72,26 @@ class RtuMaster:
             self._start_timer(self._gap, self._sort_idle)
             return
         verdict = self._exchange.feed(data)
+        while verdict is not None and self._came_too_early(verdict, time):
+            verdict = self._exchange.pass_over(verdict)
         if verdict is not None:
             settle(self._done, verdict)
         elif self._exchange.expected:
             # the echo of a long request may come in lumps while it is still being sent
             self._start_timer(max(time, self._sent) + self._gap - time, self._fell_silent)
+
+    def _came_too_early(self, verdict: Verdict, time: float) -> bool:
+        """Whether a reply began before its request was over: then it is that of another one.
+
+        Only where the line is known to keep the time of its baud: a pseudo-terminal does not.
+        """
+        if verdict.kind not in (Kind.REPLY, Kind.EXCEPTION):
+            return False
+        begun = time - (len(verdict.pdu) + 3) * self._character
+        early = begun < self._sent - TOLERANCE
+        self._early.append(early)
+        seldom = sum(self._early) <= len(self._early) * SELDOM
+        return early and seldom and len(self._early) >= JUDGED
 
     def lost(self, reason: str) -> None:
         """The port went away: whoever waits is told at once."""
