@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 
-from tui.bus.line import Line
-from tui.bus.link import SerialLink
+from tui.bus.line import Line, LineStatus
+from tui.bus.link import RtuTcpLink, SerialLink
 from tui.drive import library
 from tui.drive.edits import Edits
 from tui.drive.profile import Profile
@@ -55,19 +56,43 @@ class Bench:
         sent = [f.data for f in line.trace if f.direction == "out" and f.data[1] == 6]
         return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
 
+    def lose_line(self) -> None:
+        """Pull the plug, and see that the line knows it."""
+        self.simulation.unplug()
+        self._until(LineStatus.LOST)
+
+    def regain_line(self) -> None:
+        """Put the plug back, and wait for the line."""
+        self.simulation.replug()
+        self._until(LineStatus.CONNECTED)
+
+    def _until(self, status: LineStatus) -> None:
+        end = time.monotonic() + 20
+        while self.session.line.state.status is not status:
+            assert time.monotonic() < end, f"the line does not become {status}"
+            time.sleep(0.02)
+
 
 SOURCES = {"ramp_increment", "high_speed", "low_speed", "max_frequency"}
 
 
 @contextmanager
 def bench(
-    family: str, *, read_only: bool = False, faults: FaultRates | None = None, **spec: object
+    family: str,
+    *,
+    read_only: bool = False,
+    faults: FaultRates | None = None,
+    tcp: bool = False,
+    **spec: object,
 ) -> Iterator[Bench]:
-    """A simulated drive behind a pseudo-terminal."""
+    """A simulated drive behind a pseudo-terminal, or over TCP where the line is to come back."""
     drive = DriveSpec(family, 1, **spec)  # type: ignore[arg-type]
     simulation = Simulation([drive], faults=faults, seed=3)
     simulation.start()
-    line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
+    if tcp:
+        line = Line(RtuTcpLink(*simulation.serve_rtu_tcp()), read_only=read_only)
+    else:
+        line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
     journal = Journal()
     try:
         line.open(wait=5.0)

@@ -139,7 +139,7 @@ class _Work:
         for low, high in limit_pairs(self.session.profile):
             if {low, high} & codes:
                 codes |= {low, high}
-        await self.asker.ask(self._with_sources(sorted(codes)))
+        await self.asker.ask_many(self._with_sources(codes))
 
     def _with_sources(self, codes: Iterable[str]) -> list[str]:
         found = list(codes)

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from tui.bus.errors import ChecksumFault, NoAnswer, WrongReply
 from tui.bus.line import Priority
 from tui.drive.chart import watched_codes
+from tui.drive.profile import Profile
 from tui.drive.schema import StateKind
 
 from .drive_session import DriveSession
@@ -20,6 +21,24 @@ TRIES = 3
 """How often a read is tried when its reply is lost or damaged."""
 LONGEST_REST = 3.0
 """Seconds that are waited at most for a drive that the line leaves alone for a while."""
+
+
+LARGEST = 60
+"""How many parameters are planned at once: planning more would hold up the line's loop."""
+
+
+def neighbours(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
+    """The codes by address, parted where no read could go over the gap, and where they get many."""
+    function = profile.function(3)
+    longest = (function.max_read if function else None) or 1
+    parts: list[list[str]] = []
+    last = -1
+    for parameter in sorted((profile[code] for code in codes), key=lambda p: p.address):
+        if not parts or parameter.address - last > longest or len(parts[-1]) >= LARGEST:
+            parts.append([])
+        parts[-1].append(parameter.code)
+        last = parameter.address
+    return parts
 
 
 class OwnReader(Reader):
@@ -67,6 +86,13 @@ class Asker:
                 self._note(readings)
                 return readings
         raise AssertionError  # the last try returns or raises
+
+    async def ask_many(self, codes: Iterable[str]) -> dict[str, int]:
+        """The raw values of any number of parameters, planned a part at a time."""
+        found: dict[str, int] = {}
+        for part in neighbours(self.session.profile, dict.fromkeys(codes)):
+            found |= await self.ask_raws(part)
+        return found
 
     async def ask_raws(self, codes: Iterable[str]) -> dict[str, int]:
         """The raw values of those that the drive tells."""

@@ -140,7 +140,7 @@ async def _told(session: DriveSession, asker: Asker) -> str:
         for p in profile.parameters
         if p.factory is not None and is_setting(profile, p) and not line_setting(profile, p.code)
     }
-    held = await asker.ask_raws(wanted)
+    held = await asker.ask_many(wanted)
     other = [code for code, raw in held.items() if raw != wanted[code]]
     text = f"{profile.name}: the factory settings are recalled in working memory"
     if not other:
