@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -45,29 +45,12 @@ def complain(text: str) -> None:
         click.echo(f"drivepanel: {text}", err=True)
 
 
-class TellingCommander(Commander):
-    """A commander that keeps the error behind a refusal: it decides the exit status."""
-
-    error: Exception | None = None
-
-    def _begin(self, work: Callable[[], Awaitable[str]]) -> None:
-        async def noted() -> str:
-            self.error = None
-            try:
-                return await work()
-            except Exception as error:
-                self.error = error
-                raise
-
-        super()._begin(noted)
-
-
 @dataclass(frozen=True, slots=True)
 class Desk:
     """One drive with all that commands it and looks after it."""
 
     session: DriveSession
-    commander: TellingCommander
+    commander: Commander
     stopper: Stopper
     keeper: Keeper
     journal: Journal
@@ -101,7 +84,7 @@ async def desk_of(opened: OpenLine, target: Target) -> AsyncIterator[Desk]:
     journal, keeper = Journal(), Keeper(opened.line)
     desk = Desk(
         session,
-        TellingCommander(session, journal),
+        Commander(session, journal),
         Stopper(opened.line, journal),
         keeper,
         journal,
@@ -127,7 +110,7 @@ async def _first_look(session: DriveSession) -> None:
         await asyncio.sleep(LOOK)
 
 
-async def carried_out(commander: TellingCommander, give: Callable[[], None]) -> Outcome:
+async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome:
     """Give an order and wait for what becomes of it.
 
     Raises OrderRefused where it is not even begun; Failure where it is refused, with the status
@@ -140,7 +123,7 @@ async def carried_out(commander: TellingCommander, give: Callable[[], None]) -> 
     if outcome is None:
         raise Failure("The order was not sent: a newer one took its place.", REFUSED_HERE)
     if outcome.kind is Kind.REFUSED:
-        raise Failure(outcome.text, _status(commander.error))
+        raise Failure(outcome.text, _status(outcome.error))
     return outcome
 
 

@@ -64,6 +64,8 @@ class Outcome:
     kind: Kind
     text: str
     time: float
+    error: Exception | None = None
+    """What was refused, and by whom."""
 
 
 class Commander:
@@ -187,7 +189,7 @@ class Commander:
         except (LineError, DriveError, NotTaken) as error:
             rest = " The orders behind it were dropped." if self._queue.drop() else ""
             self._take_steps()
-            self._say(Kind.REFUSED, f"{error}{rest}")
+            self._say(Kind.REFUSED, f"{error}{rest}", error)
         except asyncio.CancelledError:
             self._ended_by_stop()
             raise
@@ -202,8 +204,8 @@ class Commander:
         """Tell why an order was not given."""
         self._say(Kind.REFUSED, text)
 
-    def _say(self, kind: Kind, text: str) -> None:
-        self.outcome = Outcome(kind, text, time.monotonic())
+    def _say(self, kind: Kind, text: str, error: Exception | None = None) -> None:
+        self.outcome = Outcome(kind, text, time.monotonic(), error)
 
     async def _carry_out(self, id: OrderId) -> str:
         chart = await self._chart()
