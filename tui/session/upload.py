@@ -10,6 +10,7 @@ import tui
 from tui.bus.line import Priority
 from tui.drive.parameter_set import Head, ParameterSet
 from tui.drive.profile import Profile
+from tui.drive.restore_plan import rating_codes
 from tui.drive.shown import scale_sources
 from tui.drive.writable import is_setting
 
@@ -32,19 +33,6 @@ def setting_codes(profile: Profile) -> list[str]:
         p.code
         for p in profile.parameters
         if p.access != "w" and (is_setting(profile, p) or p.code in wanted)
-    ]
-
-
-def rating_codes(profile: Profile) -> list[str]:
-    """Codes that tell the drive's model or rating."""
-    current = profile.quantity("drive_current")
-    return [
-        code
-        for code in (
-            profile.data.identification.model_parameter,
-            current.code if current and current.access == "r" else "",
-        )
-        if code
     ]
 
 

@@ -1,0 +1,337 @@
+"""What restoring a parameter set to a drive would write, and why it leaves the rest; pure."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from .edits import Edit, Edits, problems
+from .errors import ValueRefused
+from .parameter_set import ParameterSet, lacking
+from .profile import Profile, is_verified
+from .schema import Parameter, Quantity
+from .shown import number_of, scale_sources, shown
+from .writable import CUTTING, is_setting, line_setting, needs_standstill
+
+Kind = Literal["write", "equal", "skip"]
+Reason = Literal[
+    "",
+    "no setting",
+    "forbidden",
+    "unverified",
+    "line",
+    "rating",
+    "range",
+    "absent",
+    "unknown",
+    "no counterpart",
+]
+
+RATED: frozenset[Quantity] = frozenset(
+    {
+        "rated_frequency",
+        "rated_voltage",
+        "rated_current",
+        "rated_speed",
+        "motor_poles",
+        "thermal_current",
+        "switching_frequency",
+    }
+)
+"""Quantities that belong to one rating of drive and motor."""
+ACROSS: tuple[Quantity, ...] = (
+    "acceleration",
+    "deceleration",
+    "acceleration_2",
+    "deceleration_2",
+    "max_frequency",
+    "high_speed",
+    "low_speed",
+    "rated_frequency",
+    "rated_voltage",
+    "rated_current",
+    "rated_speed",
+    "motor_poles",
+    "thermal_current",
+    "switching_frequency",
+    "preset_speed_1",
+    "preset_speed_2",
+    "preset_speed_3",
+    "preset_speed_4",
+    "preset_speed_5",
+    "preset_speed_6",
+    "preset_speed_7",
+)
+"""Quantities that mean the same on every family and can be carried from one to another."""
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a person wants beyond the plain restoring."""
+
+    line_settings: bool = False
+    """Write address, baud and format too, which may cut this very line."""
+    rating: bool = False
+    """Write motor and rating data to a drive of another rating too."""
+    confirmed: frozenset[str] = frozenset()
+    """Codes of unverified parameters that the user has confirmed."""
+
+
+PLAIN = Options()
+
+
+@dataclass(frozen=True, slots=True)
+class Held:
+    """The drive as it is now."""
+
+    raws: Mapping[str, int]
+    absent: Mapping[str, str] = field(default_factory=dict)
+    """Codes that cannot be read, and why."""
+    lacking: Collection[str] = ()
+    """Codes that the drive said it does not have."""
+    reference: str = ""
+    """What the drive calls itself; empty where that is not known."""
+
+
+@dataclass(frozen=True, slots=True)
+class Item:
+    """One parameter of the set with what becomes of it."""
+
+    code: str
+    kind: Kind
+    reason: Reason = ""
+    text: str = ""
+    """Why it is left out, or what is to be known of it."""
+    old: str = ""
+    new: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class RestorePlan:
+    """What would be written, in `edits`, and every item with its reason."""
+
+    items: tuple[Item, ...]
+    edits: Edits
+    same_rating: bool | None
+    """None where one side does not tell its model."""
+    needs_stop: bool
+    """Whether some of it is written with the motor stopped only."""
+    across: bool
+    """Whether the set is of another family: only common quantities are carried over."""
+
+    def of_kind(self, kind: Kind) -> list[Item]:
+        """The items of one kind."""
+        return [item for item in self.items if item.kind == kind]
+
+    def count(self, kind: Kind) -> int:
+        """How many items are of one kind; what is no setting does not count."""
+        return sum(1 for item in self.of_kind(kind) if item.reason != "no setting")
+
+
+def rating_codes(profile: Profile) -> list[str]:
+    """Codes of read-only words that tell the drive's model or rating."""
+    current = profile.quantity("drive_current")
+    own = current.code if current is not None and current.access == "r" else ""
+    return [code for code in (profile.data.identification.model_parameter, own) if code]
+
+
+def plan_restore(
+    profile: Profile,
+    held: Held,
+    source: ParameterSet,
+    source_profile: Profile,
+    options: Options = PLAIN,
+) -> RestorePlan:
+    """What it takes to make a drive hold a parameter set.
+
+    `profile` and `held` are the drive's, `source_profile` is the set's. Values of another family
+    are carried over by quantity, in engineering values.
+    """
+    across = profile.id != source_profile.id
+    planner = _Planner(profile, held, source, source_profile, options, across)
+    if across:
+        planner.add_quantities()
+    else:
+        planner.add_codes()
+    planner.settle()
+    return RestorePlan(
+        items=tuple(planner.items.values()),
+        edits=planner.edits,
+        same_rating=planner.same_rating,
+        needs_stop=any(needs_standstill(profile, profile[e.code]) for e in planner.edits),
+        across=across,
+    )
+
+
+def same_rating(
+    profile: Profile, held: Held, source: ParameterSet, *, across: bool = False
+) -> bool | None:
+    """Whether set and drive are of one rating; None where one of them does not tell."""
+    if across:
+        return False
+    told = source.head.identity.get("reference", "")
+    if told and held.reference:
+        return told == held.reference
+    codes = [c for c in rating_codes(profile) if c in held.raws and c in source.raws]
+    return all(held.raws[c] == source.raws[c] for c in codes) if codes else None
+
+
+class _Planner:
+    """Sorts the parameters of a set into those to write, equal ones and the rest."""
+
+    def __init__(
+        self,
+        profile: Profile,
+        held: Held,
+        source: ParameterSet,
+        source_profile: Profile,
+        options: Options,
+        across: bool,
+    ) -> None:
+        self.profile = profile
+        self.held = held
+        self.source = source
+        self.source_profile = source_profile
+        self.options = options
+        self.same_rating = same_rating(profile, held, source, across=across)
+        self.items: dict[str, Item] = {}
+        self.edits = Edits()
+        self._wanted: dict[str, Edit] = {}
+
+    def add_codes(self) -> None:
+        """Every parameter of a set of the same family."""
+        sources = scale_sources(self.profile)
+        for parameter in sorted(self.profile.parameters, key=lambda p: p.code not in sources):
+            raw = self.source.raws.get(parameter.code)
+            if raw is None:
+                continue
+            typed = self._typed(self.profile, parameter, raw) if parameter.scale_by else ""
+            self._consider(parameter, typed, raw)
+        for code, text in self.source.unknown.items():
+            self._skip(code, "unknown", f"the profile {self.profile.id} does not have it", text)
+        for code, why in self.source.absent.items():
+            parameter_of = self.profile.get(code)
+            if parameter_of is not None and is_setting(self.profile, parameter_of):
+                self._skip(code, "absent", f"it is not in the set: {why}")
+
+    def add_quantities(self) -> None:
+        """What both families name as the same quantity."""
+        taken: set[str] = set()
+        for quantity in ACROSS:
+            theirs = self.source_profile.quantity(quantity)
+            ours = self.profile.quantity(quantity)
+            if theirs is None or ours is None or theirs.code not in self.source.raws:
+                continue
+            raw = self.source.raws[theirs.code]
+            typed = self._typed(self.source_profile, theirs, raw)
+            if not is_setting(self.source_profile, theirs) or theirs.unit != ours.unit:
+                continue
+            taken.add(theirs.code)
+            self._consider(ours, typed, raw)
+        for parameter in self.source_profile.parameters:
+            code = parameter.code
+            if code in self.source.raws and code not in taken:
+                self._skip_theirs(parameter)
+
+    def _skip_theirs(self, parameter: Parameter) -> None:
+        raw = self.source.raws[parameter.code]
+        raws = self.source.raws
+        value = shown(self.source_profile, parameter, raw, raws, lacking(self.source_profile, raws))
+        key = f"{self.source_profile.id} {parameter.code}"
+        if is_setting(self.source_profile, parameter):
+            text = f"{self.profile.name} has no parameter that surely means the same"
+            self._skip(key, "no counterpart", text, value.display)
+
+    def _typed(self, profile: Profile, parameter: Parameter, raw: int) -> str:
+        """The value of the set as it is typed: it holds under every scale."""
+        absent = lacking(profile, self.source.raws)
+        number = number_of(profile, parameter, raw, self.source.raws, absent)
+        if raw in profile.names(parameter) or number is None:
+            return shown(profile, parameter, raw, self.source.raws, absent).text
+        return f"{number:f} {parameter.unit}".rstrip()
+
+    def _consider(self, parameter: Parameter, typed: str, raw: int) -> None:
+        """Take a parameter among those to write, or say why not."""
+        code = parameter.code
+        if (reason := self._reason_against(parameter)) is not None:
+            self._skip(code, *reason, self._new_text(parameter, typed, raw))
+            return
+        edit = Edit(code, typed, self.held.raws[code], raw)
+        try:
+            Edits().stage_many(
+                self.profile,
+                [*self._scales(parameter), edit],
+                self.held.raws,
+                self.held.lacking,
+            )
+        except ValueRefused as error:
+            self._skip(code, "range", str(error), self._new_text(parameter, typed, raw))
+        else:
+            self._wanted[code] = edit
+
+    def _scales(self, parameter: Parameter) -> list[Edit]:
+        follows = parameter.scale_by
+        return [e for c, e in self._wanted.items() if follows and c == follows.parameter]
+
+    def _new_text(self, parameter: Parameter, typed: str, raw: int) -> str:
+        if typed:
+            return typed
+        return shown(self.profile, parameter, raw, self.source.raws).display
+
+    def _reason_against(self, parameter: Parameter) -> tuple[Reason, str] | None:
+        code, options = parameter.code, self.options
+        if not is_setting(self.profile, parameter):
+            return "no setting", "it is measured, counted or ordered"
+        if parameter.forbidden:
+            return "forbidden", parameter.forbidden
+        if not is_verified(parameter) and code not in options.confirmed:
+            return "unverified", "no document of this family confirms its address"
+        setting = line_setting(self.profile, code)
+        if setting is not None and setting.role in CUTTING and not options.line_settings:
+            return "line", "it belongs to the line on which this drive is reached"
+        if self.same_rating is False and not options.rating and rated(parameter):
+            return "rating", "it belongs to another rating or model"
+        if code not in self.held.raws:
+            return "absent", self.held.absent.get(code, "this drive does not tell it")
+        return None
+
+    def settle(self) -> None:
+        """Make edits of what is to be written, in range of each other, and tell the rest."""
+        while True:
+            self.edits = Edits().stage_many(
+                self.profile, self._wanted.values(), self.held.raws, self.held.lacking
+            )
+            wrong = problems(self.profile, self.edits, self.held.raws)
+            if not wrong:
+                break
+            for code, text in wrong.items():
+                edit = self._wanted.pop(code)
+                self._skip(code, "range", text, edit.typed or edit.text)
+        self._tell(self.edits.asked)
+        order = {p.code: place for place, p in enumerate(self.profile.parameters)}
+        self.items = dict(
+            sorted(self.items.items(), key=lambda pair: order.get(pair[0], len(order)))
+        )
+
+    def _tell(self, edits: Iterable[Edit]) -> None:
+        for edit in edits:
+            kind: Kind = "equal" if edit.new == edit.old else "write"
+            self.items[edit.code] = Item(edit.code, kind, "", edit.remark, edit.old_text, edit.text)
+
+    def _skip(self, code: str, reason: Reason, text: str, new: str = "") -> None:
+        raw = self.held.raws.get(code)
+        parameter = self.profile.get(code)
+        old = ""
+        if raw is not None and parameter is not None:
+            raws = self.held.raws
+            old = shown(self.profile, parameter, raw, raws, self.held.lacking).display
+        self.items[code] = Item(code, "skip", reason, text, old, new)
+
+
+def rated(parameter: Parameter) -> bool:
+    """Whether a setting belongs to one rating of drive and motor, or to one model."""
+    if parameter.quantity in RATED or parameter.unit in ("A", "kW", "HP"):
+        return True
+    told = parameter.factory_text.casefold() if parameter.factory is None else ""
+    return any(word in told for word in ("rating", "model", "mains voltage"))
