@@ -164,6 +164,16 @@ async def test_a_silent_refusal_is_found_by_reading() -> None:
         assert "15.07" in applied.left
 
 
+@pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
+async def test_another_option_module_is_not_written(family: str) -> None:
+    """With another code in 15.01 the words of menu 15 mean something else."""
+    with bench(family, sets={"15.01": 400}) as made:
+        applied = await made.apply(**{"15.07": "5", "11.63": "4"})
+        assert outcomes(applied) == {"15.07": Outcome.REFUSED, "11.63": Outcome.DONE}
+        assert "another option is fitted" in text(applied, "15.07")
+        assert made.drive.raw("15.07") == 0
+
+
 async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")

@@ -123,6 +123,17 @@ _STORAGE = {
 }
 
 
+OPTION_CODES = {"PX-MODBUS": "15.01"}
+"""By group, the word that tells which option is fitted: with another one than its factory value
+says, the group's parameters mean something else (PX-MODBUS manual 4)."""
+
+
+def option_code(profile: Profile, parameter: Parameter) -> Parameter | None:
+    """The word that must hold its factory value before the parameter may be written, or None."""
+    code = OPTION_CODES.get(parameter.group, "")
+    return profile.get(code) if code != parameter.code else None
+
+
 def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
     """What a person should know of a parameter before it is written, each in a few words."""
     block = slot_of(profile, parameter.code)

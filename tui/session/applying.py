@@ -21,7 +21,7 @@ from tui.bus.errors import (
 from tui.drive.edits import Edit, Edits, cuts_line, limit_pairs, ordered, problems
 from tui.drive.errors import DriveError
 from tui.drive.shown import shown
-from tui.drive.writable import refusal, waits_for_reset
+from tui.drive.writable import option_code, refusal, waits_for_reset
 
 from .asking import Asker
 from .drive_session import DriveSession
@@ -173,7 +173,13 @@ class _Work:
         state = await asker.ask_state()
         if (against := refusal(profile, parameter, state, self.confirmed)) is not None:
             return Result(edit, Outcome.REFUSED, against.text, edit.old)
-        raws = await asker.ask_raws(self._with_sources([edit.code]))
+        option = option_code(profile, parameter)
+        wanted = [edit.code, *([option.code] if option else [])]
+        raws = await asker.ask_raws(self._with_sources(wanted))
+        if option is not None and raws.get(option.code) != option.factory:
+            text = f"{edit.code} is not written: {option.code} does not read {option.factory}, so"
+            text += " another option is fitted, to which it means something else."
+            return Result(edit, Outcome.REFUSED, text, edit.old)
         held = raws.get(edit.code)
         if held is None:
             said = asker.absent.get(edit.code, "")
