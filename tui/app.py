@@ -21,6 +21,7 @@ from tui.bus.errors import LineClosed
 from tui.drive.schema import OrderId
 from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
+from tui.session.editor import Editor
 from tui.session.fault_record import Recorder
 from tui.session.journal import Journal
 from tui.session.keeper import Keeper
@@ -100,6 +101,7 @@ class DrivePanelApp(Panel):
         self._told: StopSummary | None = None
         self._commanders: dict[int, Commander] = {}
         self._recorders: dict[int, Recorder] = {}
+        self._editors: dict[int, Editor] = {}
 
     def get_driver_class(self) -> type[Driver]:
         """The driver of this platform, with the stop keys before everything else."""
@@ -147,6 +149,18 @@ class DrivePanelApp(Panel):
         known = self._commanders.get(session.device)
         if known is None or known.session is not session:
             known = self._commanders[session.device] = Commander(session, self.journal)
+        return known
+
+    def session_at(self, device: int) -> DriveSession | None:
+        """The drive found at an address of the open line, or None."""
+        found = self.connection.found.get(device)
+        return found.session if found else None
+
+    def editor(self, session: DriveSession) -> Editor:
+        """What edits the parameters of a drive of the open line."""
+        known = self._editors.get(session.device)
+        if known is None or known.session is not session:
+            known = self._editors[session.device] = Editor(session, self.journal)
         return known
 
     def recorder(self, session: DriveSession) -> Recorder:
@@ -255,7 +269,7 @@ class DrivePanelApp(Panel):
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
-        self._commanders, self._recorders = {}, {}
+        self._commanders, self._recorders, self._editors = {}, {}, {}
         self.keeper = Keeper(self.opened.line)
         self.stopper = Stopper(self.opened.line, self.journal)
         log.info("opened %s", self.opened.label)

@@ -10,7 +10,7 @@ from rich.text import Text
 from tui.drive import library
 from tui.drive.profile import Profile
 from tui.drive.values import type_range
-from tui.screens.actions import CONNECTION, FRAMES, MONITOR, keys_of
+from tui.screens.actions import EVERYWHERE, keys_of
 from tui.session.monitor import TrendPoint
 from tui.session.readings import Quality
 from tui.widgets.drawing import aligned, bar, key_line, trend
@@ -152,7 +152,7 @@ def test_a_trend_has_its_size_whatever_its_values(
     assert [row.cell_len for row in rows] == [width] * height
 
 
-@pytest.mark.parametrize("screen", [CONNECTION, MONITOR, FRAMES])
+@pytest.mark.parametrize("screen", EVERYWHERE)
 def test_the_line_of_keys_fits_80_columns(screen: str) -> None:
     assert key_line(keys_of(screen)).cell_len <= 80
 

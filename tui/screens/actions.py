@@ -5,39 +5,10 @@ Bindings, the line of keys, the help screen and the command palette are made fro
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 from textual.binding import Binding, BindingType
 
-CONNECTION, MONITOR, FRAMES = "connection", "monitor", "frames"
-SOURCES, FAULTS = "control source", "faults"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS)
-
-
-@dataclass(frozen=True, slots=True)
-class Action:
-    """One thing a person can do."""
-
-    id: str
-    """Name of the method, with its arguments as Textual writes them."""
-    keys: str
-    """Keys as Textual names them, separated by commas; none where a widget takes the key."""
-    shown: str
-    """The key as a person reads it."""
-    label: str
-    """One or two words for the line of keys."""
-    help: str
-    """A sentence for the help screen and the palette."""
-    screens: tuple[str, ...] = EVERYWHERE
-    app: bool = False
-    """True for an action of the app, False for one of the screen."""
-    line: bool = True
-    """Whether it stands in the line of keys."""
-    both: str = ""
-    """What the line of keys shows where one entry stands for a pair of keys."""
-    first: bool = False
-    """Whether the key counts before any widget that has the focus."""
-
+from .action import CONNECTION, EVERYWHERE, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES, Action
+from .parameter_actions import PARAMETER_ACTIONS
 
 ACTIONS: tuple[Action, ...] = (
     Action(
@@ -103,7 +74,7 @@ ACTIONS: tuple[Action, ...] = (
         (CONNECTION,),
         line=False,
     ),
-    Action("arm", "a", "a", "arm", "Arm this drive for orders, or end that.", (MONITOR, SOURCES)),
+    Action("arm", "a", "a", "arm", "Arm this drive, or end that.", (MONITOR, SOURCES, PARAMETERS)),
     Action("order('forward')", "r", "r", "run", "Run forward.", (MONITOR,)),
     Action("order('reverse')", "v", "v", "reverse", "Run reverse.", (MONITOR,)),
     Action("reference", "f", "f", "ref", "Type a reference in Hz or rpm.", (MONITOR,)),
@@ -232,6 +203,8 @@ ACTIONS: tuple[Action, ...] = (
     Action("move_record(-1)", "right_square_bracket", "]", "newer", "Newer values.", (FAULTS,)),
     Action("leave", "escape,h,2", "Esc", "back", "Go back to Monitor.", (FAULTS,)),
     Action("leave", "escape,c,2", "Esc", "back", "Go back to Monitor.", (SOURCES,)),
+    Action("parameters", "3", "3", "", "Parameters of this drive.", (MONITOR,), line=False),
+    *PARAMETER_ACTIONS,
     Action("leave", "escape,1", "Esc", "", "Go back to Connection.", (MONITOR,), line=False),
     Action(
         "step_drive(-1)",
@@ -311,3 +284,20 @@ def line_of(screen: str) -> list[tuple[str, str, str]]:
 def keys_of(screen: str) -> list[tuple[str, str]]:
     """What the line of keys says on a screen."""
     return [(key, label) for _, key, label in line_of(screen)]
+
+
+__all__ = [
+    "ACTIONS",
+    "CONNECTION",
+    "EVERYWHERE",
+    "FAULTS",
+    "FRAMES",
+    "MONITOR",
+    "PARAMETERS",
+    "SOURCES",
+    "Action",
+    "bindings",
+    "keys_of",
+    "line_of",
+    "of_screen",
+]

@@ -274,6 +274,12 @@ class MonitorScreen(OrderKeys):
 
         self.app.push_screen(FaultsScreen(self.session))
 
+    def action_parameters(self) -> None:
+        """Every parameter of the drive."""
+        from .parameters import ParametersScreen
+
+        self.app.push_screen(ParametersScreen(self.session))
+
     def action_control_source(self) -> None:
         """Who commands the drive, and how that is changed."""
         from .control_source import ControlSourceScreen

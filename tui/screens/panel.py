@@ -9,6 +9,7 @@ from textual.app import App
 from tui.drive.schema import OrderId
 from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
+from tui.session.editor import Editor
 from tui.session.fault_record import Recorder
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine
@@ -32,6 +33,14 @@ class Panel(App[None]):
     @abstractmethod
     def commander(self, session: DriveSession) -> Commander:
         """What commands a drive of the open line."""
+
+    @abstractmethod
+    def session_at(self, device: int) -> DriveSession | None:
+        """The drive found at an address of the open line, or None."""
+
+    @abstractmethod
+    def editor(self, session: DriveSession) -> Editor:
+        """What edits the parameters of a drive of the open line."""
 
     @abstractmethod
     def recorder(self, session: DriveSession) -> Recorder:

@@ -1,0 +1,116 @@
+"""Which parameters a list shows: search, filters, groups; pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass, field
+from typing import Literal
+
+from .edits import Edits
+from .profile import Profile, is_verified, notations
+from .schema import Parameter
+from .writable import is_setting
+
+FilterId = Literal[
+    "all",
+    "settings",
+    "staged",
+    "not factory",
+    "differs",
+    "unsaved",
+    "read-only",
+    "unverified",
+    "favourites",
+    "recent",
+]
+FILTERS: tuple[FilterId, ...] = (
+    "all",
+    "settings",
+    "staged",
+    "not factory",
+    "differs",
+    "unsaved",
+    "favourites",
+    "recent",
+    "read-only",
+    "unverified",
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Facts:
+    """What a filter decides by."""
+
+    profile: Profile
+    raws: Mapping[str, int] = field(default_factory=dict)
+    edits: Edits = field(default_factory=Edits)
+    unsaved: Collection[str] = ()
+    favourites: Collection[str] = ()
+    recent: tuple[str, ...] = ()
+    other: Mapping[str, int] = field(default_factory=dict)
+    """Raw values of the parameter set that the drive is compared with."""
+
+
+def rows(facts: Facts, chosen: FilterId, search: str = "") -> list[str]:
+    """Codes of what is shown: the best matches first, then in the profile's order.
+
+    Of the recent ones the last edited comes first.
+    """
+    words = search.casefold().split()
+    profile = facts.profile
+    parameters = list(profile.parameters)
+    if chosen == "recent":
+        parameters = [p for code in facts.recent if (p := profile.get(code)) is not None]
+    found = [
+        (rank, p.code)
+        for p in parameters
+        if passes(facts, chosen, p) and (rank := match(profile, p, words)) is not None
+    ]
+    return [code for _, code in sorted(found, key=lambda pair: pair[0])]
+
+
+def passes(facts: Facts, chosen: FilterId, parameter: Parameter) -> bool:
+    """Whether a parameter belongs to a filter."""
+    code, profile = parameter.code, facts.profile
+    raw = facts.raws.get(code)
+    match chosen:
+        case "settings":
+            return is_setting(profile, parameter)
+        case "staged":
+            return code in facts.edits
+        case "not factory":
+            return not_factory(profile, parameter, raw)
+        case "differs":
+            other = facts.other.get(code)
+            return is_setting(profile, parameter) and other is not None and other != raw
+        case "unsaved":
+            return code in facts.unsaved
+        case "read-only":
+            return parameter.access == "r"
+        case "unverified":
+            return not is_verified(parameter)
+        case "favourites":
+            return code in facts.favourites
+        case _:
+            return True
+
+
+def not_factory(profile: Profile, parameter: Parameter, raw: int | None) -> bool:
+    """Whether a setting surely holds something else than its factory value."""
+    known = raw is not None and parameter.factory is not None
+    return known and raw != parameter.factory and is_setting(profile, parameter)
+
+
+def match(profile: Profile, parameter: Parameter, words: Collection[str]) -> int | None:
+    """How well every word is found: 0 in the code, 1 in name or address, 2 in a value's name."""
+    if not words:
+        return 0
+    code = parameter.code.casefold()
+    if all(word in code for word in words):
+        return 0
+    text = " ".join((*notations(parameter), parameter.name)).casefold()
+    left = [word for word in words if word not in text]
+    if not left:
+        return 1
+    values = " ".join((parameter.group, *profile.names(parameter).values())).casefold()
+    return 2 if all(word in values for word in left) else None

@@ -1,0 +1,193 @@
+"""Keys of the Parameters screen that handle parameter sets: back up, compare, stage a set."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from pathlib import Path
+
+from textual.screen import Screen
+
+from tui.bus.errors import LineError
+from tui.drive.errors import DriveError
+from tui.session.drive_session import DriveSession
+from tui.session.editor import Editor
+
+from .panel import Panel
+
+
+class SetKeys(Screen[None]):
+    """Reads and writes files of parameter sets; what a set has otherwise is staged, not written."""
+
+    app: Panel
+    session: DriveSession
+
+    @property
+    def editor(self) -> Editor:
+        """What is known and staged."""
+        raise NotImplementedError
+
+    def note(self, text: str) -> None:
+        """Say something in the line of messages."""
+        raise NotImplementedError
+
+    def show_differences(self) -> None:
+        """Show what the drive has otherwise than the set."""
+        raise NotImplementedError
+
+    # Back up
+
+    def action_backup(self) -> None:
+        """Ask for a file, read everything, write it."""
+        from .ask import Ask
+
+        profile = self.session.profile
+        when = time.strftime("%Y%m%d-%H%M")
+        proposed = str(Path.cwd() / f"{profile.id}-{self.session.device}-{when}.toml")
+
+        def told(name: str | None) -> None:
+            if name:
+                self.run_worker(
+                    self._back_up(Path(name).expanduser()), exclusive=True, group="sets"
+                )
+
+        about = "Every readable parameter, in units and raw, one a line (TOML)."
+        self.app.push_screen(Ask("Back up to", _free, text=proposed, about=about), told)
+
+    async def _back_up(self, path: Path) -> None:
+        from tui.drive.parameter_set import dumps
+        from tui.drive.set_file import write_file
+        from tui.session.upload import Upload
+
+        def progress(done: int, count: int) -> None:
+            self.note(f"Reading for the backup: {done} of {count}")
+
+        upload = Upload(self.session, progress=progress)
+        try:
+            await upload.run()
+            write_file(path, dumps(self.session.profile, upload.parameter_set()))
+        except (LineError, DriveError) as error:
+            self.note(f"No backup: {error}")
+        else:
+            bad = len(upload.asker.absent)
+            without = f"; {bad} the drive does not tell" if bad else ""
+            self.note(f"Backed up {len(upload.asker.raws)} parameters{without}: {path}")
+
+    # Compare
+
+    def action_compare(self) -> None:
+        """Ask for what to compare with."""
+        from .ask import Ask
+
+        def told(text: str | None) -> None:
+            if text:
+                self.run_worker(self._compare(text), exclusive=True, group="sets")
+
+        about = (
+            "A file of a backup, the address of another drive found on this line, or `factory`."
+            " What it has otherwise is shown; n stages it."
+        )
+        self.app.push_screen(Ask("Compare with", self._nameable, about=about), told)
+
+    def _nameable(self, text: str) -> str:
+        """What is wrong with what was typed, or nothing."""
+        typed = text.strip()
+        if typed.isdecimal():
+            return "" if self.app.session_at(int(typed)) else f"No drive was found at {typed}."
+        if typed.casefold() == "factory" or Path(typed).expanduser().is_file():
+            return ""
+        return f"There is no file {typed}." if typed else "Type a file, an address, or factory."
+
+    async def _compare(self, text: str) -> None:
+        editor = self.editor
+        typed = text.strip()
+        editor.source = None
+        try:
+            if typed.casefold() == "factory":
+                editor.other, editor.other_label = {}, "factory"
+                self.note("Compared with the factory settings; d shows what differs.")
+                return
+            if typed.isdecimal():
+                await self._compare_drive(int(typed))
+            else:
+                await self._compare_file(typed)
+            if editor.source is not None:
+                await self._look_at_source()
+        except (LineError, DriveError) as error:
+            self.note(str(error))
+
+    async def _compare_file(self, name: str) -> None:
+        from tui.drive.set_file import read_set
+
+        path = Path(name)
+        self.editor.source = await asyncio.to_thread(lambda: read_set(path.expanduser()))
+        self.editor.other_label = path.name
+
+    async def _compare_drive(self, device: int) -> None:
+        from tui.session.upload import Upload, setting_codes
+
+        other = self.app.session_at(device)
+        if other is None:
+            return
+
+        def progress(done: int, count: int) -> None:
+            self.note(f"Reading device {device}: {done} of {count}")
+
+        upload = Upload(other, setting_codes(other.profile), progress)
+        await upload.run()
+        self.editor.source = upload.parameter_set()
+        self.editor.other_label = f"device {device}"
+
+    async def _look_at_source(self) -> None:
+        """Read the drive's settings, and tell what would be staged and what left out."""
+        editor = self.editor
+        assert editor.source is not None
+        self.note("Reading the settings to compare")
+        plan = await editor.plan()
+        same_family = editor.source.head.profile == self.session.profile.id
+        editor.other = dict(editor.source.raws) if same_family else plan_values(plan)
+        if not editor.other:
+            editor.other = {"": 0}
+        writes, skips = plan.count("write"), plan.count("skip")
+        self.note(
+            f"{editor.other_label}: {writes} differ and can be staged (n), {plan.count('equal')}"
+            f" are equal, {skips} left out."
+        )
+        self.show_differences()
+
+    def action_stage_set(self) -> None:
+        """Stage what the set has otherwise; nothing is written."""
+        if self.editor.source is None:
+            self.note("Nothing to stage from: o chooses a file or another drive.")
+            return
+        self.run_worker(self._stage_set(), exclusive=True, group="sets")
+
+    async def _stage_set(self) -> None:
+        from .skipped import Skipped
+
+        editor = self.editor
+        try:
+            plan = await editor.plan()
+        except (LineError, DriveError) as error:
+            self.note(str(error))
+            return
+        editor.take_plan(plan)
+        left = [item for item in plan.of_kind("skip") if item.reason != "no setting"]
+        self.note(f"{len(plan.edits)} staged from {editor.other_label}; w writes them.")
+        if left:
+            self.app.push_screen(Skipped(len(plan.edits), editor.other_label, left))
+
+
+def plan_values(plan: object) -> dict[str, int]:
+    """The raw values that a plan would write, by code."""
+    from tui.drive.restore_plan import RestorePlan
+
+    assert isinstance(plan, RestorePlan)
+    return {edit.code: edit.new for edit in plan.edits}
+
+
+def _free(name: str) -> str:
+    """What is wrong with a name for a new file."""
+    if not name.strip():
+        return "A name is needed."
+    return f"{name} is there already." if Path(name).expanduser().exists() else ""

@@ -1,0 +1,31 @@
+"""What a writing will do, in words, before it is done."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from tui.drive.edits import Edit, Edits, consequences, cuts_line, ordered, problems
+from tui.session.editor import Editor
+
+SHOWN = 9
+"""Edits that are named; the others are counted."""
+
+
+def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
+    """Old and new of each edit in the order of writing, then what is dangerous about it."""
+    profile, raws = editor.session.profile, editor.raws
+    chosen = Edits(tuple(edits))
+    order = ordered(profile, chosen, raws)
+    lines = [f"{e.code}  {e.old_text or '-----'} → {e.text}" for e in order[:SHOWN]]
+    if len(order) > SHOWN:
+        lines.append(f"and {len(order) - SHOWN} more")
+    told = list(problems(profile, chosen, raws).values())
+    told += [r.text for e in order if (r := editor.refusal(e.code)) is not None]
+    told += [edit.warning for edit in order if edit.warning]
+    told += consequences(profile, chosen, raws, editor.lacking)
+    told += [
+        f"{e.code} changes the line itself: the drive answers at its new settings only."
+        for e in order
+        if cuts_line(profile, profile[e.code])
+    ]
+    return "\n".join([*lines, *([""] if told else []), *dict.fromkeys(told)])

@@ -1,0 +1,369 @@
+"""Editing the parameters of one drive: what is read when, what is staged, what became of it.
+
+The values come in through a worker of the line's loop: what is looked at first, the rest behind
+everything else; then what is looked at again and again, so that another's change is noticed.
+Everything else belongs to the thread of the screen.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tui.bus.errors import LineError
+from tui.bus.line import LineStatus, Priority, Worker
+from tui.drive.edits import Edits
+from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.parameter_set import ParameterSet
+from tui.drive.restore_plan import RestorePlan
+from tui.drive.rows import Facts
+from tui.drive.schema import Parameter, StateKind
+from tui.drive.shown import scale_sources, shown
+from tui.drive.values import Value
+from tui.drive.writable import Refusal, refusal
+
+from .applying import Applied, Outcome, Result, apply_edits
+from .asking import Asker, neighbours
+from .drive_session import DriveSession
+from .favourites import Marks, load_marks, save_marks
+from .journal import Journal
+from .memory import factory_reset, save_to_eeprom
+from .upload import readable_codes
+
+LOOK = 0.1
+"""Seconds between two turns of the reader that has nothing to do."""
+AGAIN = 1.0
+"""Seconds after which what is looked at is read again."""
+AFTER_ERROR = 1.0
+
+
+@dataclass(frozen=True, slots=True)
+class Say:
+    """What the last work has come to."""
+
+    text: str
+    kind: str
+    """working, done or refused."""
+    time: float
+
+
+@dataclass(slots=True)
+class Editor:
+    """The values, the staged edits and the work on one drive."""
+
+    session: DriveSession
+    journal: Journal
+    edits: Edits = field(default_factory=Edits)
+    raws: dict[str, int] = field(default_factory=dict)
+    """Raw values as last read; replaced as a whole by the line's thread."""
+    absent: dict[str, str] = field(default_factory=dict)
+    lacking: frozenset[str] = frozenset()
+    results: dict[str, Result] = field(default_factory=dict)
+    """What became of the last writing of each parameter."""
+    changed_elsewhere: dict[str, int] = field(default_factory=dict)
+    """Codes that somebody else changed while they were looked at, with the value before."""
+    unsaved: set[str] = field(default_factory=set)
+    waits_for_reset: set[str] = field(default_factory=set)
+    said: Say | None = None
+    trouble: str = ""
+    """Why nothing can be read now; empty while that works."""
+    marks: Marks = field(default_factory=Marks)
+    other: Mapping[str, int] = field(default_factory=dict)
+    other_label: str = "factory"
+    source: ParameterSet | None = None
+    """The parameter set that the drive is compared with, if it is one."""
+    visible: tuple[str, ...] = ()
+    version: int = 0
+    """Counts every change, so that a screen knows when to look."""
+    _reader: Worker | None = None
+    _work: Worker | None = None
+    _asked: dict[str, float] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.marks = load_marks(self.session.profile.id)
+        self.raws = self.session.monitor.known.raws(longest=AGAIN)
+
+    # What is known
+
+    @property
+    def facts(self) -> Facts:
+        """What filters decide by."""
+        return Facts(
+            self.session.profile,
+            self.raws,
+            self.edits,
+            self.unsaved,
+            self.marks.favourites,
+            self.marks.recent,
+            self.other,
+        )
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """How many readable parameters were read, and how many there are."""
+        codes = readable_codes(self.session.profile)
+        return sum(code in self.raws or code in self.absent for code in codes), len(codes)
+
+    @property
+    def state(self) -> StateKind | None:
+        """The kind of the drive's state as Monitor knows it; None while it is not known."""
+        latest = self.session.monitor.latest
+        return None if latest is None or latest.error else latest.state.kind
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being written."""
+        return self._work is not None and not self._work.done()
+
+    def value(self, code: str, raw: int | None = None) -> Value | None:
+        """A parameter's value as a person reads it: the held one, or another raw value's."""
+        held = self.raws.get(code) if raw is None else raw
+        if held is None:
+            return None
+        return shown(
+            self.session.profile, self.session.profile[code], held, self.raws, self.lacking
+        )
+
+    def refusal(self, code: str) -> Refusal | None:
+        """Why a parameter cannot be written now."""
+        profile = self.session.profile
+        return refusal(profile, profile[code], self.state, self.marks.confirmed)
+
+    # Reading
+
+    def start(self) -> None:
+        """Begin to read."""
+        self.stop()
+        self._reader = self.session.line.spawn(self._read, f"editor {self.session.device}")
+
+    def stop(self) -> None:
+        """Read no more; what is being written goes on."""
+        if self._reader is not None:
+            self._reader.cancel()
+            self._reader = None
+
+    async def _read(self) -> None:
+        profile = self.session.profile
+        first = Asker(self.session)
+        later = Asker(self.session, Priority.BACKGROUND)
+        rest = [*sorted(scale_sources(profile)), *readable_codes(profile)]
+        parts = iter(neighbours(profile, dict.fromkeys(rest)))
+        waiting: list[tuple[str, ...]] = []
+        while True:
+            try:
+                if due := self._due():
+                    await first.ask(due)
+                    self._take(first, due)
+                elif waiting:
+                    await later.ask(waiting[0])
+                    self._take(later, waiting.pop(0))
+                elif (part := next(parts, None)) is not None:
+                    left = [c for c in part if c not in self.raws and c not in self.absent]
+                    waiting = [tuple(group) for group in later.reader.groups(left)]
+                else:
+                    await asyncio.sleep(LOOK)
+                self.trouble = ""
+            except LineError as error:
+                self.trouble = str(error)
+                self.version += 1
+                await asyncio.sleep(AFTER_ERROR)
+
+    def _due(self) -> list[str]:
+        """What is looked at and was not read lately."""
+        oldest = time.monotonic() - AGAIN
+        due = [code for code in self.visible if self._asked.get(code, 0.0) < oldest]
+        if not due:
+            return []
+        follows = [p.scale_by.parameter for c in due if (p := self._parameter(c)) and p.scale_by]
+        return list(dict.fromkeys((*follows, *due)))
+
+    def _parameter(self, code: str) -> Parameter | None:
+        parameter = self.session.profile.get(code)
+        return parameter if parameter is not None and parameter.access != "w" else None
+
+    def _take(self, asker: Asker, codes: list[str] | tuple[str, ...]) -> None:
+        """Keep what was read; note what another has changed meanwhile."""
+        now = time.monotonic()
+        read = {code: asker.raws[code] for code in codes if code in asker.raws}
+        for code, raw in read.items():
+            before = self.raws.get(code)
+            if before is not None and before != raw and not self.busy and code in self.edits:
+                self.changed_elsewhere = {**self.changed_elsewhere, code: before}
+        self._asked |= dict.fromkeys(codes, now)
+        self.absent = {
+            **{c: why for c, why in self.absent.items() if c not in read},
+            **{code: asker.absent[code] for code in codes if code in asker.absent},
+        }
+        self.lacking = self.lacking | asker.lacking
+        if read.items() - self.raws.items():
+            self.raws = {**self.raws, **read}
+        self.version += 1
+
+    # Staging
+
+    def stage(self, code: str, typed: str) -> str:
+        """Stage what was typed; returns what should be told at once. Raises ValueRefused."""
+        edits = self.edits.stage(self.session.profile, code, typed, self.raws, self.lacking)
+        return self._staged(code, edits)
+
+    def stage_raw(self, code: str, raw: int) -> str:
+        """Stage a raw value: a name of a list, a word of bits. Raises ValueRefused."""
+        edits = self.edits.stage_raw(self.session.profile, code, raw, self.raws, self.lacking)
+        return self._staged(code, edits)
+
+    def _staged(self, code: str, edits: Edits) -> str:
+        if self.busy:
+            raise ValueRefused("Something is being written; wait until that is done.")
+        self.edits = edits
+        self.results.pop(code, None)
+        self.version += 1
+        edit = edits.get(code)
+        return edit.remark if edit else ""
+
+    def undo(self, code: str) -> None:
+        """Take one edit back."""
+        self.edits = self.edits.undo(code, self.session.profile, self.raws, self.lacking)
+        self.results.pop(code, None)
+        self.changed_elsewhere = {c: r for c, r in self.changed_elsewhere.items() if c != code}
+        self.version += 1
+
+    def undo_all(self) -> None:
+        """Take every edit back."""
+        self.edits, self.results, self.changed_elsewhere = Edits(), {}, {}
+        self.version += 1
+
+    def accept_changes(self) -> None:
+        """Take what others wrote for the value before, knowingly."""
+        self.edits = self.edits.now(self.session.profile, self.raws, self.lacking)
+        self.changed_elsewhere = {}
+        self.version += 1
+
+    async def plan(self) -> RestorePlan:
+        """What it takes to make the drive hold the set; reads it. Raises the line's errors."""
+        from tui.drive import library
+        from tui.drive.restore_plan import Options
+
+        from .restoring import plan_for
+
+        assert self.source is not None
+        profile = library.load(self.source.head.profile)
+        options = Options(confirmed=frozenset(self.marks.confirmed))
+        return await plan_for(self.session, self.source, profile, options)
+
+    def take_plan(self, plan: RestorePlan) -> None:
+        """Stage what a plan would write."""
+        profile = self.session.profile
+        self.edits = self.edits.stage_many(profile, plan.edits.asked, self.raws, self.lacking)
+        self.version += 1
+
+    # Marks
+
+    def toggle_favourite(self, code: str) -> None:
+        """Mark a parameter, or take the mark away."""
+        self._mark(self.marks.toggled(code))
+
+    def confirm(self, code: str) -> None:
+        """A person has compared an unverified parameter with the keypad."""
+        self._mark(self.marks.with_confirmed(code))
+
+    def _mark(self, marks: Marks) -> None:
+        self.marks = marks
+        save_marks(self.session.profile.id, marks)
+        self.version += 1
+
+    # Writing
+
+    def apply(self, codes: tuple[str, ...] = ()) -> None:
+        """Write what is staged, or only these; returns at once."""
+        edits = self.edits
+        if codes:
+            edits = Edits(tuple(edit for edit in edits.asked if edit.code in codes))
+        held_back = tuple(edit for edit in self.edits.asked if codes and edit.code not in codes)
+
+        async def work() -> str:
+            applied = await apply_edits(
+                self.session,
+                self.journal,
+                edits,
+                confirmed=self.marks.confirmed,
+                progress=self._progress,
+            )
+            self._applied(applied, Edits((*applied.left.asked, *held_back)))
+            return _summary(applied)
+
+        self._run(work)
+
+    def _progress(self, done: int, count: int, result: Result) -> None:
+        self.results = {**self.results, result.edit.code: result}
+        if result.held is not None:
+            self.raws = {**self.raws, result.edit.code: result.held}
+        self._say(f"{done} of {count}: {result.edit.code} {result.outcome}", "working")
+
+    def _applied(self, applied: Applied, left: Edits) -> None:
+        self.edits = left
+        written = [result.edit.code for result in applied.written]
+        self._mark(self.marks.edited(written))
+        self.unsaved |= set(applied.unsaved)
+        self.waits_for_reset |= set(applied.after_reset)
+        changed = {r.edit.code for r in applied.results if r.outcome is Outcome.CHANGED}
+        self.changed_elsewhere = {
+            c: r for c, r in self.changed_elsewhere.items() if c not in written or c in changed
+        }
+
+    def save(self) -> None:
+        """Copy the settings to EEPROM, where the family needs that."""
+
+        async def work() -> str:
+            done = await save_to_eeprom(self.session, self.journal)
+            self.unsaved = set()
+            return done
+
+        self._run(work)
+
+    def factory(self) -> None:
+        """Recall the factory settings."""
+
+        async def work() -> str:
+            confirmed = self.marks.confirmed
+            done = await factory_reset(self.session, self.journal, confirmed=confirmed)
+            self._asked, self.raws = {}, {}
+            self.start()
+            return done
+
+        self._run(work)
+
+    def _run(self, work: Callable[[], Coroutine[Any, Any, str]]) -> None:
+        if self.busy:
+            self._say("Another writing is still under way.", "refused")
+            return
+        if self.session.line.state.status is not LineStatus.CONNECTED:
+            self._say("The line is lost; nothing is written.", "refused")
+            return
+
+        async def guarded() -> None:
+            try:
+                self._say(await work(), "done")
+            except (LineError, DriveError) as error:
+                self._say(str(error), "refused")
+
+        self._work = self.session.line.spawn(guarded, f"write {self.session.device}")
+
+    def _say(self, text: str, kind: str) -> None:
+        self.said = Say(text, kind, time.monotonic())
+        self.version += 1
+
+
+def _summary(applied: Applied) -> str:
+    """What became of all edits, in a sentence or two."""
+    done, failed = len(applied.written), len(applied.results) - len(applied.written)
+    parts = [f"{done} written and read back" if done else "nothing written"]
+    if failed:
+        first = next(r for r in applied.results if not r.done)
+        parts.append(f"{failed} still staged: {first.text}")
+    parts += [link.text for link in applied.links]
+    if applied.after_reset:
+        parts.append(f"in force after a reset of the drive: {', '.join(applied.after_reset)}")
+    return "; ".join(parts)
