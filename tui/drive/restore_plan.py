@@ -255,7 +255,11 @@ class _Planner:
         """Take a parameter among those to write, or say why not."""
         code = parameter.code
         if (reason := self._reason_against(parameter)) is not None:
-            self._skip(code, *reason, self._new_text(parameter, typed, raw))
+            new = self._new_text(parameter, typed, raw)
+            if reason[0] != "no setting" and self._holds(parameter, new):
+                self.items[code] = Item(code, "equal", "", "", new, new)
+            else:
+                self._skip(code, *reason, new)
             return
         edit = Edit(code, typed, self.held.raws[code], raw)
         try:
@@ -278,6 +282,14 @@ class _Planner:
         if typed:
             return typed
         return shown(self.profile, parameter, raw, self.source.raws).display
+
+    def _holds(self, parameter: Parameter, text: str) -> bool:
+        """Whether the drive shows the same value, so that nothing is left out."""
+        held = self.held
+        raw = held.raws.get(parameter.code)
+        if raw is None:
+            return False
+        return shown(self.profile, parameter, raw, held.raws, held.lacking).display == text
 
     def _reason_against(self, parameter: Parameter) -> tuple[Reason, str] | None:
         code, options = parameter.code, self.options

@@ -1,0 +1,233 @@
+"""Settings and parameter sets on the command line: back up, compare, restore, write."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+import signal
+import subprocess
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.programs import DRIVEPANEL, PATIENCE, port_of, simulated
+from tui.cli.main import main
+
+FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
+
+
+@pytest.fixture
+def line() -> Iterator[str]:
+    """A simulated Altivar 312 that several commands in turn can reach, at address 2."""
+    with simulated("atv312@2", "--tcp", "127.0.0.1:0") as simulation:
+        yield f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+
+
+def invoked(*arguments: str | Path) -> Result:
+    """A command run in this process, as the program itself would run it."""
+    return CliRunner().invoke(main, [str(a) for a in arguments], prog_name="drivepanel")
+
+
+def run(status: int, *arguments: str | Path) -> str:
+    """Run a command to this exit status; what it prints on standard output."""
+    done = invoked(*arguments)
+    assert done.exit_code == status, done.output
+    assert "Traceback" not in done.stderr
+    return done.stdout
+
+
+def refused(status: int, *arguments: str | Path) -> str:
+    """What a command says on standard error when it ends with this status."""
+    done = invoked(*arguments)
+    assert done.exit_code == status, done.output
+    assert done.stderr.startswith("drivepanel: ")
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_a_drive_equals_its_own_backup(family: str, tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    drive = (f"sim:{family}@3", "-d", "3", "-p", family)
+    assert "parameters of" in run(0, "backup", drive[0], file, *drive[1:])
+    run(0, "compare", file, *drive)
+    assert "0 to write" in run(0, "restore", drive[0], file, "--dry-run", *drive[1:])
+
+
+def test_back_up_write_compare_restore(line: str, tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    run(0, "backup", line, file, "-d", "2")
+    written = run(0, "write", line, "ACC=5,5 s", "hsp=40", "-d", "2", "--arm", "--save")
+    assert "ACC: 3.0 s -> 5.5 s" in written
+    assert "saved to EEPROM" in written
+    different = run(1, "compare", file, line, "-d", "2")
+    assert [row.split()[1] for row in different.splitlines()[1:]] == ["HSP", "ACC"]
+    rows = list(
+        csv.DictReader(io.StringIO(run(1, "compare", file, line, "-d", "2", "--format", "csv")))
+    )
+    assert {(row["code"], row["raw a"], row["raw b"]) for row in rows} == {
+        ("ACC", "30", "55"), ("HSP", "500", "400"),
+    }  # fmt: skip
+    assert "| yes | ACC |" in run(1, "compare", file, line, "-d", "2", "--format", "markdown")
+    assert "2 to write" in run(0, "restore", line, file, "-d", "2", "--dry-run")
+    run(1, "compare", file, line, "-d", "2")
+    assert "2 written and read back, 0 not." in run(0, "restore", line, file, "-d", "2", "--arm")
+    run(0, "compare", file, line, "-d", "2")
+
+
+def test_two_drives_of_a_line(tmp_path: Path) -> None:
+    with simulated("atv31@1", "atv31@2", "--tcp", "127.0.0.1:0", "--set", "2:ACC=99") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        told = run(1, "compare", line, line, "-d", "1", "-d", "2")
+        assert {row.split()[1] for row in told.splitlines()[1:]} == {"ACC", "Add"}
+
+
+def test_the_factory_settings(line: str) -> None:
+    told = run(1, "compare", "factory", line, "-d", "2")
+    assert "LAC" in told
+    assert "ACC" in run(1, "compare", "factory", line, "-d", "2", "--all")
+
+
+def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    sets = {f"SP{n}": 100 + n for n in range(2, 9)} | {"ACC": 77, "dEC": 66, "AC2": 55}
+    settings = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
+    with simulated("atv312", "--tcp", "127.0.0.1:0", *settings) as simulation:
+        run(0, "backup", f"tcp:127.0.0.1:{port_of(simulation.ready)}", file)
+    with simulated("atv312", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        process = subprocess.Popen(
+            [*DRIVEPANEL, "restore", line, str(file), "--arm"],
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
+            env=_unbuffered(),
+        )  # fmt: skip
+        try:
+            assert process.stdout is not None
+            first = process.stdout.readline()
+            assert first.startswith("1/"), first
+        finally:
+            process.send_signal(signal.SIGKILL)
+            process.communicate(timeout=PATIENCE)
+        told = run(0, "restore", line, file, "--arm")
+        assert "did not come to its end" in told
+        run(0, "compare", file, line)
+        assert "did not come" not in run(0, "restore", line, file, "--arm")
+
+
+def _unbuffered() -> dict[str, str]:
+    return {**os.environ, "PYTHONUNBUFFERED": "1"}
+
+
+USAGE: dict[str, tuple[str, ...]] = {
+    "backup without a file": ("backup", "sim:atv71"),
+    "compare the factory with itself": ("compare", "factory", "factory"),
+    "compare a file that is not there": ("compare", "nosuch.toml", "factory"),
+    "compare what is nothing": ("compare", "no such line", "factory"),
+    "compare three drives": ("compare", "sim:atv71", "factory", "-d", "1", "-d", "2", "-d", "3"),
+    "restore a file that is not there": ("restore", "sim:atv71", "nosuch.toml", "--dry-run"),
+    "restore both ways": ("restore", "sim:atv71", "x.toml", "--dry-run", "--arm"),
+    "write nothing": ("write", "sim:atv71", "--arm"),
+    "write no value": ("write", "sim:atv71", "ACC", "--arm"),
+    "write an empty value": ("write", "sim:atv71", "ACC=", "--arm"),
+    "write an unknown code": ("write", "sim:atv71", "NOSUCH=1", "--arm"),
+    "confirm an unknown code": ("write", "sim:atv71", "ACC=5", "--confirm", "NOSUCH", "--arm"),
+}
+
+
+@pytest.mark.parametrize("arguments", USAGE.values(), ids=USAGE.keys())
+def test_2_usage(arguments: tuple[str, ...]) -> None:
+    refused(2, *arguments)
+
+
+def test_2_a_bad_file_is_told_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    run(0, "backup", "sim:powerdrive", file, "-p", "powerdrive")
+    text = file.read_text(encoding="utf-8")
+    assert "is there already" in refused(2, "backup", "sim:powerdrive", file, "-p", "powerdrive")
+    assert file.read_text(encoding="utf-8") == text
+    run(0, "backup", "sim:powerdrive", file, "-p", "powerdrive", "--force")
+    file.write_text(text[: len(text) // 2], encoding="utf-8")
+    for command in (("compare", file, "factory"), ("restore", "sim:powerdrive", file, "--dry-run")):
+        said = refused(2, *command)
+        assert (
+            f"{file}:{len((text[: len(text) // 2]).splitlines())}: " in said or "cut short" in said
+        )
+
+
+def test_2_two_families_are_not_compared(tmp_path: Path) -> None:
+    for family in ("atv31", "atv312"):
+        run(0, "backup", f"sim:{family}", tmp_path / f"{family}.toml")
+    assert "different families" in refused(
+        2, "compare", tmp_path / "atv31.toml", tmp_path / "atv312.toml"
+    )
+
+
+def test_3_nobody_answers(tmp_path: Path) -> None:
+    refused(3, "backup", "sim:atv71@2", tmp_path / "x.toml", "-d", "9")
+    assert not (tmp_path / "x.toml").exists()
+
+
+WRITES_REFUSED_HERE = [
+    (("ACC=5",), "Not armed"),
+    (("ACC=100000", "--arm"), "out of range"),
+    (("ACC=soon", "--arm"), "'soon'"),
+    (("RFR=5", "--arm"), "only be read"),
+    (("CMD=6", "--arm"), "order"),
+    (("LSP=60", "HSP=40", "--arm"), "above HSP"),
+    (("BIR=1", "--arm"), "unverified"),
+    (("FRY=1", "--arm"), "not written from here"),
+    (("ACC=5", "--arm", "--read-only"), "read-only"),
+]
+
+
+@pytest.mark.parametrize(("arguments", "text"), WRITES_REFUSED_HERE)
+def test_5_refused_here(arguments: tuple[str, ...], text: str) -> None:
+    assert text in refused(5, "write", "sim:atv71", *arguments)
+
+
+def test_5_nothing_is_restored_unarmed(tmp_path: Path) -> None:
+    run(0, "backup", "sim:atv21", tmp_path / "x.toml")
+    assert "Not armed" in refused(5, "restore", "sim:atv21", tmp_path / "x.toml")
+
+
+def test_5_a_motor_that_runs_is_not_set_up() -> None:
+    with simulated("atv312", "--tcp", "127.0.0.1:0", "--run", "30") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        said = refused(5, "write", line, "ACC=4", "FrS=60", "--arm")
+        assert "motor stopped only" in said
+        assert "1 to write" not in said
+        assert re.search(r"ACC .* 4\.0 +s ", run(0, "read", line, "ACC"))
+
+
+def test_an_unverified_one_is_written_when_confirmed() -> None:
+    assert "F111" in run(0, "write", "sim:atv21", "F111=Forced local", "--arm", "--confirm", "f111")
+
+
+def test_a_dry_run_of_write_sends_nothing(line: str) -> None:
+    assert "write  ACC: 3.0 s -> 9.0 s" in run(0, "write", line, "ACC=9", "-d", "2", "--dry-run")
+    assert "3.0" in run(0, "read", line, "ACC", "-d", "2")
+
+
+def test_where_the_drive_is_found_after_its_address_was_written() -> None:
+    with simulated("atv21", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        told = run(0, "write", line, "F802=7", "--arm")
+        assert "-d 7" in told
+        end = time.monotonic() + PATIENCE
+        while invoked("read", line, "F802", "-d", "7").exit_code != 0:
+            assert time.monotonic() < end
+
+
+def test_a_set_of_another_family_is_carried_over_by_quantity(line: str, tmp_path: Path) -> None:
+    with simulated("atv71", "--tcp", "127.0.0.1:0", "--set", "ACC=88") as simulation:
+        run(0, "backup", f"tcp:127.0.0.1:{port_of(simulation.ready)}", tmp_path / "71.toml")
+    told = run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--dry-run")
+    assert "write  ACC: 3.0 s -> 8.8 s" in told
+    assert "of another family" in told
+    run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--arm")
+    assert re.search(r"ACC .* 8\.8 +s ", run(0, "read", line, "ACC", "-d", "2"))

@@ -1,0 +1,102 @@
+"""`drivepanel compare`: two parameter sets, of files, drives or the factory."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .backup import take_set
+from .errors import USAGE, Failure, told
+from .options import Target, connect, on_line
+from .sets import set_in
+
+if TYPE_CHECKING:
+    from tui.drive.compare import Format
+    from tui.drive.parameter_set import ParameterSet
+    from tui.session.lines import OpenLine
+
+FACTORY = "factory"
+DIFFERENT = 1
+
+
+@click.command()
+@click.argument("a")
+@click.argument("b")
+@click.option("--all", "all_rows", is_flag=True, help="Show equal and measured ones too.")
+@click.option(
+    "--format",
+    "format_",
+    type=click.Choice(["text", "markdown", "csv"]),
+    default="text",
+    show_default=True,
+    help="Form of the table.",
+)
+@click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drives.")
+@click.option(
+    "-d",
+    "--device",
+    "devices",
+    type=click.IntRange(1, 247),
+    multiple=True,
+    metavar="ADDRESS",
+    help="Slave address of the drive; twice where A and B are two drives.",
+)
+@told
+def compare(
+    a: str,
+    b: str,
+    all_rows: bool,
+    format_: Format,
+    profile_id: str | None,
+    devices: tuple[int, ...],
+) -> None:
+    """Compare the settings of A and B: each a FILE, a LINE, or `factory`.
+
+    Measurements, counters and orders are no settings. Ends with 0 where all are equal and with 1
+    where some differ.
+    """
+    from tui.drive import library
+    from tui.drive.compare import compare as rows_of
+    from tui.drive.compare import factory_side, side_of
+    from tui.drive.compare import told as table
+
+    if len(devices) > 2:
+        raise click.UsageError("-d is given once, or once for A and once for B.")
+    places = devices or (1,)
+    sets = [
+        None if text == FACTORY else _set_of(text, Target(text, device, profile_id))
+        for text, device in ((a, places[0]), (b, places[-1]))
+    ]
+    ids = {found.head.profile for found in sets if found is not None}
+    if not ids:
+        raise click.UsageError("One of A and B must be a file or a drive.")
+    if len(ids) > 1:
+        raise Failure(
+            f"A and B are of different families ({', '.join(sorted(ids))}).\n'drivepanel restore"
+            " --dry-run' tells what can be carried from one to the other.",
+            USAGE,
+        )
+    profile = library.load(ids.pop())
+    sides = [
+        factory_side(profile) if found is None else side_of(text, found)
+        for text, found in zip((a, b), sets, strict=True)
+    ]
+    rows = rows_of(profile, *sides, all_rows=all_rows)
+    click.echo(table(rows, (a, b), format_), nl=False)
+    if any(row.differs for row in rows):
+        raise click.exceptions.Exit(DIFFERENT)
+
+
+def _set_of(text: str, target: Target) -> ParameterSet:
+    """The parameter set in a file, or that of a drive, read now."""
+    if Path(text).is_file():
+        return set_in(Path(text))
+    if Path(text).suffix == ".toml":
+        raise Failure(f"{text} is not there.", USAGE)
+
+    async def work(opened: OpenLine) -> ParameterSet:
+        return await take_set(await connect(opened, target))
+
+    return on_line(text, work, read_only=True)

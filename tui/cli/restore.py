@@ -1,0 +1,168 @@
+"""`drivepanel restore`: a parameter set back into a drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .backup import profile_option
+from .errors import DONE, DRIVE_REFUSED, told
+from .options import Target, connect, device_option, line_argument, on_line, read_only_option
+from .orders import arm_option, need_arming
+from .sets import (
+    codes_of,
+    confirm_option,
+    counter,
+    dry_run_option,
+    save_option,
+    say_afterwards,
+    say_result,
+    set_in,
+    status_of_results,
+)
+
+if TYPE_CHECKING:
+    from tui.drive.parameter_set import ParameterSet
+    from tui.drive.restore_plan import Options, RestorePlan
+    from tui.session.drive_session import DriveSession
+    from tui.session.lines import OpenLine
+
+NAMED = 12
+"""How many codes are named for one reason; --dry-run names all."""
+
+
+@click.command()
+@line_argument
+@click.argument("file", type=click.Path(path_type=Path))
+@dry_run_option
+@arm_option
+@click.option("--line-settings", is_flag=True, help="Write address, baud and format too.")
+@click.option("--rating", is_flag=True, help="Write rating and motor data to another model too.")
+@confirm_option
+@save_option
+@read_only_option
+@profile_option
+@device_option
+@told
+def restore(
+    line_text: str,
+    file: Path,
+    dry_run: bool,
+    arm: bool,
+    line_settings: bool,
+    rating: bool,
+    confirmed: tuple[str, ...],
+    save: bool,
+    read_only: bool,
+    profile_id: str | None,
+    device: int,
+) -> None:
+    """Bring a parameter set back into a drive: what differs is written and read back.
+
+    --dry-run tells what would be written, what is left out, and why. An interrupted restoring
+    is resumed by the same command: the drive is read, and what is missing is written.
+    """
+    if dry_run is arm:
+        if not dry_run:
+            need_arming(False, "restoring writes settings of the drive")
+        raise click.UsageError("Give either --dry-run or --arm.")
+    values = set_in(file)
+    target = Target(line_text, device, profile_id)
+
+    async def work(opened: OpenLine) -> int:
+        from tui.drive.restore_plan import Options
+
+        session = await connect(opened, target)
+        codes = codes_of(session, confirmed)
+        options = Options(line_settings, rating, codes)
+        if dry_run:
+            return await _tell(session, values, options)
+        return await _restore(session, values, options, save=save)
+
+    status = on_line(line_text, work, read_only=read_only or dry_run)
+    if status != DONE:
+        raise click.exceptions.Exit(status)
+
+
+async def _tell(session: DriveSession, values: ParameterSet, options: Options) -> int:
+    from tui.drive import library
+    from tui.session.restoring import plan_for
+
+    source = library.load(values.head.profile)
+    plan = await plan_for(session, values, source, options, counter("Read"))
+    say_plan(session, plan)
+    return DONE
+
+
+def say_plan(session: DriveSession, plan: RestorePlan) -> None:
+    """The plan: what is written in its order, and what is left out with its reason."""
+    from tui.drive.edits import ordered
+
+    items = {item.code: item for item in plan.of_kind("write")}
+    held = {edit.code: edit.old for edit in plan.edits if edit.old is not None}
+    for edit in ordered(session.profile, plan.edits, held):
+        item = items[edit.code]
+        click.echo(f"write  {item.code}: {item.old} -> {item.new}  {item.text}".rstrip())
+    for item in plan.of_kind("skip"):
+        if item.reason != "no setting":
+            value = f" {item.new}" if item.new else ""
+            click.echo(f"leave  {item.code}{value}: {item.text}")
+    if plan.same_rating is False and not plan.across:
+        click.echo("The set is of another model or rating than this drive.")
+    if plan.across:
+        click.echo(
+            "The set is of another family: common quantities are carried over in their units."
+        )
+    stop = " Some of it needs the motor stopped." if plan.needs_stop else ""
+    click.echo(
+        f"{plan.count('write')} to write, {plan.count('equal')} equal already,"
+        f" {plan.count('skip')} left out.{stop}"
+    )
+
+
+async def _restore(
+    session: DriveSession, values: ParameterSet, options: Options, *, save: bool
+) -> int:
+    from tui.drive import library
+    from tui.session.journal import Journal
+    from tui.session.memory import save_to_eeprom
+    from tui.session.restoring import Mark
+    from tui.session.restoring import restore as bring_back
+
+    source = library.load(values.head.profile)
+    if told_before := Mark.of(session).interrupted:
+        click.echo(told_before)
+    journal = Journal()
+    try:
+        done = await bring_back(
+            session, journal, values, source, options,
+            progress=say_result, reading=counter("Read"),
+        )  # fmt: skip
+        say_plan_left_out(done.plan)
+        for link in done.links:
+            click.echo(link.text)
+        saved = save and done.complete
+        if saved:
+            click.echo(await save_to_eeprom(session, journal))
+        say_afterwards(done.after_reset, done.unsaved, saved=saved)
+        written = sum(result.done for result in done.results)
+        click.echo(f"{written} written and read back, {len(done.left)} not.")
+        if done.complete:
+            return DONE
+        click.echo("drivepanel: The same command writes what is missing.", err=True)
+        return status_of_results(done.results) or DRIVE_REFUSED
+    finally:
+        journal.close()
+
+
+def say_plan_left_out(plan: RestorePlan) -> None:
+    """What was left out, by reason."""
+    reasons: dict[str, list[str]] = {}
+    for item in plan.of_kind("skip"):
+        if item.reason != "no setting":
+            reasons.setdefault(item.reason, []).append(item.code)
+    for reason, codes in reasons.items():
+        more = f" and {len(codes) - NAMED} more" if len(codes) > NAMED else ""
+        click.echo(f"left out, {reason}: {', '.join(codes[:NAMED])}{more}")

@@ -1,0 +1,118 @@
+"""What the commands about settings and parameter sets share."""
+
+from __future__ import annotations
+
+import asyncio
+import sys
+import time
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from .errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, USAGE, Failure
+
+if TYPE_CHECKING:
+    from tui.drive.parameter_set import ParameterSet
+    from tui.session.applying import Result
+    from tui.session.drive_session import DriveSession
+    from tui.session.upload import Upload
+
+OUTAGE = 20.0
+"""Seconds for which a read-out waits for a lost line to come back."""
+LOOK = 0.1
+
+confirm_option = click.option(
+    "--confirm",
+    "confirmed",
+    multiple=True,
+    metavar="CODE",
+    help="Write this unverified parameter too, after comparing it with the keypad.",
+)
+save_option = click.option(
+    "--save", is_flag=True, help="Save the settings to the drive's EEPROM afterwards."
+)
+dry_run_option = click.option(
+    "--dry-run", is_flag=True, help="Tell what would be written, and write nothing."
+)
+
+
+def set_in(path: Path) -> ParameterSet:
+    """The parameter set in a file; raises Failure with status 2 for a bad one."""
+    from tui.drive.parameter_set import SetError
+    from tui.drive.set_file import read_set
+
+    try:
+        return read_set(path)
+    except SetError as error:
+        raise Failure(str(error), USAGE) from error
+
+
+def codes_of(session: DriveSession, names: Iterable[str]) -> frozenset[str]:
+    """The codes that a person named in any notation; raises UnknownParameter."""
+    return frozenset(session.profile.find(name).code for name in names)
+
+
+async def read_out(upload: Upload) -> None:
+    """Read what is left of an upload; a line that is lost for a moment does not end it.
+
+    Raises the line's errors where it does not come back.
+    """
+    from tui.bus.errors import LineLost
+    from tui.bus.line import LineStatus
+
+    line = upload.session.line
+    while not upload.done:
+        try:
+            await upload.run()
+        except LineLost:
+            end = time.monotonic() + OUTAGE
+            while line.state.status is not LineStatus.CONNECTED:
+                if time.monotonic() > end:
+                    raise
+                await asyncio.sleep(LOOK)
+
+
+def counter(what: str) -> Callable[[int, int], None] | None:
+    """Shows progress in one line of a terminal; None where nobody would see it."""
+    if not sys.stderr.isatty():
+        return None
+
+    def show(done: int, of: int) -> None:
+        end = "\n" if done >= of else ""
+        click.echo(f"\r{what}: {done} of {of}", err=True, nl=False)
+        click.echo(end, err=True, nl=False)
+
+    return show
+
+
+def say_result(done: int, of: int, result: Result) -> None:
+    """One written or refused setting: on standard output, or as an error."""
+    text = f"{done}/{of}  {result.text}"
+    click.echo(text if result.done else f"drivepanel: {text}", err=not result.done)
+
+
+def status_of_results(results: Iterable[Result]) -> int:
+    """The exit status of a number of writes: the worst that has happened."""
+    from tui.session.applying import Outcome
+
+    table = {
+        Outcome.DRIVE_REFUSED: DRIVE_REFUSED,
+        Outcome.NOT_TAKEN: DRIVE_REFUSED,
+        Outcome.REFUSED: REFUSED_HERE,
+        Outcome.CHANGED: REFUSED_HERE,
+        Outcome.UNKNOWN: LINE_TROUBLE,
+        Outcome.NOT_SENT: LINE_TROUBLE,
+    }
+    statuses = {table[r.outcome] for r in results if r.outcome in table}
+    order = (LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE)
+    return next((status for status in order if status in statuses), DONE)
+
+
+def say_afterwards(after_reset: Iterable[str], unsaved: Iterable[str], *, saved: bool) -> None:
+    """What a person has to know once settings are written."""
+    if waiting := ", ".join(after_reset):
+        click.echo(f"In force only after the next reset of the drive: {waiting}.")
+    if any(True for _ in unsaved) and not saved:
+        click.echo("Lost at power-off until they are saved: --save does that, motor stopped.")

@@ -1,0 +1,134 @@
+"""`drivepanel write`: settings of a drive, in engineering values."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from .backup import profile_option
+from .errors import DONE, told
+from .options import Target, connect, device_option, line_argument, on_line, read_only_option
+from .orders import arm_option, need_arming
+from .sets import (
+    codes_of,
+    confirm_option,
+    dry_run_option,
+    save_option,
+    say_afterwards,
+    say_result,
+    status_of_results,
+)
+
+if TYPE_CHECKING:
+    from tui.drive.edits import Edits
+    from tui.session.drive_session import DriveSession
+    from tui.session.lines import OpenLine
+
+
+@click.command()
+@line_argument
+@click.argument("wanted", nargs=-1, required=True, metavar="CODE=VALUE...")
+@dry_run_option
+@arm_option
+@confirm_option
+@save_option
+@read_only_option
+@profile_option
+@device_option
+@told
+def write(
+    line_text: str,
+    wanted: tuple[str, ...],
+    dry_run: bool,
+    arm: bool,
+    confirmed: tuple[str, ...],
+    save: bool,
+    read_only: bool,
+    profile_id: str | None,
+    device: int,
+) -> None:
+    """Write settings of a drive, each read back: ACC=3.5s HSP=50 CHCF=Separate.
+
+    A VALUE is a number with or without its unit, a name as the profile gives it, or a word in
+    hexadecimal (16#0021). Limits and scales are written before what depends on them.
+    """
+    typed = _pairs(wanted)
+    if not dry_run:
+        need_arming(arm, "this writes settings of the drive")
+    target = Target(line_text, device, profile_id)
+
+    async def work(opened: OpenLine) -> int:
+        session = await connect(opened, target)
+        edits = await _staged(session, typed)
+        if dry_run:
+            for edit in edits:
+                click.echo(f"write  {edit.code}: {edit.old_text} -> {edit.text}")
+            return DONE
+        return await _write(session, edits, confirmed, save=save)
+
+    status = on_line(line_text, work, read_only=read_only or dry_run)
+    if status != DONE:
+        raise click.exceptions.Exit(status)
+
+
+def _pairs(wanted: tuple[str, ...]) -> list[tuple[str, str]]:
+    pairs = []
+    for text in wanted:
+        code, sign, value = text.partition("=")
+        if not sign or not code.strip() or not value.strip():
+            raise click.UsageError(f"{text!r} is not written CODE=VALUE, like ACC=3.5s.")
+        pairs.append((code.strip(), value.strip()))
+    return pairs
+
+
+async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
+    """The edits against what the drive holds; what is to be known of them is said."""
+    from tui.drive.edits import Edits, consequences
+    from tui.drive.errors import ValueRefused
+    from tui.drive.shown import scale_sources
+    from tui.session.asking import Asker
+
+    profile = session.profile
+    pairs = [(profile.find(code).code, value) for code, value in typed]
+    sources = scale_sources(profile)
+    follow = [p.code for p in profile.parameters if p.scale_by and {c for c, _ in pairs} & sources]
+    asker = Asker(session)
+    await asker.ask_many([code for code, _ in pairs] + sorted(sources) + follow)
+    edits = Edits()
+    # scale sources first: what is typed for a ramp holds under the new scale
+    for code, value in sorted(pairs, key=lambda pair: pair[0] not in sources):
+        if profile[code].access == "r":
+            raise ValueRefused(f"{code} can only be read.")
+        edits = edits.stage(profile, code, value, asker.raws, asker.lacking)
+    for edit in edits.asked:
+        if edit.remark:
+            click.echo(edit.remark)
+    for text in consequences(profile, edits, asker.raws, asker.lacking):
+        click.echo(text)
+    return edits
+
+
+async def _write(
+    session: DriveSession, edits: Edits, confirmed: tuple[str, ...], *, save: bool
+) -> int:
+    from tui.session.applying import apply_edits
+    from tui.session.journal import Journal
+    from tui.session.memory import save_to_eeprom
+
+    if not len(edits):
+        click.echo("The drive holds these values already.")
+    journal = Journal()
+    try:
+        done = await apply_edits(
+            session, journal, edits, confirmed=codes_of(session, confirmed), progress=say_result
+        )
+        for link in done.links:
+            click.echo(link.text)
+        saved = save and len(done.written) == len(done.results) and not done.stopped
+        if saved:
+            click.echo(await save_to_eeprom(session, journal))
+        say_afterwards(done.after_reset, done.unsaved, saved=saved)
+        return status_of_results(done.results)
+    finally:
+        journal.close()
