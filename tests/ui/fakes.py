@@ -45,7 +45,7 @@ STORED = {
     "RFP0": 488, "LCP0": 84, "ULP0": 3980, "THP0": 50, "RTP0": 2483,
     "EP0": 0x0637, "IP0": 0x0812, "CMP0": 0x000F, "CRP0": 0x0015,
 }  # fmt: skip
-FOLDER = Path("/home/pump/.local/state/drivepanel")
+FOLDER = Path("/var/lib/drivepanel")
 
 
 class StillClock(Clock):
