@@ -231,3 +231,15 @@ def test_a_set_of_another_family_is_carried_over_by_quantity(line: str, tmp_path
     assert "of another family" in told
     run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--arm")
     assert re.search(r"ACC .* 8\.8 +s ", run(0, "read", line, "ACC", "-d", "2"))
+
+
+def test_a_report(line: str, tmp_path: Path) -> None:
+    file = tmp_path / "pump.md"
+    run(0, "write", line, "ACC=9", "-d", "2", "--arm")
+    run(0, "report", line, file, "-d", "2")
+    text = file.read_text(encoding="utf-8")
+    assert text.startswith("# Altivar 312 at tcp:")
+    assert "| ACC | 3.0 s | 9.0 s | ok | setting |" in text
+    assert "is there already" in refused(2, "report", line, file, "-d", "2")
+    assert file.read_text(encoding="utf-8") == text
+    run(0, "report", line, file, "-d", "2", "--force")

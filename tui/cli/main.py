@@ -21,6 +21,7 @@ COMMANDS = {
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "read": ("read", "Read parameters of a drive."),
     "reference": ("orders", "Give a drive its reference."),
+    "report": ("report", "Write a report on a drive to a file."),
     "reset": ("orders", "Reset a drive's fault."),
     "restore": ("restore", "Bring a parameter set back into a drive."),
     "run": ("run", "Run a motor until this command is ended."),

@@ -1,0 +1,74 @@
+"""The report on a drive: every family, what changed, what the journal knows."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.session.sets_bench import FAMILIES, bench
+from tui.session.identify import identify
+from tui.session.report import entries_of, report
+from tui.session.upload import Upload
+
+SECTIONS = [
+    "## Line settings of the drive",
+    "## Settings changed from the factory",
+    "## Control source",
+    "## Indirect blocks and scanner",
+    "## When the line falls silent",
+    "## Faults",
+    "## Written from here",
+]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_every_family_has_its_report(family: str) -> None:
+    with bench(family) as made:
+        upload = Upload(made.session)
+        await upload.run()
+        text = report(made.profile, upload.parameter_set(), [])
+    heads = [line for line in text.splitlines() if line.startswith("## ")]
+    assert heads == SECTIONS
+    assert text.startswith(f"# {made.profile.name} at serial:")
+    for setting in made.profile.data.link.settings:
+        assert f"| {setting.parameter} |" in text
+    tables = [line.count(" | ") for line in text.splitlines() if line.startswith("| ")]
+    assert tables
+
+
+async def test_what_was_changed_with_what_was_before() -> None:
+    with bench("atv312", sets={"ttO": 33}) as made:
+        made.session.identity = await identify(made.session.line, 1)
+        await made.apply(SP2="7", ttO="5")
+        made.drive.provoke("OCF")
+        upload = Upload(made.session)
+        await upload.run()
+        entries = entries_of(made.journal, made.session.line_text, 1)
+        assert [entry.code for entry in entries] == ["SP2", "ttO"]
+        text = report(made.profile, upload.parameter_set(), entries)
+        assert entries_of(made.journal, made.session.line_text, 2) == []
+    rows = [line for line in text.splitlines() if line.startswith("| ttO |")]
+    assert any(row.endswith("| 10.0 s | 5.0 s | 3.3 s |") for row in rows), rows
+    assert "- Reference: ATV312" in text
+    assert "OCF" in text.partition("## Faults")[2].partition("##")[0]
+    assert "| SP2 | 10.0 Hz | 7.0 Hz | ok | setting |" in text
+
+
+async def test_the_scanner_tells_what_it_brings() -> None:
+    with bench("atv71", sets={"NMA1": 3201, "NMA2": 0}) as made:
+        upload = Upload(made.session)
+        await upload.run()
+        text = report(made.profile, upload.parameter_set(), [])
+    assert f"| NMA1 | ETA {made.profile['ETA'].name} |" in text
+    assert "| NMA2 | nothing |" in text
+    assert "None." in text.partition("## Written from here")[2]
+
+
+async def test_damaged_lines_of_the_journal_are_left_out() -> None:
+    with bench("atv71") as made:
+        await made.apply(ACC="5")
+        path = made.journal.path
+        path.with_name(f"{path.name}.1").write_text('{"half\n[1]\n{"a": 1}\n', encoding="utf-8")
+        with path.open("a", encoding="utf-8") as file:
+            file.write("cut short\n")
+        entries = entries_of(made.journal, made.session.line_text, 1)
+        assert [entry.code for entry in entries] == ["ACC"]

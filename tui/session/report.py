@@ -1,0 +1,215 @@
+"""A report on one drive as Markdown: what it is, how it is set up, and what was changed."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, fields
+from pathlib import Path
+
+from tui.drive.chart import read_chart
+from tui.drive.compare import compare, factory_side, side_of
+from tui.drive.control_source import source_in_force
+from tui.drive.parameter_set import ParameterSet, lacking
+from tui.drive.profile import Profile
+from tui.drive.schema import Block, Quantity
+from tui.drive.shown import shown
+from tui.drive.values import NOT_AVAILABLE, set_bits
+
+from .journal import KEPT, Entry, Journal
+
+LONGEST = 200
+"""How many entries of the journal a report shows at most, the last ones."""
+CHANNELS: tuple[Quantity, ...] = ("command_channel", "reference_channel")
+
+
+def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
+    """What the journal's files tell of a drive on a line, oldest first; damaged lines left out."""
+    files = [journal.path.with_name(f"{journal.path.name}.{n}") for n in range(KEPT, 0, -1)]
+    found = (entry for file in (*files, journal.path) for entry in _entries(file))
+    return [entry for entry in found if (entry.line, entry.device) == (line, device)]
+
+
+def _entries(file: Path) -> Iterator[Entry]:
+    try:
+        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return
+    names = {field.name for field in fields(Entry)}
+    for line in lines:
+        try:
+            told = json.loads(line)
+        except ValueError:
+            continue
+        if isinstance(told, dict) and set(told) == names:
+            yield Entry(**told)
+
+
+def report(profile: Profile, values: ParameterSet, entries: Sequence[Entry]) -> str:
+    """The whole report; `entries` are those of the journal about this drive, oldest first."""
+    maker = _Report(profile, values, entries)
+    parts = (
+        maker.head(),
+        maker.line(),
+        maker.changed(),
+        maker.control(),
+        maker.blocks(),
+        maker.watch(),
+        maker.faults(),
+        maker.journal(),
+    )
+    return "\n".join(line for part in parts for line in (*part, ""))
+
+
+@dataclass(frozen=True, slots=True)
+class _Report:
+    profile: Profile
+    values: ParameterSet
+    entries: Sequence[Entry]
+
+    def head(self) -> list[str]:
+        """What the drive is, and when and where it was read."""
+        head = self.values.head
+        known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
+        return [
+            f"# {self.profile.name} at {head.line}, address {head.device}",
+            "",
+            f"- Read: {head.time}",
+            f"- Profile: {self.profile.id}, version {head.profile_version}; panel {head.panel}",
+            *(known or ["- The drive does not say who it is."]),
+            f"- Parameters: {len(self.values.raws)} read, {len(self.values.absent)} not",
+        ]
+
+    def line(self) -> list[str]:
+        """The drive's own settings of its line."""
+        rows = [
+            (s.parameter, self.profile[s.parameter].name, self.text(s.parameter))
+            for s in self.profile.data.link.settings
+        ]
+        return ["## Line settings of the drive", "", *_table(("code", "name", "value"), rows)]
+
+    def changed(self) -> list[str]:
+        """Settings that are not as from the factory, with what the journal knows of before."""
+        before: dict[str, str] = {}
+        for entry in self.entries:
+            before.setdefault(entry.code, entry.old)
+        sides = factory_side(self.profile), side_of("now", self.values)
+        rows = [
+            (row.code, row.name, row.a, row.b, before.get(row.code, ""))
+            for row in compare(self.profile, *sides)
+        ]
+        known = len(sides[0].raws)
+        return [
+            "## Settings changed from the factory",
+            "",
+            f"The factory settings of {known} parameters are known. Before: the first old value in"
+            " the journal.",
+            "",
+            *_table(("code", "name", "factory", "now", "before"), rows),
+        ]
+
+    def control(self) -> list[str]:
+        """Who commands the drive and who gives its reference."""
+        raws = self.values.raws
+        source = source_in_force(self.profile, raws)
+        lines = [f"- Configuration: {source.name if source else 'none of those in the manual'}"]
+        if channel := read_chart(self.profile, raws).channel:
+            lines.append(f"- Commanded by: {channel}")
+        for quantity in CHANNELS:
+            parameter = self.profile.quantity(quantity)
+            if parameter is None or parameter.code not in raws:
+                continue
+            text = self.text(parameter.code)
+            if parameter.bits:
+                bits = set_bits(parameter.bits, raws[parameter.code])
+                text = ", ".join(bit.name for bit in bits) or "none"
+            lines.append(f"- {parameter.name} ({parameter.code}): {text}")
+        return ["## Control source", "", *lines]
+
+    def blocks(self) -> list[str]:
+        """What indirect blocks and the communication scanner bring."""
+        lines: list[str] = ["## Indirect blocks and scanner", ""]
+        if not self.profile.data.blocks:
+            return [*lines, "This family has none."]
+        for block in self.profile.data.blocks:
+            rows = [(slot, self._target(block, slot)) for slot in block.slots]
+            lines += [f"{block.name}:", "", *_table(("place", "stands for"), rows), ""]
+        return lines[:-1]
+
+    def _target(self, block: Block, slot: str) -> str:
+        raw = self.values.raws.get(slot)
+        if raw is None:
+            return NOT_AVAILABLE
+        if block.selects_by == "address":
+            found = self.profile.at(raw & 0xFFFF) if raw else None
+            code = found.code if found else ""
+        else:
+            code = next((c.parameter for c in block.choices if c.raw == raw), "")
+        if code:
+            return f"{code} {self.profile[code].name}"
+        return "nothing" if not raw else f"raw {raw}"
+
+    def watch(self) -> list[str]:
+        """What the drive does when the line falls silent."""
+        watch = self.profile.data.communication_fault
+        lines = ["## When the line falls silent", ""]
+        if watch is None:
+            return [*lines, "What this family does then is in no document at hand."]
+        raw = self.values.raws.get(watch.timeout)
+        off = ", the watch is off" if raw is not None and raw == watch.off else ""
+        lines.append(f"- Time-out ({watch.timeout}): {self.text(watch.timeout)}{off}")
+        if watch.reaction:
+            held = self.values.raws.get(watch.reaction)
+            known = next((r for r in watch.reactions if r.raw == held), None)
+            does = f": {known.does}" if known else ""
+            lines.append(f"- Reaction ({watch.reaction}): {self.text(watch.reaction)}{does}")
+        elif watch.reactions:
+            lines.append(f"- Reaction: {watch.reactions[0].does}")
+        return [*lines, f"- The watch begins: {watch.starts}"]
+
+    def faults(self) -> list[str]:
+        """The present or last fault, and the history that the drive keeps."""
+        data = self.profile.data.faults
+        codes = [code for code in (data.parameter, *data.history) if code]
+        rows = [(code, self.profile[code].name, self._fault(code)) for code in codes]
+        return ["## Faults", "", *_table(("code", "name", "fault"), rows)]
+
+    def _fault(self, code: str) -> str:
+        raw = self.values.raws.get(code)
+        if raw is None:
+            return NOT_AVAILABLE
+        fault = self.profile.fault(raw)
+        if fault is None:
+            return "none" if raw == self.profile.data.faults.none else self.text(code)
+        return f"{fault.code} {fault.name}"
+
+    def journal(self) -> list[str]:
+        """What was written to this drive from this machine."""
+        last = self.entries[-LONGEST:]
+        left = len(self.entries) - len(last)
+        rows = [
+            (e.time[:19].replace("T", " "), e.code, e.old, e.new, e.answer, e.why) for e in last
+        ]
+        head = ("time", "code", "old", "new", "answer", "why")
+        earlier = [f"{left} earlier ones are in the journal.", ""] if left else []
+        return ["## Written from here", "", *earlier, *_table(head, rows)]
+
+    def text(self, code: str) -> str:
+        """A parameter's value as a person reads it."""
+        raw = self.values.raws.get(code)
+        if raw is None:
+            return NOT_AVAILABLE
+        raws = self.values.raws
+        parameter = self.profile[code]
+        return shown(self.profile, parameter, raw, raws, lacking(self.profile, raws)).display
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:
+    lines = ["| " + " | ".join(_cell(cell) for cell in row) + " |" for row in rows]
+    if not lines:
+        return ["None."]
+    return ["| " + " | ".join(head) + " |", "|" + "---|" * len(head), *lines]
+
+
+def _cell(text: str) -> str:
+    return text.replace("|", "\\|").replace("\n", " ")
