@@ -100,6 +100,8 @@ def test_a_value_edited_by_hand_counts_once_raw_is_taken_out() -> None:
     assert read(with_scale).raws["ACC"] == 425
     assert read(with_scale).raws["INR"] == 0
     assert read(small().replace('raw = 30, value = "3.0 s"', "value = 4.5")).raws["ACC"] == 45
+    rounded = read(small().replace('raw = 30, value = "3.0 s"', 'value = "4.56 s"'))
+    assert (rounded.raws["ACC"], rounded.notes) == (46, {"ACC": "ACC: 4.56 s is held as 4.6 s."})
 
 
 FAULTS = [

@@ -8,7 +8,7 @@ import time
 import pytest
 
 from tests.session.sets_bench import Bench, bench
-from tui.bus.errors import NoAnswer, RequestRefused
+from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.memory_orders import MemoryRefused
 from tui.session import asking
 from tui.session.applying import Applied, Outcome, Result, apply_edits
@@ -200,6 +200,7 @@ async def test_lost_replies_do_not_write_twice_nor_forget() -> None:
             assert result.done == (held == result.edit.new), result.text
         registers = [register for register, _ in made.writes()]
         assert len(registers) == len(set(registers))
+        assert made.session.line.counters.timeouts > 0, "no reply was lost: nothing was shown"
 
 
 async def test_a_read_only_line_writes_nothing() -> None:
@@ -318,3 +319,10 @@ async def rest(made: Bench) -> None:
     while made.drive.motor.frequency:
         assert time.monotonic() < end, "the motor does not come to rest"
         await asyncio.sleep(0.05)
+
+
+async def test_a_drive_that_refuses_to_save_says_why() -> None:
+    with bench("atv71") as made:
+        made.drive.busy = True
+        with pytest.raises(DeviceException, match="Check whether the parameter can be written"):
+            await save_to_eeprom(made.session, made.journal)

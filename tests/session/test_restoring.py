@@ -7,6 +7,7 @@ import asyncio
 import pytest
 
 from tests.session.sets_bench import FAMILIES, Bench, bench
+from tui.bus.errors import RequestRefused
 from tui.drive import library
 from tui.drive.compare import Side, compare, side_of
 from tui.drive.memory_orders import FACTORY
@@ -146,6 +147,34 @@ async def test_a_lost_line_keeps_the_rest_and_the_mark() -> None:
         made.regain_line()
         again = await restored(made, values, Options())
         assert again.complete, again
+
+
+async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
+    with bench("atv312", sets=known("atv312"), tcp=True) as made:
+        values = await backed_up(made)
+        await to_factory(made)
+        looked: list[int] = []
+
+        def reading(done: int, of: int) -> None:
+            looked.append(done)
+            if looked.count(of) == 1 and done < of:
+                made.lose_line()
+
+        done = await restore(
+            made.session, made.journal, values, made.profile, reading=reading
+        )  # fmt: skip
+        assert done.stopped
+        assert any(result.done for result in done.results)
+        assert Mark.of(made.session).interrupted
+        made.regain_line()
+        assert (await restored(made, values, PLAIN)).complete
+
+
+async def test_a_read_only_line_is_not_restored_to() -> None:
+    with bench("atv71", read_only=True) as made:
+        with pytest.raises(RequestRefused, match="read-only"):
+            await restored(made, values_of("atv71", {"ACC": 50}), PLAIN)
+        assert not Mark.of(made.session).path.exists()
 
 
 async def test_an_equal_drive_is_written_nothing() -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from .errors import DriveError
@@ -57,6 +57,8 @@ class ParameterSet:
     """Codes in the file that the profile does not have, with their values as written."""
     lines: Mapping[str, int] = field(default_factory=dict)
     """Where each code stands in its file."""
+    notes: Mapping[str, str] = field(default_factory=dict)
+    """By code, what is to be known of a value that was edited by hand: its rounding."""
 
 
 def dumps(profile: Profile, values: ParameterSet) -> str:
@@ -121,9 +123,3 @@ def _key(text: str) -> str:
 def _text(text: str) -> str:
     """A basic string of TOML: JSON's, with the one character more that TOML wants escaped."""
     return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
-
-
-def without(values: ParameterSet, codes: Collection[str]) -> ParameterSet:
-    """The same set without some parameters."""
-    kept = {code: raw for code, raw in values.raws.items() if code not in codes}
-    return ParameterSet(values.head, kept, values.absent, values.unknown, values.lines)

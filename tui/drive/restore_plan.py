@@ -194,6 +194,7 @@ class _Planner:
         self.source = source
         self.source_profile = source_profile
         self.options = options
+        self._across = across
         self.same_rating = same_rating(profile, held, source, across=across)
         self.items: dict[str, Item] = {}
         self.edits = Edits()
@@ -329,7 +330,9 @@ class _Planner:
     def _tell(self, edits: Iterable[Edit]) -> None:
         for edit in edits:
             kind: Kind = "equal" if edit.new == edit.old else "write"
-            self.items[edit.code] = Item(edit.code, kind, "", edit.remark, edit.old_text, edit.text)
+            note = "" if self._across else self.source.notes.get(edit.code, "")
+            told = f"{note} {edit.remark}".strip()
+            self.items[edit.code] = Item(edit.code, kind, "", told, edit.old_text, edit.text)
 
     def _skip(self, code: str, reason: Reason, text: str, new: str = "") -> None:
         raw = self.held.raws.get(code)

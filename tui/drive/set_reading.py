@@ -54,9 +54,10 @@ def loads(text: str, file: str, profile_of: Callable[[str], Profile]) -> Paramet
     _check_whole(tables, text, len(entries), fault)
     profile = profile_of(head.profile)
     known = [entry for entry in entries if profile.get(entry.code) is not None]
+    resolver = _Resolver(profile, fault)
     return ParameterSet(
         head=head,
-        raws=_Resolver(profile, fault).raws(known),
+        raws=resolver.raws(known),
         absent={str(code): str(why) for code, why in _table(tables, ABSENT).items()},
         unknown={
             e.code: e.value if e.value is not None else str(e.raw)
@@ -64,6 +65,7 @@ def loads(text: str, file: str, profile_of: Callable[[str], Profile]) -> Paramet
             if profile.get(e.code) is None
         },
         lines={entry.code: entry.line for entry in entries},
+        notes=resolver.notes,
     )
 
 
@@ -194,6 +196,7 @@ class _Resolver:
     profile: Profile
     fault: _Fault
     found: dict[str, int] = field(default_factory=dict)
+    notes: dict[str, str] = field(default_factory=dict)
 
     def raws(self, entries: list[_Entry]) -> dict[str, int]:
         told = {entry.code: entry.raw for entry in entries if entry.raw is not None}
@@ -239,4 +242,8 @@ class _Resolver:
             raise self.fault(entry.line, str(error)) from error
         if conversion.rounded and entry.raw is not None:
             raise self.fault(entry.line, f"{entry.code}: {entry.value} cannot be held exactly.")
+        if conversion.rounded:
+            absent = lacking(self.profile, raws)
+            held = shown(self.profile, parameter, conversion.raw, raws, absent).display
+            self.notes[entry.code] = f"{entry.code}: {entry.value} is held as {held}."
         return conversion.raw

@@ -30,8 +30,8 @@ NAMED = 8
 async def save_to_eeprom(session: DriveSession, journal: Journal) -> str:
     """Copy the settings to EEPROM and wait until the drive is done; returns what was done.
 
-    Raises MemoryRefused (wrong state, or the family needs or knows no such order) and the
-    line's errors.
+    Raises MemoryRefused (wrong state, or the family needs or knows no such order),
+    DeviceException with what the drive's refusal means, and the line's other errors.
     """
     order = save_order(session.profile)
     await _carry_out(session, journal, order, why="save to EEPROM", confirmed={order.parameter})
@@ -44,7 +44,7 @@ async def factory_reset(
     """Recall the factory settings and look what became of them; returns what was done.
 
     Raises MemoryRefused (wrong state, order not known, or its word unverified and not among
-    `confirmed`) and the line's errors.
+    `confirmed`), DeviceException with what the drive's refusal means, and the line's other errors.
     """
     order = factory_order(session.profile)
     asker = await _carry_out(session, journal, order, why="factory settings", confirmed=confirmed)
@@ -83,8 +83,10 @@ async def _carry_out(
         # the drive takes the order back by itself: what it holds afterwards proves nothing
         await Writer(session, journal).write(parameter, raw, why=why, read_back=False)
     except DeviceException as error:
-        text = device_refusal(profile, parameter, error, asker.headline)
-        raise MemoryRefused(text) from error
+        text = device_refusal(profile, parameter, error, asker.headline).rstrip(".")
+        raise DeviceException(
+            error.device, error.function, error.address, error.code, text
+        ) from error
     await _until_done(asker, order)
     return asker
 

@@ -12,10 +12,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
+from tui.bus.errors import LineError, RequestRefused
 from tui.drive.edits import Edits
 from tui.drive.parameter_set import ParameterSet
 from tui.drive.profile import Profile
 from tui.drive.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
+from tui.drive.writable import waits_for_reset
 
 from .applying import Applied, Progress, Result, apply_edits
 from .drive_session import DriveSession
@@ -76,23 +78,32 @@ async def restore(
 
     Raises the line's errors while nothing was written yet.
     """
+    if session.line.read_only:
+        raise RequestRefused("The line is read-only: nothing is written.")
     plan = await plan_for(session, source, source_profile, options, reading)
     first, results = plan, dict[str, Result]()
     links: list[LinkChange] = []
     mark = Mark.of(session)
-    mark.begin(source, len(plan.edits))
-    stopped = ""
-    for _ in range(PASSES):
-        if not len(plan.edits):
+    if len(plan.edits):
+        mark.begin(source, len(plan.edits))
+    stopped, left = "", plan.edits
+    for number in range(PASSES):
+        if not len(left):
             break
-        applied = await _one_pass(session, journal, plan, options, progress)
-        results.update({result.edit.code: result for result in applied.results})
-        links += applied.links
-        stopped = applied.stopped
-        if stopped or not applied.written:
+        try:
+            applied = await _one_pass(session, journal, plan, options, progress)
+            results.update({result.edit.code: result for result in applied.results})
+            links += applied.links
+            stopped, left = applied.stopped, applied.left
+            if stopped or not applied.written:
+                break
+            plan = await plan_for(session, source, source_profile, options, reading)
+        except LineError as error:
+            if not number and not results:
+                raise
+            stopped = str(error)
             break
-        plan = await plan_for(session, source, source_profile, options, reading)
-    left = applied.left if stopped else plan.edits
+        left = plan.edits
     if not stopped and not len(left):
         mark.end()
     done = [code for code, result in results.items() if result.done]
@@ -102,7 +113,7 @@ async def restore(
         results=tuple(results.values()),
         left=left,
         links=tuple(links),
-        after_reset=tuple(p.code for p in parameters if p.effective == "after-reset"),
+        after_reset=tuple(p.code for p in parameters if waits_for_reset(session.profile, p)),
         unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
         stopped=stopped,
     )
