@@ -76,6 +76,29 @@ def test_a_command_imports_what_it_needs_and_no_more(
     assert not loaded & unwanted
 
 
+def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> None:
+    start = (
+        "import asyncio, sys\n"
+        "from tui.cli import panel\n"
+        "from tui.app import DrivePanelApp\n"
+        "async def first_picture():\n"
+        "    app = DrivePanelApp()\n"
+        "    async with app.run_test() as pilot:\n"
+        "        await pilot.pause()\n"
+        "        assert app.connection.query_one('#lines').option_count\n"
+        "        await pilot.press('space', 'f12', 'f9')\n"  # the stop keys work all the same
+        "asyncio.run(first_picture())\n"
+        "print(*sys.modules)\n"
+    )
+    done = run(sys.executable, "-c", start)
+    assert done.returncode == 0, done.stderr
+    loaded = set(done.stdout.split())
+    assert "tui.screens.connection" in loaded
+    unwanted = {"pymodbus", "msgspec", "tui.bus.line", "tui.drive.profile", "tui.simulator"}
+    assert not loaded & unwanted
+    assert not {"tui.session.monitor", "tui.screens.monitor", "tui.session.journal"} & loaded
+
+
 def test_the_wheel_holds_tui_alone_and_all_profiles(tmp_path: Path) -> None:
     build = "import sys; from hatchling.build import build_wheel; build_wheel(sys.argv[1])"
     done = run(sys.executable, "-c", build, str(tmp_path))

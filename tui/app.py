@@ -7,7 +7,7 @@ import logging
 import threading
 from collections.abc import Callable, Iterable
 from contextlib import suppress
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.console import RenderableType
 from rich.text import Text
@@ -15,19 +15,11 @@ from textual.app import SystemCommand
 from textual.driver import Driver
 from textual.events import Event, Key
 from textual.screen import Screen
-from textual.widgets import Input, TextArea
+from textual.widgets import Input
 
 from tui.bus.errors import LineClosed
-from tui.drive.schema import OrderId
-from tui.session.command import Commander
-from tui.session.drive_session import DriveSession
-from tui.session.editor import Editor
-from tui.session.fault_record import Recorder
-from tui.session.journal import Journal
-from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line, state_folder
-from tui.session.stop import Stopper, StopSummary
 from tui.widgets.clock import Clock
 from tui.widgets.lean import lean
 from tui.widgets.palette import THEME
@@ -35,11 +27,20 @@ from tui.widgets.palette import THEME
 from .screens.actions import ACTIONS, CONNECTION, bindings
 from .screens.confirm import Confirm
 from .screens.connection import ConnectionScreen
-from .screens.help import HelpScreen
 from .screens.in_turn import KeysInTurn
 from .screens.leave import Choice, Leave
 from .screens.panel import Panel
 from .screens.stop_keys import STOP_ALL_ANYWHERE, STOP_ANYWHERE, STOP_OUTSIDE_TEXT, with_stop_keys
+
+if TYPE_CHECKING:
+    from tui.drive.schema import OrderId
+    from tui.session.command import Commander
+    from tui.session.drive_session import DriveSession
+    from tui.session.editor import Editor
+    from tui.session.fault_record import Recorder
+    from tui.session.journal import Journal
+    from tui.session.keeper import Keeper
+    from tui.session.stop import Stopper, StopSummary
 
 log = logging.getLogger("drivepanel")
 
@@ -81,6 +82,8 @@ class DrivePanelApp(Panel):
         leave_running: bool = False,
     ) -> None:
         super().__init__()
+        self.register_theme(THEME)
+        self.theme = THEME.name
         self.clock = clock or Clock()
         self.read_only = read_only
         self.low_bandwidth = low_bandwidth
@@ -88,7 +91,6 @@ class DrivePanelApp(Panel):
         self.opened: OpenLine | None = None
         self.keeper: Keeper | None = None
         self.stopper: Stopper | None = None
-        self.journal = Journal()
         self.connection = ConnectionScreen()
         self._open = open_line
         self._start = start
@@ -99,9 +101,19 @@ class DrivePanelApp(Panel):
         self._keys = KeysInTurn(self)
         self._hungry: set[int] = set()
         self._told: StopSummary | None = None
+        self._journal: Journal | None = None
         self._commanders: dict[int, Commander] = {}
         self._recorders: dict[int, Recorder] = {}
         self._editors: dict[int, Editor] = {}
+
+    @property
+    def journal(self) -> Journal:
+        """The record of what is written to drives."""
+        if self._journal is None:
+            from tui.session.journal import Journal
+
+            self._journal = Journal()
+        return self._journal
 
     def get_driver_class(self) -> type[Driver]:
         """The driver of this platform, with the stop keys before everything else."""
@@ -116,7 +128,9 @@ class DrivePanelApp(Panel):
 
     def _is_typing(self) -> bool:
         """Whether a space would go into a text."""
-        return isinstance(self.focused, Input | TextArea)
+        # TextArea by its name: to import it takes longer than the whole first picture may
+        kinds = type(self.focused).__mro__
+        return Input in kinds or any(kind.__name__ == "TextArea" for kind in kinds)
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A space belongs to the text that is being typed."""
@@ -137,15 +151,20 @@ class DrivePanelApp(Panel):
         self._stop(everything=True)
 
     def _stop(self, *, everything: bool) -> None:
+        stopper = self.stopper
+        if stopper is None:
+            return
         sessions = [found.session for found in self.connection.found.values() if found.session]
         if not everything:
             sessions = self._shown(sessions)
-        if self.stopper is not None and sessions:
+        if sessions:
             with suppress(LineClosed):
-                self.stopper.stop(sessions)
+                stopper.stop(sessions)
 
     def commander(self, session: DriveSession) -> Commander:
         """What commands a drive of the open line."""
+        from tui.session.command import Commander
+
         known = self._commanders.get(session.device)
         if known is None or known.session is not session:
             known = self._commanders[session.device] = Commander(session, self.journal)
@@ -158,6 +177,8 @@ class DrivePanelApp(Panel):
 
     def editor(self, session: DriveSession) -> Editor:
         """What edits the parameters of a drive of the open line."""
+        from tui.session.editor import Editor
+
         known = self._editors.get(session.device)
         if known is None or known.session is not session:
             known = self._editors[session.device] = Editor(session, self.journal)
@@ -165,6 +186,8 @@ class DrivePanelApp(Panel):
 
     def recorder(self, session: DriveSession) -> Recorder:
         """What keeps the seconds before a trip of a drive of the open line."""
+        from tui.session.fault_record import Recorder
+
         known = self._recorders.get(session.device)
         if known is None or known.session is not session:
             known = self._recorders[session.device] = Recorder(session, self.journal)
@@ -188,6 +211,8 @@ class DrivePanelApp(Panel):
 
     def _shown(self, found: list[DriveSession]) -> list[DriveSession]:
         """The drive whose screen is open; without one those commanded from here, else all."""
+        from tui.session.drive_session import DriveSession
+
         for screen in reversed(self.screen_stack):
             session = getattr(screen, "session", None)
             if isinstance(session, DriveSession):
@@ -196,8 +221,6 @@ class DrivePanelApp(Panel):
 
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
-        self.register_theme(THEME)
-        self.theme = THEME.name
         self.push_screen(self.connection)
         self.set_interval(HUNGER_LOOK, self._tell_hunger)
         self.set_interval(HUNGER_LOOK, self._tell_stops)
@@ -221,9 +244,13 @@ class DrivePanelApp(Panel):
     def _tell_stops(self) -> None:
         """Tell what the last stop has come to where the screen on top does not show it."""
         reports = list(self.stopper.reports.values()) if self.stopper else []
-        last = max((report.time for report in reports), default=0.0)
+        if not reports:
+            return
+        from tui.session.stop import StopSummary
+
+        last = max(report.time for report in reports)
         stop = StopSummary([report for report in reports if report.time >= last - 0.1])
-        if stop == self._told or not reports:
+        if stop == self._told:
             return
         before, self._told = self._told, stop
         session = getattr(self.screen, "session", None)
@@ -245,7 +272,8 @@ class DrivePanelApp(Panel):
             # the panel ends without having been asked: an error of its own, or a signal
             await asyncio.to_thread(self.stop_motors)
         await self.disconnect()
-        self.journal.close()
+        if self._journal is not None:
+            self._journal.close()
 
     def _handle_exception(self, error: Exception) -> None:
         """An error of the panel itself: all of it to the log, one line to the person."""
@@ -270,6 +298,9 @@ class DrivePanelApp(Panel):
             opening.add_done_callback(_close_unwanted)
             raise
         self._commanders, self._recorders, self._editors = {}, {}, {}
+        from tui.session.keeper import Keeper
+        from tui.session.stop import Stopper
+
         self.keeper = Keeper(self.opened.line)
         self.stopper = Stopper(self.opened.line, self.journal)
         log.info("opened %s", self.opened.label)
@@ -278,6 +309,11 @@ class DrivePanelApp(Panel):
     def _open_here(self, text: str) -> OpenLine:
         """Open a line in a thread; closed again where the panel was left meanwhile."""
         opened = self._open(text, read_only=self.read_only, wait=CONNECT_WITHIN)
+        # here, where nobody waits for a key: what the loop asks for next
+        import tui.screens.monitor
+        import tui.session.keeper
+        import tui.session.stop  # noqa: F401
+
         if self._gone:
             opened.close()
             raise LineClosed
@@ -333,7 +369,7 @@ class DrivePanelApp(Panel):
                 does = f"acts {watch.timeout:g} s after the last request: {reaction}"
             who = f"Device {session.device}, {session.profile.name}"
             lines.append(f"{who}: left alone it {does.rstrip('.')}.")
-        return "\n".join(lines)
+        return "\n".join([*lines, *self._unfinished()])
 
     def _leave_motors(self, choice: Choice | None) -> None:
         if choice == "leave":
@@ -394,17 +430,33 @@ class DrivePanelApp(Panel):
     def _question(self, question: str, keys: str) -> Confirm | None:
         """What to ask before the drives are left alone; None where that trips none."""
         alone = self.keeper.left_alone() if self.keeper else {}
-        if not alone:
-            return None
-        which = ", ".join(f"device {device} after {time:g} s" for device, time in alone.items())
-        follows = (
-            "These motors run, and their drives watch the line. Once nobody asks them any more,"
-            f" they act on their communication time-out: {which}."
-        )
-        return Confirm(question, follows, keys)
+        told = self._unfinished()
+        if alone:
+            which = ", ".join(f"device {device} after {time:g} s" for device, time in alone.items())
+            told.append(
+                "These motors run, and their drives watch the line. Once nobody asks them any"
+                f" more, they act on their communication time-out: {which}."
+            )
+        return Confirm(question, "\n".join(told), keys) if told else None
+
+    def _unfinished(self) -> list[str]:
+        """What would be lost of the work on parameters."""
+        told = []
+        for device, editor in sorted(self._editors.items()):
+            if len(editor.edits):
+                told.append(f"Device {device}: {len(editor.edits)} staged edits are not written.")
+            if editor.unsaved:
+                count = len(editor.unsaved)
+                told.append(
+                    f"Device {device}: {count} written settings are not saved to EEPROM; they are"
+                    " lost at power-off."
+                )
+        return told
 
     def action_help(self) -> None:
         """Every key of the screen on top."""
+        from .screens.help import HelpScreen
+
         if not isinstance(self.screen, HelpScreen):
             self.push_screen(HelpScreen(self._screen_name()))
 

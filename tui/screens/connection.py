@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual import work
@@ -18,13 +18,8 @@ from textual.widgets.option_list import Option
 from textual.worker import Worker, WorkerState
 
 from tui.bus.errors import LineError
-from tui.bus.line import LineStatus
-from tui.drive import library
 from tui.drive.errors import DriveError
 from tui.session.addresses import parse_addresses
-from tui.session.drive_session import DriveSession
-from tui.session.identify import ScanResult, scan
-from tui.session.keeper import Look
 from tui.session.state import recent_lines
 from tui.widgets.drawing import cut, key_line, rule, wrapped
 from tui.widgets.lines import Lines
@@ -35,6 +30,10 @@ from .choices import LINE_FORMS, LineChoice, choice_line, fault_of_line, groups
 from .found import FoundDrive, about_drive, drive_line, next_step
 from .hints import hint_for
 from .panel import Panel
+
+if TYPE_CHECKING:
+    from tui.session.identify import ScanResult
+    from tui.session.keeper import Look
 
 log = logging.getLogger("drivepanel")
 
@@ -141,8 +140,12 @@ class ConnectionScreen(Screen[None]):
         self._title("#line-title", self.app.line_label or "No line", words)
         count = f"{len(self.found)} found" if self.found else ""
         self._title("#drives-title", "Drives", count)
-        if state is not None and state.status is LineStatus.LOST:
-            self.say(f"LINE LOST: {state.reason}", "It is tried again by itself.", ALARM_KIND)
+        if state is not None:
+            from tui.bus.line import LineStatus
+
+            if state.status is LineStatus.LOST:
+                reason = f"LINE LOST: {state.reason}"
+                self.say(reason, "It is tried again by itself.", ALARM_KIND)
 
     def _title(self, where: str, title: str, right: str = "") -> None:
         lines = self.query_one(where, Lines)
@@ -301,6 +304,8 @@ class ConnectionScreen(Screen[None]):
     @work(exclusive=True, group="scan", exit_on_error=False)
     async def scan(self, devices: Sequence[int]) -> None:
         """Ask each address; drives appear as they answer."""
+        from tui.session.identify import scan
+
         opened = self.app.opened
         if opened is None:
             return
@@ -344,6 +349,9 @@ class ConnectionScreen(Screen[None]):
 
     async def _equip(self, drive: FoundDrive) -> None:
         """Give a drive its profile: the typed one, else the one that fits."""
+        from tui.drive import library
+        from tui.session.drive_session import DriveSession
+
         typed = self.query_one("#profile", Input).value.strip().lower()
         identity = drive.identity
         wanted = typed or identity.profile or next(iter(identity.candidates), None)
@@ -380,6 +388,8 @@ class ConnectionScreen(Screen[None]):
         self._warn(looks)
 
     def _connected(self) -> bool:
+        from tui.bus.line import LineStatus
+
         opened = self.app.opened
         return opened is not None and opened.line.state.status is LineStatus.CONNECTED
 
@@ -405,6 +415,8 @@ class ConnectionScreen(Screen[None]):
         if drive.session is None:
             await self._equip(drive)
         if drive.session is None:
+            from tui.drive import library
+
             known = ", ".join(listing.id for listing in library.listings())
             self.say(
                 f"Device {device} does not say which drive it is.",

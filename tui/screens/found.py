@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 
-from tui.session.drive_session import DriveSession
-from tui.session.identify import DriveIdentity
 from tui.widgets.drawing import cut
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, RUNNING, STRONG
+
+if TYPE_CHECKING:
+    from tui.session.drive_session import DriveSession
+    from tui.session.identify import DriveIdentity
 
 STATE_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
 WHO_WIDTH, VERSION_WIDTH, PROFILE_WIDTH = 16, 4, 13

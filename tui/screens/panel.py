@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from typing import TYPE_CHECKING
 
 from textual.app import App
 
-from tui.drive.schema import OrderId
-from tui.session.command import Commander
-from tui.session.drive_session import DriveSession
-from tui.session.editor import Editor
-from tui.session.fault_record import Recorder
-from tui.session.keeper import Keeper
-from tui.session.lines import OpenLine
-from tui.session.stop import Stopper
-from tui.widgets.clock import Clock
+if TYPE_CHECKING:
+    from tui.drive.schema import OrderId
+    from tui.session.command import Commander
+    from tui.session.drive_session import DriveSession
+    from tui.session.editor import Editor
+    from tui.session.fault_record import Recorder
+    from tui.session.keeper import Keeper
+    from tui.session.lines import OpenLine
+    from tui.session.stop import Stopper
+    from tui.widgets.clock import Clock
 
 
 class Panel(App[None]):

@@ -1,4 +1,7 @@
-"""Opening a line from what a person typed: serial, TCP, RTU over TCP, or simulated."""
+"""Opening a line from what a person typed: serial, TCP, RTU over TCP, or simulated.
+
+What a line is made of is imported when one is opened: the panel shows itself before that.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +11,10 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import LinkSyntaxError
-from tui.bus.line import Line
-from tui.bus.link import Link, RtuTcpLink, SerialLink, label, parse_link
 
 if TYPE_CHECKING:
+    from tui.bus.line import Line
+    from tui.bus.link import Link
     from tui.simulator import DriveSpec, Simulation
 
 SIMULATED = "sim:"
@@ -32,6 +35,8 @@ class OpenLine:
     def label(self) -> str:
         """How the line is called on a screen."""
         if self.simulation is None:
+            from tui.bus.link import label
+
             return label(self.line.link).removeprefix("serial:").replace(",", " ")
         count = len(self.devices)
         return self.text if count == 1 else f"{SIMULATED}{count} drives"
@@ -54,6 +59,9 @@ def open_line(text: str, *, read_only: bool = False, wait: float | None = None) 
 
         check_line(text)
         return _simulated(parse_drives(text[len(SIMULATED) :]), read_only=read_only, wait=wait)
+    from tui.bus.line import Line
+    from tui.bus.link import parse_link
+
     return _opened(OpenLine(text, Line(parse_link(text), read_only=read_only)), wait)
 
 
@@ -67,6 +75,8 @@ def check_line(text: str) -> None:
         except SimulatorError as error:
             raise LinkSyntaxError(str(error)) from error
     else:
+        from tui.bus.link import parse_link
+
         parse_link(text)
 
 
@@ -95,6 +105,7 @@ def demo_line(drives: Mapping[str, float]) -> OpenLine:
 def _simulated(
     specs: Sequence[DriveSpec], *, read_only: bool = False, wait: float | None = None
 ) -> OpenLine:
+    from tui.bus.line import Line
     from tui.simulator import Simulation
 
     simulation = Simulation(specs)
@@ -116,6 +127,8 @@ def _opened(opened: OpenLine, wait: float | None) -> OpenLine:
 
 def _serve(simulation: Simulation) -> Link:
     """Start a simulation where the panel reaches it: a pseudo-terminal, or loopback."""
+    from tui.bus.link import RtuTcpLink, SerialLink
+
     simulation.start()
     try:
         if os.name == "posix":
