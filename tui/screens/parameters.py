@@ -14,7 +14,7 @@ from tui.drive.rows import FILTERS, FilterId, rows
 from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
 from tui.session.editor import Editor
-from tui.widgets.drawing import cut, key_line, rule
+from tui.widgets.drawing import key_line, rule
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, STRONG
 from tui.widgets.parameter_view import (
@@ -22,6 +22,7 @@ from tui.widgets.parameter_view import (
     detail_lines,
     head_line,
     items_of,
+    news_lines,
     row_line,
     status_line,
 )
@@ -32,8 +33,8 @@ from .set_keys import SetKeys
 REFRESH = 0.25
 SAID_FOR = {"working": 60.0, "done": 12.0, "refused": 60.0}
 """Seconds for which it is shown what the last writing has come to."""
-BELOW = 8
-"""Lines below the table: four of detail, two of messages, status and keys."""
+BELOW = 9
+"""Lines below the table: four of detail, three of news, the status and the keys."""
 ABOVE = 2
 
 
@@ -150,18 +151,18 @@ class ParametersScreen(SetKeys):
         self.query_one("#table", Lines).show(table)
         detail = detail_lines(editor, self._code, width) if self._code else []
         self.query_one("#detail", Lines).show([rule("", width), *detail])
-        self.query_one("#message", Lines).show([self._message(width)])
+        news = news_lines(editor, self._code, self._message(), width)
+        self.query_one("#message", Lines).show(news)
         armed = self.commander.armed_for
         self.query_one("#status", Lines).show([status_line(editor, armed, width)])
 
     def _title(self) -> Text:
         done, count = self.editor.progress
         text = Text(no_wrap=True)
-        text.append(f" Parameters · {self.session.profile.name} · {self.session.device}", STRONG)
+        text.append(f" {self.session.profile.name} · device {self.session.device}", STRONG)
         parameters = sum(1 for item in self._items if item.code)
-        text.append(
-            f"   {self._filter}: {parameters}", ATTENTION if self._filter != "all" else FAINT
-        )
+        style = FAINT if self._filter == "settings" else ATTENTION
+        text.append(f" · {self._filter} {parameters}", style)
         if done < count:
             text.append(f"   read {done} of {count}", FAINT)
         return text
@@ -171,17 +172,13 @@ class ParametersScreen(SetKeys):
             return " Nothing is called so. Esc clears the search, d shows another selection."
         return f" No parameter is {self._filter}. d shows another selection."
 
-    def _message(self, width: int) -> Text:
+    def _message(self) -> Text:
         editor, now = self.editor, self.app.clock.monotonic()
         said = editor.said
         if said is not None and (editor.busy or now - said.time < SAID_FOR[said.kind]):
             style = {"working": ATTENTION, "done": STRONG, "refused": ALARM}[said.kind]
-            return Text(cut(f" {said.text}", width).rstrip(), style)
-        if self._note:
-            return Text(cut(f" {self._note}", width).rstrip(), ALARM)
-        if editor.trouble:
-            return Text(cut(f" {editor.trouble}", width).rstrip(), ALARM)
-        return Text("")
+            return Text(said.text, style)
+        return Text(self._note or editor.trouble, ALARM)
 
     def show_differences(self) -> None:
         """Show what the drive has otherwise than the set."""
@@ -221,7 +218,8 @@ class ParametersScreen(SetKeys):
         self.query_one("#search", Input).focus()
 
     def on_input_changed(self) -> None:
-        """Search as one types."""
+        """Search as one types; the best match is chosen."""
+        self._at = len(self._items)
         self._list_again()
 
     def on_input_submitted(self) -> None:

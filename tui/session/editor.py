@@ -244,14 +244,16 @@ class Editor:
     async def plan(self) -> RestorePlan:
         """What it takes to make the drive hold the set; reads it. Raises the line's errors."""
         from tui.drive import library
-        from tui.drive.restore_plan import Options
+        from tui.drive.restore_plan import Options, plan_restore
 
-        from .restoring import plan_for
+        from .restoring import held_by
 
         assert self.source is not None
         profile = library.load(self.source.head.profile)
         options = Options(confirmed=frozenset(self.marks.confirmed))
-        return await plan_for(self.session, self.source, profile, options)
+        held = await held_by(self.session)
+        self.raws = {**self.raws, **held.raws}
+        return plan_restore(self.session.profile, held, self.source, profile, options)
 
     def take_plan(self, plan: RestorePlan) -> None:
         """Stage what a plan would write."""
@@ -361,8 +363,8 @@ def _summary(applied: Applied) -> str:
     done, failed = len(applied.written), len(applied.results) - len(applied.written)
     parts = [f"{done} written and read back" if done else "nothing written"]
     if failed:
-        first = next(r for r in applied.results if not r.done)
-        parts.append(f"{failed} still staged: {first.text}")
+        codes = ", ".join(r.edit.code for r in applied.results if not r.done)
+        parts.append(f"{failed} still staged: {codes}")
     parts += [link.text for link in applied.links]
     if applied.after_reset:
         parts.append(f"in force after a reset of the drive: {', '.join(applied.after_reset)}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from rich.console import Console
 from rich.style import Style
 from rich.text import Text
 
@@ -35,6 +36,8 @@ VALUE_WIDTH = 13
 OTHER_WIDTH = 11
 NUMBER_WIDTH = 9
 RANGE_WIDTH = 22
+NEWS = 3
+"""Lines for what is said and what happened to a parameter last."""
 WIDE = 110
 """Columns from which the manual's number and the range have columns of their own."""
 
@@ -195,14 +198,29 @@ def range_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def detail_lines(editor: Editor, code: str, width: int) -> list[Text]:
-    """Everything about one parameter, on four lines."""
+    """What one parameter is, on three lines."""
     parameter = editor.session.profile[code]
     return [
         _place(editor, parameter, width),
         _meaning(editor, parameter, width),
         _writing(editor, parameter, width),
-        _news(editor, parameter, width),
     ]
+
+
+def news_lines(editor: Editor, code: str, message: Text, width: int) -> list[Text]:
+    """What is said, and what happened to the parameter last: always so many lines."""
+    news = _news(editor, editor.session.profile[code]) if code else Text("")
+    first = _wrapped(message, width, NEWS)
+    rest = _wrapped(news, width, NEWS - len(first)) if news.plain != message.plain else []
+    lines = [*rest, *([Text("")] * (NEWS - len(first) - len(rest))), *first]
+    return [Text(" ") + line if line.plain else line for line in lines]
+
+
+def _wrapped(text: Text, width: int, most: int) -> list[Text]:
+    lines: list[Text] = list(text.wrap(Console(width=width), width - 3)) if text.plain else []
+    if len(lines) > most > 0:
+        lines[most - 1].append(" …")
+    return lines[:most]
 
 
 def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
@@ -260,31 +278,27 @@ def _writing(editor: Editor, parameter: Parameter, width: int) -> Text:
     return text
 
 
-def _news(editor: Editor, parameter: Parameter, width: int) -> Text:
+def _news(editor: Editor, parameter: Parameter) -> Text:
     """What happened to it last: another's change, a refusal, a remark."""
     code, profile = parameter.code, editor.session.profile
-    text = Text(no_wrap=True)
     edit, result = editor.edits.get(code), editor.results.get(code)
     if code in editor.changed_elsewhere:
         before = shown(profile, parameter, editor.changed_elsewhere[code], editor.raws).display
-        text.append(
-            f" Changed by somebody else: it was {before}. u drops your edit, y keeps it.", ALARM
-        )
-    elif result is not None and not result.done:
-        text.append(f" {result.text}", ALARM)
-    elif edit is not None:
-        text.append(f" {edit.old_text or NOT_AVAILABLE} → {edit.text}", ATTENTION)
+        said = f"Changed by somebody else: it was {before}. u drops your edit, y keeps it."
+        return Text(said, ALARM)
+    if result is not None and not result.done:
+        return Text(result.text, ALARM)
+    if edit is not None:
+        text = Text(f"{edit.old_text or NOT_AVAILABLE} → {edit.text}", ATTENTION)
         text.append(f" (raw {edit.old} → {edit.new})", FAINT)
-        if edit.remark:
-            text.append(f"  {edit.remark}", ALARM)
-    elif result is not None:
-        text.append(f" {result.text}", FAINT)
+        text.append(f"  {edit.remark}" if edit.remark else "", ALARM)
+        return text
+    if result is not None:
+        text = Text(result.text, FAINT)
         if waits_for_reset(profile, parameter):
             text.append(" In force after a reset of the drive.", ALARM)
-    elif code in editor.absent:
-        text.append(f" {editor.absent[code]}", STALE)
-    text.truncate(width, overflow="ellipsis")
-    return text
+        return text
+    return Text(editor.absent.get(code, ""), STALE)
 
 
 def status_line(editor: Editor, armed: float | None, width: int) -> Text:
@@ -312,6 +326,7 @@ __all__ = [
     "detail_lines",
     "head_line",
     "items_of",
+    "news_lines",
     "range_text",
     "row_line",
     "status_line",

@@ -1,0 +1,201 @@
+"""Editing the parameters of simulated drives over a real line, as the screen does."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from tui.drive.errors import ValueRefused
+from tui.drive.parameter_set import dumps
+from tui.drive.rows import FILTERS, rows
+from tui.drive.set_file import read_set, write_file
+from tui.session.editor import Editor
+from tui.session.upload import Upload
+
+from .test_command import FAMILIES, Bench, bench
+
+
+@asynccontextmanager
+async def editing(family: str, **spec: object) -> AsyncIterator[tuple[Bench, Editor]]:
+    """A drive with an editor that reads."""
+    async with bench(family, **spec) as made:  # type: ignore[arg-type]
+        editor = Editor(made.commander.session, made.commander._writer.journal)
+        editor.start()
+        try:
+            yield made, editor
+        finally:
+            editor.stop()
+
+
+async def read(made: Bench, editor: Editor, *codes: str) -> None:
+    editor.visible = codes
+    await made.until(lambda: all(code in editor.raws for code in codes))
+
+
+async def written(made: Bench, editor: Editor) -> str:
+    await made.until(lambda: not editor.busy and editor.said is not None)
+    assert editor.said is not None
+    return editor.said.text
+
+
+# a number whose step may follow another word, on each family
+NUMBERS = {"atv21": "ACC", "atv31": "ACC", "atv312": "ACC", "atv71": "ACC"}
+
+
+@pytest.mark.parametrize("family", NUMBERS)
+async def test_find_edit_apply_undo(family: str) -> None:
+    async with editing(family) as (made, editor):
+        code = NUMBERS[family]
+        assert code in rows(editor.facts, "settings", "acc")
+        await read(made, editor, code)
+        before = editor.raws[code]
+        editor.stage(code, "7.5 s")
+        assert editor.edits.get(code) is not None
+        editor.undo(code)
+        assert len(editor.edits) == 0
+        assert editor.raws[code] == before
+        editor.stage(code, "7.5 s")
+        editor.apply()
+        assert "1 written and read back" in await written(made, editor)
+        assert made.drive.raw(code) == editor.raws[code] == 75
+        assert len(editor.edits) == 0
+        assert editor.marks.recent[0] == code
+        assert rows(editor.facts, "recent") == [code]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+async def test_everything_is_read_what_is_looked_at_first(family: str) -> None:
+    async with editing(family) as (made, editor):
+        last = [p.code for p in editor.session.profile.parameters if p.access != "w"][-1]
+        await made.until(
+            lambda: last in editor.raws or last in editor.absent or editor.progress[0] > 0
+        )
+        editor.visible = (last,)
+        await made.until(lambda: last in editor.raws or last in editor.absent)
+        await made.until(lambda: editor.progress[0] == editor.progress[1], 60.0)
+        for chosen in FILTERS:
+            rows(editor.facts, chosen, "a")
+
+
+async def test_a_refused_edit_stays_staged_and_says_why() -> None:
+    async with editing("atv71") as (made, editor):
+        await read(made, editor, "HSP", "LSP", "TFR")
+        editor.stage("HSP", "70")
+        editor.apply()
+        said = await written(made, editor)
+        assert said == "nothing written; 1 still staged: HSP"
+        assert "TFR" in editor.results["HSP"].text
+        assert editor.edits.get("HSP") is not None
+        assert made.drive.raw("HSP") == 500
+
+
+async def test_a_running_motor_locks_what_needs_standstill() -> None:
+    async with editing("atv71") as (made, editor):
+        made.commander.refer("20Hz")
+        await made.done()
+        await made.order("forward")
+        await read(made, editor, "TFR", "ACC")
+        await made.until(lambda: editor.state == "running")
+        refused = editor.refusal("TFR")
+        assert refused is not None
+        assert refused.reason == "running"
+        assert editor.refusal("ACC") is None
+        editor.stage("TFR", "65")
+        editor.stage("ACC", "4")
+        editor.apply()
+        assert "1 written and read back; 1 still staged" in await written(made, editor)
+        assert made.drive.raw("ACC") == 40
+        assert made.drive.raw("TFR") == 600
+
+
+async def test_what_somebody_else_changes_is_noticed_and_not_overwritten() -> None:
+    async with editing("atv71") as (made, editor):
+        await read(made, editor, "ACC")
+        editor.stage("ACC", "7")
+        made.drive.set("ACC", 55)
+        await made.until(lambda: "ACC" in editor.changed_elsewhere)
+        editor.apply()
+        assert "still staged" in await written(made, editor)
+        assert made.drive.raw("ACC") == 55
+        editor.said = None
+        editor.accept_changes()
+        editor.apply()
+        assert "1 written" in await written(made, editor)
+        assert made.drive.raw("ACC") == 70
+
+
+async def test_a_ramp_keeps_its_seconds_when_its_increment_changes() -> None:
+    async with editing("atv71") as (made, editor):
+        await read(made, editor, "ACC", "INR")
+        editor.stage("ACC", "7.5")
+        editor.stage("INR", "0.01 s")
+        editor.apply()
+        await written(made, editor)
+        assert (made.drive.raw("INR"), made.drive.raw("ACC")) == (0, 750)
+        value = editor.value("ACC")
+        assert value is not None
+        assert value.display == "7.50 s"
+
+
+async def test_an_unverified_one_is_confirmed_once() -> None:
+    async with editing("atv21") as (made, editor):
+        await read(made, editor, "F112")
+        refused = editor.refusal("F112")
+        assert refused is not None
+        assert refused.reason == "unverified"
+        editor.confirm("F112")
+        assert editor.refusal("F112") is None
+        again = Editor(editor.session, editor.journal)
+        assert again.refusal("F112") is None or again.refusal("F112").reason != "unverified"  # type: ignore[union-attr]
+
+
+async def test_nothing_is_staged_while_something_is_written() -> None:
+    async with editing("atv71") as (made, editor):
+        await read(made, editor, "ACC", "DEC")
+        editor.stage("ACC", "7.5")
+        editor.apply()
+        if editor.busy:
+            with pytest.raises(ValueRefused, match="wait"):
+                editor.stage("DEC", "5")
+        await written(made, editor)
+        editor.stage("DEC", "5")
+
+
+async def test_save_to_eeprom_and_factory_settings() -> None:
+    async with editing("atv312") as (made, editor):
+        await read(made, editor, "ACC")
+        editor.stage("ACC", "9")
+        editor.apply()
+        await written(made, editor)
+        assert editor.unsaved == {"ACC"}
+        editor.said = None
+        editor.save()
+        assert "saved" in await written(made, editor)
+        assert editor.unsaved == set()
+        editor.said = None
+        editor.factory()
+        assert "factory settings are recalled" in await written(made, editor)
+
+
+async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
+    async with editing("atv71") as (made, editor):
+        session = made.commander.session
+        upload = Upload(session, ["ACC", "DEC", "HSP", "INR"])
+        await upload.run()
+        file = tmp_path / "set.toml"
+        write_file(file, dumps(session.profile, upload.parameter_set()))
+        made.drive.set("ACC", 99)
+        made.drive.set("HSP", 400)
+        editor.source = read_set(file)
+        editor.other = dict(editor.source.raws)
+        await read(made, editor, "ACC", "DEC", "HSP", "INR")
+        await made.until(lambda: (editor.raws["ACC"], editor.raws["HSP"]) == (99, 400))
+        assert set(rows(editor.facts, "differs")) == {"ACC", "HSP"}
+        editor.take_plan(await editor.plan())
+        assert {edit.code for edit in editor.edits} == {"ACC", "HSP"}
+        editor.apply()
+        assert "2 written" in await written(made, editor)
+        assert (made.drive.raw("ACC"), made.drive.raw("HSP")) == (30, 500)

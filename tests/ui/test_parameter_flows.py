@@ -1,0 +1,196 @@
+"""Editing parameters by keys: simulated drives over a real line, the whole panel above."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from textual.widgets import Input
+
+from tui.screens.ask import Ask
+from tui.screens.confirm import Confirm
+from tui.screens.edit_value import EditBits, EditNumber, PickValue
+from tui.screens.monitor import MonitorScreen
+from tui.screens.parameters import ParametersScreen
+
+from .test_command_flows import Bench, bench
+from .test_flows import shown, until
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+async def to_parameters(made: Bench) -> ParametersScreen:
+    await made.pilot.press("3")
+    await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+    screen = made.app.screen
+    assert isinstance(screen, ParametersScreen)
+    await until(made.pilot, lambda: bool(shown(made.app, "table")))
+    return screen
+
+
+async def find(made: Bench, code: str) -> None:
+    """Search for a code; wait until its value is there."""
+    made.app.screen.query_one("#search", Input).value = ""
+    await made.pilot.press("slash", *code.lower(), "enter")
+    await until(made.pilot, lambda: f"\n {code} " in shown(made.app, "detail"))
+    await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
+
+
+def read(file: Path) -> str:
+    return file.read_text("utf-8")
+
+
+def write(file: Path, text: str) -> None:
+    file.write_text(text, "utf-8")
+
+
+async def answer(made: Bench, key: str, text: str) -> None:
+    """Press a key that asks for a text, and give it."""
+    await made.pilot.press(key)
+    await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+    made.app.screen.query_one(Input).value = text
+    await made.pilot.press("enter")
+
+
+async def message(made: Bench, *parts: str) -> None:
+    def said() -> str:
+        return " ".join(shown(made.app, "message").split())
+
+    await until(made.pilot, lambda: all(part in said() for part in parts))
+
+
+async def test_find_edit_write_and_read_back() -> None:
+    async with bench("atv71") as made:
+        await to_parameters(made)
+        await find(made, "ACC")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+        await made.pilot.press(*"7.53", "enter")
+        await until(made.pilot, lambda: "→ 7.5 s" in shown(made.app, "table"))
+        assert "7.53 is held as 7.5 s" in shown(made.app, "message")
+        assert made.drive().raw("ACC") == 30
+        await made.pilot.press("w")
+        await message(made, "Not armed")
+        await made.pilot.press("a", "w")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        await made.pilot.press("y")
+        await message(made, "1 written and read back")
+        assert made.drive().raw("ACC") == 75
+        await until(made.pilot, lambda: "1 not saved" in shown(made.app, "status"))
+
+
+async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:
+    async with bench("atv71") as made:
+        await to_parameters(made)
+        await find(made, "STT")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, PickValue))
+        await made.pilot.press("down", "enter")
+        await until(made.pilot, lambda: "→ Fast stop" in shown(made.app, "table"))
+        await made.pilot.press("u")
+        await until(made.pilot, lambda: "0 staged" in shown(made.app, "status"))
+        made.app.push_screen(
+            EditBits(made.app.editor(made.app.session_at(1)), made.drive().profile["CMI"])  # type: ignore[arg-type]
+        )
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditBits))
+        await made.pilot.press("enter", "escape")
+
+
+async def test_out_of_range_is_refused_while_it_is_typed() -> None:
+    async with bench("atv312") as made:
+        await to_parameters(made)
+        await find(made, "HSP")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+        await made.pilot.press(*"9999", "enter")
+        held = made.app.screen.query_one("#held")
+        assert "out of range" in str(held.render())
+        assert isinstance(made.app.screen, EditNumber)
+        await made.pilot.press("escape")
+        assert "0 staged" in shown(made.app, "status")
+
+
+async def test_steps_undo_all_and_selections() -> None:
+    async with bench("atv71") as made:
+        await to_parameters(made)
+        await find(made, "HSP")
+        await made.pilot.press("minus", "minus", "asterisk")
+        await until(made.pilot, lambda: "→ 49.8 Hz" in shown(made.app, "table"))
+        await made.pilot.press("escape", "d")
+        await until(made.pilot, lambda: "staged 1" in shown(made.app, "title"))
+        await made.pilot.press("U")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        await made.pilot.press("y")
+        await until(made.pilot, lambda: "0 staged" in shown(made.app, "status"))
+        await made.pilot.press("escape", "escape")
+        await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
+
+
+async def test_stop_works_here_and_in_its_fields() -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        await to_parameters(made)
+        await find(made, "ACC")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+        await made.pilot.press("f12")
+        await made.stopped()
+
+
+async def test_leaving_with_staged_edits_asks() -> None:
+    async with bench("atv71") as made:
+        await to_parameters(made)
+        await find(made, "HSP")
+        await made.pilot.press("minus", "q")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        follows = str(made.app.screen.query_one("#follows").render())
+        assert "1 staged edits are not written" in follows
+        await made.pilot.press("escape")
+        # they stay when the screen is left and opened again
+        await made.pilot.press("2")
+        await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
+        await to_parameters(made)
+        await until(made.pilot, lambda: "1 staged" in shown(made.app, "status"))
+
+
+async def test_back_up_change_compare_stage_and_write(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    async with bench("atv312") as made:
+        await to_parameters(made)
+        file = Path("pump.toml")
+        await answer(made, "b", str(file))
+        await message(made, "Backed up")
+        assert re.search(r"^ACC = \{.*raw = 30", read(file), re.MULTILINE)
+        made.drive().set("ACC", 99)
+        made.drive().set("HSP", 400)
+        await answer(made, "o", str(file))
+        await message(made, "pump.toml: 2 differ")
+        await until(made.pilot, lambda: "differs 2" in shown(made.app, "title"))
+        await made.pilot.press("n")
+        await until(made.pilot, lambda: "2 staged" in shown(made.app, "status"))
+        if not isinstance(made.app.screen, ParametersScreen):
+            await made.pilot.press("escape")
+        await made.pilot.press("a", "w")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        await made.pilot.press("y")
+        await message(made, "2 written and read back")
+        assert (made.drive().raw("ACC"), made.drive().raw("HSP")) == (30, 500)
+
+
+async def test_a_file_that_is_no_set_is_told_and_nothing_is_staged(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    file = Path("broken.toml")
+    write(file, "format = 1\n[drive\n")
+    async with bench("atv312") as made:
+        await to_parameters(made)
+        await answer(made, "o", str(file))
+        await message(made, "broken.toml:2")
+        assert "0 staged" in shown(made.app, "status")

@@ -1,0 +1,153 @@
+"""Pictures of the parameter editor in its main states, at both sizes."""
+
+from __future__ import annotations
+
+from typing import Any, cast
+
+import pytest
+from textual.pilot import Pilot
+
+from tui.drive import library
+from tui.screens.parameters import ParametersScreen
+from tui.session.applying import Outcome, Result
+from tui.session.command import Commander
+from tui.session.editor import Editor, Say
+from tui.session.favourites import Marks
+from tui.session.journal import Journal
+
+from . import fakes
+from .test_command_pictures import FakeCommander
+from .test_pictures import SIZES, Compare
+
+HELD = {
+    "INR": 1, "ACC": 30, "DEC": 30, "AC2": 50, "DE2": 50, "HSP": 500, "LSP": 0, "TFR": 600,
+    "BFR": 0, "NPR": 15, "UNS": 400, "NCR": 41, "NSP": 1450, "FRS": 500, "ITH": 41, "CTT": 3,
+    "SFR": 40, "STT": 0, "CHCF": 1, "FR1": 164, "CD1": 10, "CCS": 98, "TTO": 100, "SLL": 6,
+    "LAC": 0, "LAC2": 1, "ADD": 2, "TBR": 32, "TFO": 3, "BRA": 1, "RPT": 0, "CLI": 62,
+}  # fmt: skip
+
+
+class StillEditor(Editor):
+    """An editor whose values do not change."""
+
+    def start(self) -> None:
+        """Nothing is read."""
+
+    def stop(self) -> None:
+        """Nothing was read."""
+
+
+def editor_of(state: dict[str, int], *, reading: bool = False) -> Editor:
+    """An editor that stands still on an Altivar 71."""
+    profile = library.load("atv71")
+    session = fakes.session_of(fakes.snapshot_of(profile, state))
+    editor = StillEditor(session, Journal())
+    editor.marks = Marks(favourites=("ACC", "HSP"))
+    rest = {} if reading else {p.code: 0 for p in profile.parameters if p.access != "w"}
+    editor.raws = {**rest, **state, **HELD}
+    editor.absent = {} if reading else {"SPAT": "exception 2"}
+    return editor
+
+
+def plain(_: Editor) -> None:
+    """Nothing staged."""
+
+
+def staged(editor: Editor) -> None:
+    editor.stage("ACC", "5.03")
+    editor.stage("DEC", "4.0")
+    editor.stage("HSP", "45")
+
+
+def refused(editor: Editor) -> None:
+    staged(editor)
+    edit = editor.edits.get("HSP")
+    assert edit is not None
+    text = (
+        "HSP: the drive refused with exception 4, not written. The drive is running forward."
+        " Stop the motor and write again."
+    )
+    editor.results = {"HSP": Result(edit, Outcome.DRIVE_REFUSED, text, 500)}
+    editor.said = Say("2 written and read back; 1 still staged: HSP", "refused", fakes.NOW)
+
+
+def elsewhere(editor: Editor) -> None:
+    staged(editor)
+    editor.raws["HSP"] = 300
+    editor.changed_elsewhere = {"HSP": 500}
+
+
+def done(editor: Editor) -> None:
+    editor.unsaved = {"ACC", "DEC"}
+    editor.waits_for_reset = {"ADD"}
+    editor.said = Say("3 written and read back", "done", fakes.NOW)
+
+
+def compared(editor: Editor) -> None:
+    editor.other = {**editor.raws, "ACC": 60, "HSP": 400, "TTO": 50}
+    editor.other_label = "pump-2.toml"
+
+
+STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
+    "settings": (plain, fakes.READY, None, []),
+    "found": (plain, fakes.READY, None, ["slash", *"ramp", "enter"]),
+    "nothing-found": (plain, fakes.READY, None, ["slash", *"xyz", "enter"]),
+    "staged": (staged, fakes.READY, 52.0, ["slash", *"speed", "enter"]),
+    "locked": (staged, fakes.RUNNING, 52.0, ["slash", *"rated", "enter"]),
+    "write": (staged, fakes.READY, 52.0, ["w"]),
+    "not-armed": (staged, fakes.READY, None, ["w"]),
+    "refused": (refused, fakes.RUNNING, 52.0, ["slash", *"hsp", "enter"]),
+    "elsewhere": (elsewhere, fakes.READY, 52.0, ["slash", *"hsp", "enter"]),
+    "done": (done, fakes.READY, 52.0, ["d", "d"]),
+    "compared": (compared, fakes.READY, 52.0, ["d", "d"]),
+    "number": (plain, fakes.READY, 52.0, ["slash", *"acc", "enter", "enter", *"5.03"]),
+    "out-of-range": (plain, fakes.READY, 52.0, ["slash", *"hsp", "enter", "enter", *"9999"]),
+    "names": (plain, fakes.READY, 52.0, ["slash", *"stt", "enter", "enter"]),
+    "confirm": (plain, fakes.READY, 52.0, ["slash", *"fry", "enter", "y"]),
+    "save": (done, fakes.READY, 52.0, ["s"]),
+    "factory": (done, fakes.READY, 52.0, ["F"]),
+    "help": (plain, fakes.READY, 52.0, ["question_mark"]),
+}
+
+
+@SIZES
+@pytest.mark.parametrize("state", STATES)
+def test_parameters(
+    snap_compare: Compare, state: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    prepare, drive, armed, keys = STATES[state]
+    monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
+    editor = editor_of(drive)
+    prepare(editor)
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+    app._editors[2] = editor
+    app._commanders[2] = cast("Commander", FakeCommander(armed))
+    app._commanders[2].session = editor.session
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(ParametersScreen(editor.session))
+        await pilot.pause()
+        await pilot.press(*keys)
+        await pilot.pause()
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+@SIZES
+def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
+    editor = editor_of(fakes.READY, reading=True)
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+    app._editors[2] = editor
+    app._commanders[2] = cast("Commander", FakeCommander())
+    app._commanders[2].session = editor.session
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(ParametersScreen(editor.session))
+        await pilot.pause()
+        await pilot.press("right_square_bracket", "right_square_bracket")
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
