@@ -78,14 +78,16 @@ def test_a_command_imports_what_it_needs_and_no_more(
 
 def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> None:
     start = (
-        "import asyncio, sys\n"
+        "import asyncio, gc, sys\n"
         "from tui.cli import panel\n"
         "from tui.app import DrivePanelApp\n"
         "async def first_picture():\n"
-        "    app = DrivePanelApp()\n"
+        "    gc.disable()\n"
+        "    app = DrivePanelApp(on_shown=panel._collect_garbage)\n"
         "    async with app.run_test() as pilot:\n"
         "        await pilot.pause()\n"
         "        assert app.connection.query_one('#lines').option_count\n"
+        "        assert gc.isenabled() and gc.get_freeze_count()\n"
         "        await pilot.press('space', 'f12', 'f9')\n"  # the stop keys work all the same
         "asyncio.run(first_picture())\n"
         "print(*sys.modules)\n"

@@ -61,7 +61,8 @@ class DrivePanelApp(Panel):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
-    `leave_running` motors are not stopped when the panel ends without being asked.
+    `leave_running` motors are not stopped when the panel ends without being asked. `on_shown` is
+    called after the first picture.
     """
 
     TITLE = "Drive Panel"
@@ -80,6 +81,7 @@ class DrivePanelApp(Panel):
         read_only: bool = False,
         low_bandwidth: bool = False,
         leave_running: bool = False,
+        on_shown: Callable[[], None] | None = None,
     ) -> None:
         super().__init__()
         self.register_theme(THEME)
@@ -95,6 +97,7 @@ class DrivePanelApp(Panel):
         self._open = open_line
         self._start = start
         self._device = device
+        self._on_shown = on_shown
         self._gone = False
         self._settled = leave_running
         """Whether it was decided what becomes of motors that run by an order from here."""
@@ -224,6 +227,8 @@ class DrivePanelApp(Panel):
         self.push_screen(self.connection)
         self.set_interval(HUNGER_LOOK, self._tell_hunger)
         self.set_interval(HUNGER_LOOK, self._tell_stops)
+        if self._on_shown is not None:
+            self.connection.call_after_refresh(self._on_shown)
         if self._start is not None:
             self.call_after_refresh(self.connection.start, self._start, self._device)
 

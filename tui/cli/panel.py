@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from typing import TYPE_CHECKING
@@ -21,6 +22,9 @@ DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive
 
 STOP, LEAVE_RUNNING = "stop", "leave-running"
 
+YOUNGEST = 10_000
+"""New objects after which garbage is looked for; a look holds up what a key does."""
+
 DEMO_LINE = "demo"
 """The LINE of the demo inside the panel; every other text is opened as it is written."""
 
@@ -36,6 +40,7 @@ def run_panel(
     """Run the panel until it is left."""
     if not _has_terminal():
         raise Failure("The panel needs a terminal. Without one, use read, watch or --help.", USAGE)
+    gc.disable()  # until the first picture: what is imported and built for it stays
     os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
     from tui.app import DrivePanelApp
     from tui.session.lines import open_line
@@ -47,6 +52,7 @@ def run_panel(
         read_only=read_only,
         low_bandwidth=low_bandwidth,
         leave_running=on_hangup == LEAVE_RUNNING,
+        on_shown=_collect_garbage,
     )
     with ending_by_signal(app, stop=on_hangup == STOP):
         app.run()
@@ -61,6 +67,13 @@ def _open_with_demo(text: str, *, read_only: bool = False, wait: float | None = 
     if text == DEMO_LINE:
         return demo_line(DEMO)
     return open_line(text, read_only=read_only, wait=wait)
+
+
+def _collect_garbage() -> None:
+    """Collect garbage from now on, more seldom than usual, and not among what is there by now."""
+    gc.freeze()
+    gc.set_threshold(YOUNGEST, *gc.get_threshold()[1:])
+    gc.enable()
 
 
 def _has_terminal() -> bool:

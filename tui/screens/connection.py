@@ -26,7 +26,7 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
 
 from .actions import CONNECTION, bindings, keys_of
-from .choices import LINE_FORMS, LineChoice, choice_line, fault_of_line, groups
+from .choices import LINE_FORMS, Group, LineChoice, choice_line, fault_of_line, groups
 from .found import FoundDrive, about_drive, drive_line, next_step
 from .hints import hint_for
 from .panel import Panel
@@ -58,9 +58,12 @@ class ConnectionScreen(Screen[None]):
         super().__init__()
         self.found: dict[int, FoundDrive] = {}
         self._choices: dict[str, LineChoice] = {}
+        self._groups: list[Group] = []
+        self._listed: tuple[int, list[Group]] | None = None
         self._happened: tuple[str, str, str] = ("", "", "")
         self._warned: set[int] = set()
         self._looking: list[Timer] = []
+        self._away = False
 
     def compose(self) -> ComposeResult:
         """Two columns and the lines below."""
@@ -90,34 +93,38 @@ class ConnectionScreen(Screen[None]):
         """Show what there is."""
         self.query_one("#keys", Lines).show([key_line(keys_of(CONNECTION))])
         self.say("", "Choose a line and press Enter, or n to type one.")
-        self.action_refresh_lines()
+        self._groups = _lines_found()
         self._looking = [
             self.set_interval(1.0, self.show_heads),
             self.set_interval(LOOK, self.look),
         ]
-        self.call_after_refresh(self.show_heads)
 
     def on_resize(self) -> None:
-        """Titles have the width of their columns."""
-        self.call_after_refresh(self._redraw)
+        """Titles have the width of their columns, which is known before they are drawn."""
+        self._redraw()
+        self.call_after_refresh(self._redraw)  # with a scroll bar where one came
 
     def on_screen_suspend(self) -> None:
         """Stand still while another screen is on top.
 
         What stirs below a screen makes Textual draw the whole terminal again.
         """
+        self._away = True
         for timer in self._looking:
             timer.pause()
 
     def on_screen_resume(self) -> None:
         """States may have changed meanwhile."""
+        if self._away:
+            self._away = False
+            self._groups = _lines_found()
         for timer in self._looking:
             timer.resume()
         self.call_after_refresh(self._redraw)
 
     def _redraw(self) -> None:
         self.show_heads()
-        self.action_refresh_lines()
+        self._show_lines()
         self.show_drives()
         self._show_message()
 
@@ -184,22 +191,29 @@ class ConnectionScreen(Screen[None]):
 
     def action_refresh_lines(self) -> None:
         """Look for serial ports and recent lines."""
-        from tui.session.lines import serial_ports
+        self._groups = _lines_found()
+        self._show_lines()
 
-        options = self.query_one("#lines", OptionList)
+    def _show_lines(self) -> None:
+        options = self._lines()
         width = max(20, options.size.width - 1)
+        if self._listed == (width, self._groups):
+            return
+        self._listed = (width, self._groups)
         chosen = options.highlighted
-        options.clear_options()
         self._choices.clear()
-        for group in groups(serial_ports(), recent_lines()):
-            options.add_option(Option(Text(group.title, FAINT), disabled=True))
+        shown: list[Option] = []
+        for group in self._groups:
+            shown.append(Option(Text(group.title, FAINT), disabled=True))
             for choice in group.choices:
                 key = f"{group.title} {choice.text}"
                 self._choices[key] = choice
-                options.add_option(Option(choice_line(choice, width), id=key))
+                shown.append(Option(choice_line(choice, width), id=key))
             if not group.choices:
-                options.add_option(Option(Text(f"  {group.empty}", FAINT), disabled=True))
-        first = next((i for i, o in enumerate(options.options) if not o.disabled), None)
+                shown.append(Option(Text(f"  {group.empty}", FAINT), disabled=True))
+        options.clear_options()
+        options.add_options(shown)
+        first = next((i for i, o in enumerate(shown) if not o.disabled), None)
         options.highlighted = chosen if chosen is not None else first
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
@@ -473,3 +487,10 @@ class ConnectionScreen(Screen[None]):
 
     def _lines(self) -> OptionList:
         return self.query_one("#lines", OptionList)
+
+
+def _lines_found() -> list[Group]:
+    """The serial ports there are now, and the lines used lately."""
+    from tui.session.lines import serial_ports
+
+    return groups(serial_ports(), recent_lines())
