@@ -208,3 +208,41 @@ async def test_only_changed_lines_are_drawn() -> None:
         screen.look()
         screen.look()
         assert word.redrawn == before
+
+
+async def test_nothing_is_drawn_below_the_help_and_it_is_told_that_values_stand_still(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr("tui.screens.monitor.STILL_TOLD", 0.5)
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(120, 40)) as pilot:
+        screen = await to_monitor(app, pilot, 2)
+        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
+        header, motor = screen.query_one("#header", Lines), screen.query_one("#motor", Lines)
+        await pilot.press("question_mark")
+        await until(pilot, lambda: isinstance(app.screen, HelpScreen))
+        await pilot.pause()
+        before, latest = motor.redrawn, screen.session.monitor.latest
+        await until(pilot, lambda: "as of" in header.lines[0].plain)
+        # the drive is watched all the same
+        await until(pilot, lambda: screen.session.monitor.latest is not latest)
+        assert motor.redrawn == before
+        await pilot.press("escape")
+        await until(pilot, lambda: "as of" not in shown(app, "header"))
+        await until(pilot, lambda: motor.redrawn > before)
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=size) as pilot:
+        screen = await to_monitor(app, pilot, 2)
+        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
+        part = "word" if size[0] < 110 else "word0"
+        places = {widget.id: widget.region for widget in screen.query(Lines)}
+        titles = {shown(app, part).partition(" ")[0]}
+        for _ in range(3):
+            await pilot.press("w")
+            titles.add(shown(app, part).partition(" ")[0])
+            assert {widget.id: widget.region for widget in screen.query(Lines)} == places
+        assert len(titles) > 1

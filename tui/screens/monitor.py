@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from typing import ClassVar
 
@@ -36,6 +37,8 @@ from .orders import OrderKeys
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
 LOW_BANDWIDTH_REFRESH = 2.0
+STILL_TOLD = 5.0
+"""Seconds under a dialog after which it is told that the values below it stand still."""
 STOP_TOLD = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
 """Seconds for which the end of a stop is shown."""
 WIDE = (110, 36)
@@ -60,6 +63,7 @@ class MonitorScreen(OrderKeys):
         self.session = session
         self._word = 0
         self._timer: Timer | None = None
+        self._still: Timer | None = None
         self._busy: tuple[float, float] | None = None
         self._load = 0.0
         self._was = ""
@@ -101,8 +105,28 @@ class MonitorScreen(OrderKeys):
         self.set_class(event.size.width >= WIDE[0] and event.size.height >= WIDE[1], "wide")
         self.call_after_refresh(self.look)
 
+    def on_screen_suspend(self) -> None:
+        """Stand still while another screen is on top.
+
+        What stirs below a screen makes Textual draw the whole terminal again.
+        """
+        if self._timer is not None:
+            self._timer.pause()
+            since = self.app.clock.time_of_day()
+            self._still = self.set_timer(STILL_TOLD, lambda: self._tell_still(since))
+
+    def _tell_still(self, since: str) -> None:
+        """Nobody shall take what shines through under a dialog for the present."""
+        if self.app.screen.styles.background.a < 1:
+            view = replace(self._view(), clock=f"as of {since}")
+            self.query_one("#header", Lines).show(header(view, self.size.width))
+
     def on_screen_resume(self) -> None:
         """Look again after another screen was on top."""
+        if self._still is not None:
+            self._still.stop()
+        if self._timer is not None:
+            self._timer.resume()
         self.call_after_refresh(self.look)
 
     @property
@@ -112,10 +136,11 @@ class MonitorScreen(OrderKeys):
 
     def look(self) -> None:
         """Show the latest snapshot; lines that stay the same are not drawn."""
-        if not self.is_current:
-            return
-        view = self._view()
-        for id, lines in self._parts(view).items():
+        if self.is_current:
+            self._show(self._parts(self._view()))
+
+    def _show(self, parts: dict[str, list[Text]]) -> None:
+        for id, lines in parts.items():
             self.query_one(f"#{id}", Lines).show(lines)
 
     def _view(self) -> View:
@@ -190,10 +215,14 @@ class MonitorScreen(OrderKeys):
         parts["motor"] = [*motor, Text("")]
         parts["trend"] = trend_lines(view, right, max(3, body - len(motor) - 1))
         parts["history"] = []
-        pages = word_pages(self._words(), rest - 1)
+        return parts | self._small_word(view, rest)
+
+    def _small_word(self, view: View, height: int) -> dict[str, list[Text]]:
+        """The chosen word; always as many lines, as a change of height lays all out anew."""
+        pages = word_pages(self._words(), height - 1)
         page = pages[self._word % len(pages)] if pages else None
-        parts["word"] = word_lines(view, page, left) if page else []
-        return parts
+        lines = word_lines(view, page, SMALL_LEFT) if page else []
+        return {"word": lines + [Text("")] * (height - len(lines))}
 
     def _wide_words(self, view: View, height: int) -> dict[str, list[Text]]:
         """Three words from the chosen one on, and the counters of the line."""
@@ -247,7 +276,12 @@ class MonitorScreen(OrderKeys):
     def action_next_word(self) -> None:
         """The next word of bits."""
         self._word += 1
-        self.look()
+        view = self._view()
+        if self.wide:
+            self._show(self._wide_words(view, WORDS_HEIGHT))
+        else:
+            height = self.query_one("#left").size.height
+            self._show(self._small_word(view, height - len(state_lines(view, SMALL_LEFT))))
 
     def action_rating(self) -> None:
         """Tell the rated current of a drive that gives its current in %."""
