@@ -265,3 +265,14 @@ def stage(profile: Profile, typed: Mapping[str, str], held: Mapping[str, int]) -
 
 def codes(edits: Edits, profile: Profile, held: Mapping[str, int]) -> list[str]:
     return [edit.code for edit in ordered(profile, edits, held)]
+
+
+@pytest.mark.parametrize("family", ["atv31", "atv312", "atv71"])
+def test_a_lost_line_is_never_made_to_go_unnoticed(family: str) -> None:
+    profile = library.load(family)
+    watch = profile.data.communication_fault
+    assert watch is not None
+    with pytest.raises(ValueRefused, match="not written from here"):
+        Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 1})
+    # what the drive holds already is no edit
+    assert len(Edits().stage_raw(profile, watch.reaction, 0, {watch.reaction: 0})) == 0

@@ -313,3 +313,13 @@ async def test_a_journal_that_cannot_be_written_stops_no_command(tmp_path: Path)
         assert commander.outcome.kind is Kind.DONE
         assert "cannot be written" in journal.trouble
         assert len(journal.recent) == 3
+
+
+async def test_a_motor_that_starts_the_other_way_is_stopped() -> None:
+    # bit 12 of CMI is a second source of the direction; an unassigned bit 11 shows the same
+    async with bench("atv71", sets={"CMI": 1 << 12}) as made:
+        made.commander.refer("20Hz")
+        await made.done()
+        said = await made.order("forward", Kind.REFUSED)
+        assert "turned reverse and was stopped" in said
+        await made.until(lambda: made.drive.motor.frequency == 0)

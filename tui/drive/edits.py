@@ -9,11 +9,12 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 
+from .errors import ValueRefused
 from .profile import Profile
 from .schema import Parameter
 from .shown import number_of, scale_sources, shown
 from .values import check_raw, encode
-from .writable import CUTTING, line_setting, warning
+from .writable import CUTTING, line_setting, never_set, warning
 
 
 @dataclass(frozen=True, slots=True)
@@ -167,6 +168,8 @@ def _encoded(
         raw, rounded = conversion.raw, conversion.rounded
     else:
         check_raw(parameter, raw, names, scale)
+    if raw != edit.old and (why := never_set(profile, parameter, raw)):
+        raise ValueRefused(why)
     old = "" if edit.old is None else shown(profile, parameter, edit.old, raws, absent).display
     return replace(
         edit,

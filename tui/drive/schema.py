@@ -631,6 +631,8 @@ class Reaction(Table, frozen=True, kw_only=True):
     does: str
     trips: bool
     motor_keeps_running: bool = False
+    never_set: bool = False
+    """True where it makes a lost line go unnoticed: it is set at the keypad, or not at all."""
 
 
 class CommunicationFault(Table, frozen=True, kw_only=True):

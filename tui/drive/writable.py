@@ -159,6 +159,19 @@ def waits_for_reset(profile: Profile, parameter: Parameter) -> bool:
     return parameter.effective == "after-reset"
 
 
+def never_set(profile: Profile, parameter: Parameter, raw: int) -> str:
+    """Why a value is never written from here, whoever wants it; else empty."""
+    watch = profile.data.communication_fault
+    if watch is None or parameter.code != watch.reaction:
+        return ""
+    if not any(r.never_set and r.raw == raw for r in watch.reactions):
+        return ""
+    return (
+        f"{parameter.code} = {raw} is not written from here: a motor would run on when the line is"
+        " lost, and nobody would know. Set it at the keypad, if it must be."
+    )
+
+
 def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
     """What is dangerous about a value of the drive's watch over the line; else empty."""
     watch = profile.data.communication_fault

@@ -16,7 +16,7 @@ from enum import StrEnum
 
 from tui.bus.errors import LineError, Superseded
 from tui.bus.line import LineStatus, Priority
-from tui.drive.chart import state_of
+from tui.drive.chart import read_chart, state_of
 from tui.drive.errors import DriveError
 from tui.drive.orders import (
     OrderRefused,
@@ -45,6 +45,8 @@ ARMED_FOR = 60.0
 STEP_TIME = 2.0
 """Seconds that a drive may take for one step of its chart."""
 LOOK = 0.05
+LOOKS = 10
+"""Looks within which the direction of a start must be the ordered one."""
 ENABLED = "enabled"
 """The state of the Drivecom charts in which the motor runs."""
 
@@ -245,6 +247,7 @@ class Commander:
         same = [order for order in chart.orders if order.id == id]
         if not same:
             raise OrderRefused(f"The {chart.name} has no order {id!r}.")
+        at_rest = (await self._state(chart)).kind not in ("running", "stopping")
         await self._write_reference_again()
         if chart.kind == "drivecom":
             await self._walk(chart, same[0])
@@ -252,7 +255,27 @@ class Commander:
             order = choose(chart, id, self._raws())
             await self._send(chart, order)
         name = same[0].name
-        return f"{name}: {await self._until_running(chart)}"
+        reached = await self._until_running(chart)
+        if at_rest:
+            await self._check_direction(chart, id)
+        return f"{name}: {reached}"
+
+    async def _check_direction(self, chart: Chart, id: OrderId) -> None:
+        """Stop a motor that starts the other way: bit 11 may be assigned to something else."""
+        turns = read_chart(self.session.profile, self._raws()).direction
+        if turns is None or turns == id:
+            return
+        for _ in range(LOOKS):
+            await asyncio.sleep(LOOK)
+            await self._read([chart.direction.parameter] if chart.direction else [])
+            turns = read_chart(self.session.profile, self._raws()).direction
+            if turns == id:
+                return
+        await self._send(chart, choose(chart, "stop", self._raws()))
+        raise OrderRefused(
+            f"Ordered {id}, the drive turned {turns} and was stopped: its reverse order is"
+            " assigned to something else."
+        )
 
     async def _write_reference_again(self) -> None:
         """Some drives run only once their reference was written, too: it is, as it stands."""

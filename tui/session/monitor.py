@@ -10,9 +10,10 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 
-from tui.bus.errors import LineError
+from tui.bus.errors import LineClosed, LineError, LineLost
 from tui.bus.line import Line, LineState, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.errors import DriveError
@@ -21,6 +22,7 @@ from tui.drive.profile import Profile
 from tui.drive.schema import Quantity
 
 from .drive_state import DriveState, drive_state
+from .due import Due
 from .known import Known
 from .reader import Reader
 from .readings import Reading
@@ -34,6 +36,8 @@ TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 SHORTEST_PERIOD = 0.05
 RESET_NEAR = frozenset({"fault", "starting", "unknown"})
 """Kinds of state in or after which a drive is reset, maybe without falling silent."""
+FORGOTTEN_AFTER = 3
+"""Failed cycles in a row after which another drive may answer."""
 RATE_OVER = 6
 """Cycles over which the rate is measured."""
 
@@ -104,6 +108,7 @@ class Monitor:
         self._latest: Snapshot | None = None
         self._using = ""
         self._all_due = True
+        self._learn_due = True
         self._trend: deque[TrendPoint] = deque()
         self._listeners: tuple[Listener, ...] = ()
         self._worker: Worker | None = None
@@ -171,28 +176,35 @@ class Monitor:
     async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
         begun: deque[float] = deque(maxlen=RATE_OVER)
+        due = Due(SLOW_FACTOR)
         self._all_due = True
-        cycle = 0
+        cycle = failures = 0
         try:
             while True:
                 started = time.monotonic()
                 cycle += 1
                 error = ""
                 period = self._period(rates)
-                seldom, self._all_due = self._all_due, False
+                if self._all_due:
+                    self._all_due, self._learn_due = False, True
+                    due.add(rates.seldom)
                 try:
-                    turn = rates.seldom if seldom else self._turn(rates, cycle)
+                    turn = due.turn((*rates.seldom, *self.also), self.reader.groups)
                     readings.update(await self._cycle(rates, readings, turn))
-                    if seldom or cycle % SLOW_FACTOR == 0:
-                        await self.reader.learn_slots()
                 except (LineError, DriveError) as fault:
                     error = str(fault)
-                    self.reader.forget()  # what answers next may be another drive
+                    failures += 1
                     begun.clear()
-                    self._all_due = True
+                    due.failed(self.reader.groups)
+                    if self._may_be_another(fault, failures):
+                        self.reader.forget()
+                        self._all_due = True
                 else:
+                    failures = 0
+                    due.came()
                     self.known.note(readings)
                     begun.append(started)
+                    await self._learn(cycle)
                 self._publish(cycle, readings, rates, _span(begun, period), error)
                 rest = started + period - time.monotonic()
                 await asyncio.sleep(period if error else max(0.0, rest))
@@ -205,10 +217,20 @@ class Monitor:
         cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
         return self.line.pace.claim(self, cost, max(self.period, SHORTEST_PERIOD))
 
-    def _turn(self, rates: Rates, cycle: int) -> tuple[str, ...]:
-        """The seldom values whose turn it is: a tenth of their requests in each cycle."""
-        groups = self.reader.groups((*rates.seldom, *self.also))
-        return tuple(code for group in groups[cycle % SLOW_FACTOR :: SLOW_FACTOR] for code in group)
+    def _may_be_another(self, fault: Exception, failures: int) -> bool:
+        """Whether after a failed cycle what was learned of the drive may be wrong."""
+        if failures >= FORGOTTEN_AFTER or isinstance(fault, LineLost | LineClosed):
+            return True
+        return self._latest is None or self._latest.state.kind in RESET_NEAR
+
+    async def _learn(self, cycle: int) -> None:
+        """See now and then what the drive's block brings; what fails is asked again next time."""
+        if not self._learn_due and cycle % SLOW_FACTOR:
+            return
+        self._learn_due = True
+        with suppress(LineError, DriveError):
+            await self.reader.learn_slots()
+            self._learn_due = False
 
     async def _cycle(
         self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
@@ -219,7 +241,7 @@ class Monitor:
         if set(rates.changing) <= set(turn):
             return found
         now = drive_state(self.profile, found)
-        same = all(found[code].raw == before[code].raw for code in rates.key if code in before)
+        same = all(code in before and found[code].raw == before[code].raw for code in rates.key)
         if not same or now.alarm or now.kind == "fault":
             found |= await self.reader.read(rates.changing, priority=Priority.POLL)
         return found
