@@ -20,6 +20,7 @@ from tui.screens.faults import FaultsScreen
 from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
 from tui.screens.monitor import MonitorScreen
+from tui.screens.parameters import ParametersScreen
 from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
 
@@ -186,7 +187,14 @@ async def test_a_line_and_a_device_on_the_command_line_open_its_monitor() -> Non
 
 
 def test_every_action_has_a_method_and_words() -> None:
-    screens = (ConnectionScreen, MonitorScreen, FramesScreen, ControlSourceScreen, FaultsScreen)
+    screens = (
+        ConnectionScreen,
+        MonitorScreen,
+        FramesScreen,
+        ControlSourceScreen,
+        FaultsScreen,
+        ParametersScreen,
+    )
     owners = {(screen.TITLE or "connection").lower(): screen for screen in screens}
     for action in ACTIONS:
         name = f"action_{action.id.partition('(')[0]}"
