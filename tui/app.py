@@ -173,6 +173,12 @@ class DrivePanelApp(Panel):
             known = self._commanders[session.device] = Commander(session, self.journal)
         return known
 
+    def follow(self, line: str, device: int) -> None:
+        """Open the line anew as a drive now wants it, and watch that drive."""
+        while self.screen is not self.connection:
+            self.pop_screen()
+        self.connection.start(line, device)
+
     def session_at(self, device: int) -> DriveSession | None:
         """The drive found at an address of the open line, or None."""
         found = self.connection.found.get(device)

@@ -165,7 +165,7 @@ async def test_back_up_change_compare_stage_and_write(
         await to_parameters(made)
         file = Path("pump.toml")
         await answer(made, "b", str(file))
-        await message(made, "Backed up")
+        await message(made, "parameters", "pump.toml")
         assert re.search(r"^ACC = \{.*raw = 30", read(file), re.MULTILINE)
         made.drive().set("ACC", 99)
         made.drive().set("HSP", 400)
@@ -194,3 +194,35 @@ async def test_a_file_that_is_no_set_is_told_and_nothing_is_staged(
         await answer(made, "o", str(file))
         await message(made, "broken.toml:2")
         assert "0 staged" in shown(made.app, "status")
+
+
+async def test_a_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    async with bench("atv312") as made:
+        await to_parameters(made)
+        await answer(made, "p", "pump.md")
+        await message(made, "parameters", "pump.md")
+        assert "Altivar 312" in read(Path("pump.md"))
+
+
+async def test_the_panel_follows_a_drive_to_its_new_address() -> None:
+    async with bench("atv71") as made:
+        await to_parameters(made)
+        parameter = made.drive().profile.quantity("line_address")
+        assert parameter is not None
+        await find(made, parameter.code)
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+        await made.pilot.press("7", "enter", "a", "w")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        assert "new settings only" in str(made.app.screen.query_one("#follows").render())
+        await made.pilot.press("y")
+        await until(made.pilot, lambda: "Follow the drive?" in question(made))
+        await made.pilot.press("y")
+        await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
+        await until(made.pilot, lambda: "device 7" in shown(made.app, "header"))
+
+
+def question(made: Bench) -> str:
+    found = made.app.screen.query("#question")
+    return str(found.first().render()) if found else ""

@@ -37,6 +37,10 @@ class Panel(App[None]):
         """What commands a drive of the open line."""
 
     @abstractmethod
+    def follow(self, line: str, device: int) -> None:
+        """Open the line anew as a drive now wants it, and watch that drive."""
+
+    @abstractmethod
     def session_at(self, device: int) -> DriveSession | None:
         """The drive found at an address of the open line, or None."""
 

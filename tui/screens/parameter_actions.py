@@ -38,6 +38,7 @@ PARAMETER_ACTIONS: tuple[Action, ...] = (
     Action("save", "s", "s", "", "Save to EEPROM, where the drive needs it.", HERE, line=False),
     Action("factory", "F", "F", "", "Recall the factory settings.", HERE, line=False),
     Action("backup", "b", "b", "", "Back all parameters up to a file.", HERE, line=False),
+    Action("report", "p", "p", "", "Write a report on this drive.", HERE, line=False),
     Action(
         "compare",
         "o",

@@ -136,6 +136,7 @@ class ParametersScreen(SetKeys):
         if not self.is_current or not self.size.width:
             return
         editor, width, room = self.editor, self.size.width, self._room
+        self._offer_to_follow()
         first = self._at - 1 if self._at and self._items[self._at - 1].group else self._at
         self._top = min(max(self._top, self._at - room + 1), first) if self._items else 0
         shown = self._items[self._top : self._top + room]
@@ -155,6 +156,25 @@ class ParametersScreen(SetKeys):
         self.query_one("#message", Lines).show(news)
         armed = self.commander.armed_for
         self.query_one("#status", Lines).show([status_line(editor, armed, width)])
+
+    def _offer_to_follow(self) -> None:
+        """Ask once whether to go where the drive answers now."""
+        from .confirm import Confirm
+
+        moved = self.editor.moved
+        if moved is None or self.editor.busy:
+            return
+        self.editor.moved = None
+        if not moved.device:
+            self.note(moved.text)
+            return
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                self.app.follow(moved.line, moved.device)
+
+        keys = "y or Enter follows it   Esc stays"
+        self.app.push_screen(Confirm("Follow the drive?", moved.text, keys), told)
 
     def _title(self) -> Text:
         done, count = self.editor.progress

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from textual.screen import Screen
 
@@ -14,6 +16,9 @@ from tui.session.drive_session import DriveSession
 from tui.session.editor import Editor
 
 from .panel import Panel
+
+if TYPE_CHECKING:
+    from tui.drive.parameter_set import ParameterSet
 
 
 class SetKeys(Screen[None]):
@@ -35,43 +40,63 @@ class SetKeys(Screen[None]):
         """Show what the drive has otherwise than the set."""
         raise NotImplementedError
 
-    # Back up
+    # Back up and report
 
     def action_backup(self) -> None:
         """Ask for a file, read everything, write it."""
+        from tui.drive.parameter_set import dumps
+
+        about = "Every readable parameter, in units and raw, one a line (TOML)."
+        profile = self.session.profile
+        self._ask_for_file("Back up to", "toml", about, lambda values: dumps(profile, values))
+
+    def action_report(self) -> None:
+        """Ask for a file, read everything, write what a customer may be given."""
+        from tui.session.report import entries_of, report
+
+        def text(values: ParameterSet) -> str:
+            entries = entries_of(self.editor.journal, self.session.line_text, self.session.device)
+            return report(self.session.profile, values, entries)
+
+        about = (
+            "Identity, line, changed settings, control source, reaction to a lost line, faults and"
+            " what was written from here (Markdown)."
+        )
+        self._ask_for_file("Report to", "md", about, text)
+
+    def _ask_for_file(
+        self, question: str, suffix: str, about: str, text: Callable[[ParameterSet], str]
+    ) -> None:
         from .ask import Ask
 
-        profile = self.session.profile
         when = time.strftime("%Y%m%d-%H%M")
-        proposed = str(Path.cwd() / f"{profile.id}-{self.session.device}-{when}.toml")
+        name = f"{self.session.profile.id}-{self.session.device}-{when}.{suffix}"
 
         def told(name: str | None) -> None:
             if name:
-                self.run_worker(
-                    self._back_up(Path(name).expanduser()), exclusive=True, group="sets"
-                )
+                work = self._read_to_file(Path(name).expanduser(), text)
+                self.run_worker(work, exclusive=True, group="sets")
 
-        about = "Every readable parameter, in units and raw, one a line (TOML)."
-        self.app.push_screen(Ask("Back up to", _free, text=proposed, about=about), told)
+        proposed = str(Path.cwd() / name)
+        self.app.push_screen(Ask(question, _free, text=proposed, about=about), told)
 
-    async def _back_up(self, path: Path) -> None:
-        from tui.drive.parameter_set import dumps
+    async def _read_to_file(self, path: Path, text: Callable[[ParameterSet], str]) -> None:
         from tui.drive.set_file import write_file
         from tui.session.upload import Upload
 
         def progress(done: int, count: int) -> None:
-            self.note(f"Reading for the backup: {done} of {count}")
+            self.note(f"Reading for {path.name}: {done} of {count}")
 
         upload = Upload(self.session, progress=progress)
         try:
             await upload.run()
-            write_file(path, dumps(self.session.profile, upload.parameter_set()))
+            write_file(path, text(upload.parameter_set()))
         except (LineError, DriveError) as error:
-            self.note(f"No backup: {error}")
+            self.note(f"No file: {error}")
         else:
             bad = len(upload.asker.absent)
             without = f"; {bad} the drive does not tell" if bad else ""
-            self.note(f"Backed up {len(upload.asker.raws)} parameters{without}: {path}")
+            self.note(f"{len(upload.asker.raws)} parameters{without}: {path}")
 
     # Compare
 

@@ -30,6 +30,7 @@ from .asking import Asker, neighbours
 from .drive_session import DriveSession
 from .favourites import Marks, load_marks, save_marks
 from .journal import Journal
+from .link_change import LinkChange
 from .memory import factory_reset, save_to_eeprom
 from .upload import readable_codes
 
@@ -68,6 +69,8 @@ class Editor:
     unsaved: set[str] = field(default_factory=set)
     waits_for_reset: set[str] = field(default_factory=set)
     said: Say | None = None
+    moved: LinkChange | None = None
+    """Where the drive answers now, after a setting of the line itself was written."""
     trouble: str = ""
     """Why nothing can be read now; empty while that works."""
     marks: Marks = field(default_factory=Marks)
@@ -310,6 +313,7 @@ class Editor:
         self._mark(self.marks.edited(written))
         self.unsaved |= set(applied.unsaved)
         self.waits_for_reset |= set(applied.after_reset)
+        self.moved = next((link for link in applied.links if link.at_once), None)
         changed = {r.edit.code for r in applied.results if r.outcome is Outcome.CHANGED}
         self.changed_elsewhere = {
             c: r for c, r in self.changed_elsewhere.items() if c not in written or c in changed
