@@ -25,7 +25,6 @@ class Due:
     def add(self, codes: Iterable[str]) -> None:
         """Owe these values; they come before the others have their turn."""
         self._owed = tuple(dict.fromkeys((*codes, *self._owed)))
-        self._most = None
 
     def turn(self, codes: Iterable[str], groups: Groups) -> tuple[str, ...]:
         """The values to be read in this cycle: some of those owed, else the next of `codes`."""
@@ -38,10 +37,10 @@ class Due:
         return self._turn
 
     def came(self) -> None:
-        """The values of this turn were read."""
+        """The values of this turn were read; of what is owed yet comes twice as much."""
         self._owed = tuple(code for code in self._owed if code not in self._turn)
-        if not self._owed:
-            self._most = None
+        if self._most is not None:
+            self._most = self._most * 2 if self._owed else None
 
     def failed(self, groups: Groups) -> None:
         """This turn failed: its values are owed, and asked for with half as many requests.

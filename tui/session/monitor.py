@@ -107,6 +107,8 @@ class Monitor:
         """Codes read with the seldom ones beside those that were asked for at the start."""
         self._latest: Snapshot | None = None
         self._using = ""
+        self._kind = "unknown"
+        """Kind of the state that was last read."""
         self._all_due = True
         self._learn_due = True
         self._trend: deque[TrendPoint] = deque()
@@ -221,7 +223,7 @@ class Monitor:
         """Whether after a failed cycle what was learned of the drive may be wrong."""
         if failures >= FORGOTTEN_AFTER or isinstance(fault, LineLost | LineClosed):
             return True
-        return self._latest is None or self._latest.state.kind in RESET_NEAR
+        return self._kind in RESET_NEAR
 
     async def _learn(self, cycle: int) -> None:
         """See now and then what the drive's block brings; what fails is asked again next time."""
@@ -271,6 +273,8 @@ class Monitor:
             line=self.line.state,
             block=self._using,
         )
+        if not error:
+            self._kind = snapshot.state.kind
         if snapshot.state.kind in RESET_NEAR:
             self.reader.distrust()
         self._latest = snapshot

@@ -1,0 +1,213 @@
+"""Monitoring over failed requests: what stays known, what is read again, what is forgotten."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine, Iterable
+from contextlib import suppress
+from typing import Any, cast
+
+import pytest
+
+from tui.bus.errors import LineLost, NoAnswer
+from tui.bus.line import Line, LineState, LineStatus, Priority, Reply, Worker
+from tui.bus.pace import Pace
+from tui.session.due import Due
+from tui.session.monitor import FORGOTTEN_AFTER, Monitor, Snapshot
+
+from .fakes import FakeLine, parameter, profile_of
+
+Cycles = list[tuple[Snapshot, list[int]]]
+"""Each snapshot with the addresses that were asked for it."""
+STATE, SPEED, REFUSED, FIRST_SLOW = 10, 20, 900, 1000
+SLOW = 12
+RUNNING, FAULT = 1, 2
+
+PROFILE = profile_of(
+    parameter("STATE", STATE),
+    parameter("SPEED", SPEED),
+    parameter("NOT", REFUSED),
+    *(parameter(f"SLOW{i}", FIRST_SLOW + 100 * i) for i in range(SLOW)),
+    monitoring={
+        "values": [
+            {"parameter": "STATE"},
+            {"parameter": "SPEED"},
+            {"parameter": "NOT", "rate": "slow"},
+            *({"parameter": f"SLOW{i}", "rate": "slow"} for i in range(SLOW)),
+        ]
+    },
+    charts=[
+        {
+            "id": "drivecom",
+            "name": "Drivecom",
+            "kind": "drivecom",
+            "status": "STATE",
+            "states": [
+                {"id": "run", "name": "Run", "kind": "running", "mask": 3, "value": RUNNING},
+                {"id": "fault", "name": "Fault", "kind": "fault", "mask": 3, "value": FAULT},
+            ],
+        }
+    ],
+)
+
+
+class FaultyLine(FakeLine):
+    """Runs workers in the test's loop; the next requests fail with the errors in `faults`."""
+
+    def __init__(self) -> None:
+        registers = {FIRST_SLOW + 100 * i: i for i in range(SLOW)}
+        super().__init__({STATE: RUNNING, SPEED: 500, **registers})
+        self.refused[REFUSED] = 2
+        self.faults: list[Exception | None] = []
+        self.pace = Pace()
+        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
+        self.task: asyncio.Task[Any] | None = None
+
+    async def read(
+        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+    ) -> Reply:
+        fault = self.faults.pop(0) if self.faults else None
+        if fault is not None:
+            self.requests.append((address, count))
+            raise fault
+        return await super().read(device, address, count, priority=priority)
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> Worker:
+        self.task = asyncio.ensure_future(work())
+        return cast("Worker", self.task)
+
+
+class Bench:
+    """A monitor, its line, and what was asked in each cycle."""
+
+    def __init__(self) -> None:
+        self.line = FaultyLine()
+        self.monitor = Monitor(cast("Line", self.line), 1, PROFILE)
+        self.cycles: Cycles = []
+        self.monitor.listen(self._take)
+
+    def _take(self, snapshot: Snapshot) -> None:
+        self.cycles.append((snapshot, [address for address, _ in self.line.requests]))
+        self.line.requests.clear()
+
+    async def run(self, cycles: int) -> Cycles:
+        """The next cycles."""
+        self.cycles.clear()
+        if self.line.task is None:
+            self.monitor.start(period=0.01)
+        end = time.monotonic() + 20
+        while len(self.cycles) < cycles:
+            assert self.line.task is not None
+            assert not self.line.task.done()
+            assert time.monotonic() < end
+            await asyncio.sleep(0.005)
+        return self.cycles[:cycles]
+
+    async def fail(self, *faults: Exception | None, cycles: int) -> Cycles:
+        """The next cycles, of which the first requests fail so."""
+        self.line.faults.extend(faults)
+        return await self.run(cycles)
+
+    async def end(self) -> None:
+        self.monitor.stop()
+        if self.line.task is not None:
+            with suppress(asyncio.CancelledError):
+                await self.line.task
+
+
+@pytest.fixture
+async def bench() -> Any:
+    made = Bench()
+    yield made
+    await made.end()
+
+
+def silence() -> NoAnswer:
+    return NoAnswer(1, 3, STATE)
+
+
+async def test_after_one_failed_request_only_that_cycle_is_read_again(bench: Bench) -> None:
+    await bench.run(12)
+    failed, after = await bench.fail(silence(), cycles=2)
+    assert failed[0].error
+    assert not after[0].error
+    assert STATE in after[1]
+    assert len(after[1]) <= 4  # the fast values and one turn of the slow ones
+    assert REFUSED not in after[1]  # it is still known that the drive does not have it
+
+
+async def test_a_failed_cycle_shows_its_error_and_nothing_new(bench: Bench) -> None:
+    await bench.run(3)
+    (before, _), *_ = await bench.run(1)
+    bench.line.registers[SPEED] = 777
+    # one request of the cycle is answered, the next is not
+    ((failed, _),) = await bench.fail(None, silence(), cycles=1)
+    assert failed.error
+    times = {code: reading.time for code, reading in before.readings.items()}
+    assert all(r.time <= max(times[c], before.time) for c, r in failed.readings.items())
+    assert failed.readings["SPEED"].raw == 500
+    (after, _), *_ = await bench.run(1)
+    assert after.readings["SPEED"].raw == 777
+
+
+@pytest.mark.parametrize("fault", [LineLost("gone"), None], ids=["line lost", "many failures"])
+async def test_what_another_drive_may_answer_is_read_anew(
+    bench: Bench, fault: Exception | None
+) -> None:
+    await bench.run(12)
+    faults = [fault] if fault else [silence() for _ in range(FORGOTTEN_AFTER)]
+    cycles = await bench.fail(*faults, cycles=len(faults) + 12)
+    assert [bool(s.error) for s, _ in cycles] == [True] * len(faults) + [False] * 12
+    asked = {address for _, addresses in cycles[len(faults) :] for address in addresses}
+    assert {REFUSED, *(FIRST_SLOW + 100 * i for i in range(SLOW))} <= asked
+
+
+async def test_a_drive_in_fault_may_be_reset_by_the_failure(bench: Bench) -> None:
+    bench.line.registers[STATE] = FAULT
+    await bench.run(12)
+    cycles = await bench.fail(silence(), cycles=10)
+    assert [bool(s.error) for s, _ in cycles] == [True] + [False] * 9
+    assert any(REFUSED in addresses for _, addresses in cycles)
+
+
+def one_each(codes: Iterable[str]) -> list[tuple[str, ...]]:
+    return [(code,) for code in codes]
+
+
+def test_what_failed_comes_in_halves_and_then_in_doubles() -> None:
+    due, codes = Due(10), tuple("abcdefgh")
+    due.add(codes)
+    asked = []
+    for fails in (True, True, False, False, False, False):
+        asked.append(due.turn(codes, one_each))
+        if fails:
+            due.failed(one_each)
+        else:
+            due.came()
+    assert ["".join(turn) for turn in asked[:5]] == ["abcdefgh", "abcd", "ab", "cdef", "gh"]
+    assert len(asked[5]) <= 1  # the usual turns again
+
+
+def test_all_have_their_turn_though_some_fail() -> None:
+    due, codes = Due(10), tuple("abcdefghijklmnopqrstuvwxyz")
+    read: set[str] = set()
+    for cycle in range(120):
+        turn = due.turn(codes, one_each)
+        if cycle % 2:
+            due.failed(one_each)
+        else:
+            read.update(turn)
+            due.came()
+    assert read == set(codes)
+
+
+def test_values_that_no_request_brings_are_not_owed_for_ever() -> None:
+    due = Due(10)
+    due.add("ab")
+    due.turn("ab", one_each)
+    due.failed(one_each)
+    for _ in range(3):
+        due.turn("ab", lambda codes: [])
+        due.came()
+    assert due.turn("ab", lambda codes: []) == ()
