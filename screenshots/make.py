@@ -18,7 +18,7 @@ FAULT_CODE = "ObF"
 
 
 async def main() -> None:
-    """One run a size: Connection, Monitor, a fault, help."""
+    """One run a size: every screen in a usual state."""
     import tui.session.lines
 
     tui.session.lines.serial_ports = list  # the same on every machine: no port
@@ -60,13 +60,41 @@ async def _run(size: tuple[int, int]) -> None:
         await pilot.press("question_mark")
         await pilot.pause(0.5)
         save("help")
-        await pilot.press("escape")
+        await pilot.press("escape", "a")
+        await pilot.pause(1.0)
+        save("armed")
+        await pilot.press("c")
+        await pilot.pause(1.5)
+        await pilot.press("down")
+        await pilot.pause(0.5)
+        save("control-source")
+        await pilot.press("escape", "3")
+        await pilot.pause(6.0)
+        await pilot.press("slash", *"ramp", "enter")
+        await pilot.pause(1.5)
+        save("parameters-found")
+        await pilot.press("slash", *[*["backspace"] * 4], *"acc", "enter", "enter")
+        await pilot.pause(0.5)
+        await pilot.press(*"5.03")
+        await pilot.pause(0.5)
+        save("parameters-edit")
+        await pilot.press("enter", "slash", *[*["backspace"] * 3], *"speed", "enter", "minus")
+        await pilot.pause(1.0)
+        save("parameters")
+        await pilot.press("a", "a", "w")
+        await pilot.pause(0.5)
+        save("parameters-write")
+        await pilot.press("escape", "2")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         simulation = app.opened.simulation if app.opened else None
         if simulation is None:
             raise RuntimeError("the screenshots are made from simulated drives")
         simulation.drive(WATCHED).provoke(FAULT_CODE)
         await pilot.pause(4.0)
         save("monitor-fault")
+        await pilot.press("h")
+        await pilot.pause(2.0)
+        save("faults")
 
 
 if __name__ == "__main__":

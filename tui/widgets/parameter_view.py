@@ -228,7 +228,7 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
     text = Text(no_wrap=True)
     text.append(f" {parameter.code} ", STRONG)
     hexadecimal = f"16#{parameter.address:04X}"
-    number = parameter.number if parameter.number != hexadecimal else ""
+    number = parameter.number if parameter.number not in (hexadecimal, parameter.code) else ""
     text.append(" · ".join(x for x in (number, hexadecimal, str(parameter.address)) if x), FAINT)
     if raw is not None:
         text.append(
