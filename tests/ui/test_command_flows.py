@@ -203,6 +203,14 @@ async def test_stop_works_on_every_screen(screen: str) -> None:
         await made.pilot.press("f12")
         await made.stopped()
         assert isinstance(made.app.screen, kind)
+        if "session" not in vars(made.app.screen):
+            # nothing of this screen tells of the drive, so the panel does
+            await until(made.pilot, lambda: "STOPPED" in told(made.app))
+
+
+def told(app: DrivePanelApp) -> str:
+    """What the notices say that are shown now."""
+    return " ".join(one.message for one in app._notifications)
 
 
 async def test_space_stops_outside_texts_only() -> None:
