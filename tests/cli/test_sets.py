@@ -243,3 +243,20 @@ def test_a_report(line: str, tmp_path: Path) -> None:
     assert "is there already" in refused(2, "report", line, file, "-d", "2")
     assert file.read_text(encoding="utf-8") == text
     run(0, "report", line, file, "-d", "2", "--force")
+
+
+def test_one_set_goes_to_several_drives(tmp_path: Path) -> None:
+    file = tmp_path / "model.toml"
+    with simulated("atv312@1,atv312@2,atv21@3", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        run(0, "write", line, "ACC=7", "HSP=40", "-d", "1", "--arm")
+        run(0, "backup", line, file)
+        told = run(0, "restore", line, file, "-d", "1", "-d", "2", "--arm")
+        assert "Device 1:" in told
+        assert told.index("0 written") < told.index("Device 2:") < told.index("2 written")
+        assert "equal" in run(0, "restore", line, file, "-d", "2", "--dry-run")
+        # a drive that is not there keeps the set from no other
+        run(0, "write", line, "ACC=3", "-d", "2", "--arm")
+        result = invoked("restore", line, file, "-d", "9", "-d", "2", "--arm")
+        assert result.exit_code == 3
+        assert "1 written" in result.output

@@ -199,3 +199,18 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
         editor.apply()
         assert "2 written" in await written(made, editor)
         assert (made.drive.raw("ACC"), made.drive.raw("HSP")) == (30, 500)
+
+
+async def test_what_waits_for_a_reset_is_told_until_the_drive_was_off() -> None:
+    async with editing("atv21") as (made, editor):
+        await read(made, editor, "F875")
+        editor.stage_raw("F875", 2)
+        editor.apply()
+        assert "after a reset of the drive: F875" in await written(made, editor)
+        assert editor.waits_for_reset == {"F875"}
+        editor.visible = ("F875",)
+        made.drive.power_off()
+        await made.until(lambda: "did not answer" in editor.trouble)
+        assert editor.waits_for_reset == {"F875"}
+        made.drive.power_on()
+        await made.until(lambda: editor.waits_for_reset == set(), 40.0)

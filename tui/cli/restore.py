@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from .backup import profile_option
-from .errors import DONE, DRIVE_REFUSED, told
-from .options import Target, connect, device_option, line_argument, on_line, read_only_option
+from .errors import DONE, DRIVE_REFUSED, status_of, told
+from .options import Target, connect, line_argument, on_line, read_only_option
 from .orders import arm_option, need_arming
 from .sets import (
     codes_of,
@@ -44,7 +45,17 @@ NAMED = 12
 @save_option
 @read_only_option
 @profile_option
-@device_option
+@click.option(
+    "-d",
+    "--device",
+    "devices",
+    type=click.IntRange(1, 247),
+    multiple=True,
+    default=(1,),
+    show_default=True,
+    metavar="ADDRESS",
+    help="Slave address of the drive; several times for several drives.",
+)
 @told
 def restore(
     line_text: str,
@@ -57,9 +68,12 @@ def restore(
     save: bool,
     read_only: bool,
     profile_id: str | None,
-    device: int,
+    devices: tuple[int, ...],
 ) -> None:
     """Bring a parameter set back into a drive: what differs is written and read back.
+
+    With several -d the set goes to each of these drives in turn; one that cannot take it does
+    not keep it from the others.
 
     --dry-run tells what would be written, what is left out, and why. An interrupted restoring
     is resumed by the same command: the drive is read, and what is missing is written.
@@ -69,21 +83,43 @@ def restore(
             need_arming(False, "restoring writes settings of the drive")
         raise click.UsageError("Give either --dry-run or --arm.")
     values = set_in(file)
-    target = Target(line_text, device, profile_id)
 
-    async def work(opened: OpenLine) -> int:
+    async def one(opened: OpenLine, device: int) -> int:
         from tui.drive.restore_plan import Options
 
-        session = await connect(opened, target)
+        session = await connect(opened, Target(line_text, device, profile_id))
         codes = codes_of(session, confirmed)
         options = Options(line_settings, rating, codes)
         if dry_run:
             return await _tell(session, values, options)
         return await _restore(session, values, options, save=save)
 
+    async def work(opened: OpenLine) -> int:
+        if len(devices) == 1:
+            return await one(opened, devices[0])
+        return max([await _in_turn(opened, device, one) for device in devices])
+
     status = on_line(line_text, work, read_only=read_only or dry_run)
     if status != DONE:
         raise click.exceptions.Exit(status)
+
+
+async def _in_turn(
+    opened: OpenLine, device: int, one: Callable[[OpenLine, int], Awaitable[int]]
+) -> int:
+    """One of several drives; what is wrong with it is told, and the next one is tried."""
+    click.echo(f"Device {device}:")
+    try:
+        return await one(opened, device)
+    except click.ClickException as error:
+        status, text = error.exit_code, error.format_message()
+    except Exception as error:
+        known = status_of(error)
+        if known is None:
+            raise
+        status, text = known, str(error)
+    click.echo(f"drivepanel: device {device}: {text}", err=True)
+    return status
 
 
 async def _tell(session: DriveSession, values: ParameterSet, options: Options) -> int:

@@ -13,7 +13,7 @@ from collections.abc import Callable, Coroutine, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from tui.bus.errors import LineError
+from tui.bus.errors import LineError, NoAnswer
 from tui.bus.line import LineStatus, Priority, Worker
 from tui.drive.edits import Edits
 from tui.drive.errors import DriveError, ValueRefused
@@ -39,6 +39,8 @@ LOOK = 0.1
 AGAIN = 1.0
 """Seconds after which what is looked at is read again."""
 AFTER_ERROR = 1.0
+WAS_OFF = 3.0
+"""Seconds of silence after which a drive that answers again was switched off, not disturbed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,6 +85,8 @@ class Editor:
     """Counts every change, so that a screen knows when to look."""
     _reader: Worker | None = None
     _work: Worker | None = None
+    _silent: float | None = None
+    """Since when the drive does not answer."""
     _asked: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -169,10 +173,27 @@ class Editor:
                 else:
                     await asyncio.sleep(LOOK)
                 self.trouble = ""
+                self._look_for_a_reset()
             except LineError as error:
+                if isinstance(error, NoAnswer) and self._silent is None:
+                    self._silent = time.monotonic()
                 self.trouble = str(error)
                 self.version += 1
                 await asyncio.sleep(AFTER_ERROR)
+
+    def _look_for_a_reset(self) -> None:
+        """A drive that was silent, or starts, was switched off: what waited for that is over."""
+        since, self._silent = self._silent, None
+        off = since is not None and time.monotonic() - since > WAS_OFF
+        if not off and self.state != "starting":
+            return
+        if self.waits_for_reset or self.unsaved:
+            lost = ", ".join(sorted(self.unsaved))
+            gone = f" Not saved before, so look at: {lost}." if lost else ""
+            self._say(f"The drive was reset or switched off.{gone}", "done")
+        self.waits_for_reset, self.unsaved = set(), set()
+        # everything may be another value now
+        self._asked, self.raws = {}, {}
 
     def _due(self) -> list[str]:
         """What is looked at and was not read lately."""

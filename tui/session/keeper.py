@@ -28,6 +28,8 @@ from .readings import Reading
 
 log = logging.getLogger("drivepanel")
 
+MAY_TURN = frozenset({"running", "unknown"})
+"""Kinds of state in which a motor that was commanded from here is not left alone unasked."""
 GLANCE = 3.0
 """Seconds between two looks at a drive that no monitor watches."""
 ASKED_PER_TIMEOUT = 4.0
@@ -121,11 +123,11 @@ class Keeper:
         }
 
     def under_command(self) -> list[DriveSession]:
-        """Drives that were commanded from here and whose motors run."""
+        """Drives that were commanded from here and whose motors do not surely stand."""
         return [
             kept.session
-            for device, kept in self._kept.items()
-            if kept.session.commanded and (self.runs(device) or self._unseen(kept))
+            for kept in self._kept.values()
+            if kept.session.commanded and self._may_turn(kept)
         ]
 
     def runs(self, device: int) -> bool:
@@ -133,10 +135,13 @@ class Keeper:
         state, _ = self._last_seen(device)
         return state is not None and state.kind == "running"
 
-    def _unseen(self, kept: _Kept) -> bool:
-        """Whether an order went out that nobody has seen the effect of yet."""
+    def _may_turn(self, kept: _Kept) -> bool:
+        """Whether a motor runs, or may: not seen since the last order, or not understood."""
+        state, seen = self._last_seen(kept.session.device)
         ordered = kept.session.commanded_at
-        return ordered is not None and self._last_seen(kept.session.device)[1] <= ordered
+        if state is None or (ordered is not None and seen <= ordered):
+            return True
+        return state.kind in MAY_TURN
 
     def _last_seen(self, device: int) -> tuple[DriveState | None, float]:
         """The newest state of a drive, by its own monitor or by a look; and when that was."""
