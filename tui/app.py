@@ -25,11 +25,9 @@ from tui.widgets.lean import lean
 from tui.widgets.palette import THEME
 
 from .screens.actions import ACTIONS, CONNECTION, bindings
-from .screens.confirm import Confirm
 from .screens.connection import ConnectionScreen
 from .screens.in_turn import KeysInTurn
-from .screens.leave import Choice, Leave
-from .screens.panel import Panel
+from .screens.leaving import Leaving
 from .screens.stop_keys import STOP_ALL_ANYWHERE, STOP_ANYWHERE, STOP_OUTSIDE_TEXT, with_stop_keys
 
 if TYPE_CHECKING:
@@ -47,8 +45,6 @@ log = logging.getLogger("drivepanel")
 CONNECT_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""
 
-STOPPED_WITHIN = 60.0
-"""Seconds that a motor may take to its standstill before the panel gives up waiting."""
 HUNGER_LOOK = 0.25
 """Seconds between two looks for drives that are about to act on their time-out."""
 
@@ -57,7 +53,7 @@ STOP_KEYS = frozenset({STOP_ANYWHERE, STOP_ALL_ANYWHERE, STOP_OUTSIDE_TEXT})
 Opener = Callable[..., OpenLine]
 
 
-class DrivePanelApp(Panel):
+class DrivePanelApp(Leaving):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
@@ -99,7 +95,7 @@ class DrivePanelApp(Panel):
         self._device = device
         self._on_shown = on_shown
         self._gone = False
-        self._settled = leave_running
+        self.settled = leave_running
         """Whether it was decided what becomes of motors that run by an order from here."""
         self._keys = KeysInTurn(self)
         self._hungry: set[int] = set()
@@ -107,7 +103,7 @@ class DrivePanelApp(Panel):
         self._journal: Journal | None = None
         self._commanders: dict[int, Commander] = {}
         self._recorders: dict[int, Recorder] = {}
-        self._editors: dict[int, Editor] = {}
+        self.editors: dict[int, Editor] = {}
 
     @property
     def journal(self) -> Journal:
@@ -188,9 +184,9 @@ class DrivePanelApp(Panel):
         """What edits the parameters of a drive of the open line."""
         from tui.session.editor import Editor
 
-        known = self._editors.get(session.device)
+        known = self.editors.get(session.device)
         if known is None or known.session is not session:
-            known = self._editors[session.device] = Editor(session, self.journal)
+            known = self.editors[session.device] = Editor(session, self.journal)
         return known
 
     def recorder(self, session: DriveSession) -> Recorder:
@@ -279,7 +275,7 @@ class DrivePanelApp(Panel):
     async def on_unmount(self) -> None:
         """Leave no line open."""
         self._gone = True
-        if not self._settled:
+        if not self.settled:
             # the panel ends without having been asked: an error of its own, or a signal
             await asyncio.to_thread(self.stop_motors)
         await self.disconnect()
@@ -308,7 +304,7 @@ class DrivePanelApp(Panel):
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
-        self._commanders, self._recorders, self._editors = {}, {}, {}
+        self._commanders, self._recorders, self.editors = {}, {}, {}
         from tui.session.keeper import Keeper
         from tui.session.stop import Stopper
 
@@ -355,114 +351,6 @@ class DrivePanelApp(Panel):
         found = self.connection.found[drives[(drives.index(device) + step) % len(drives)]]
         if found.session is not None:
             self.switch_screen(MonitorScreen(found.session))
-
-    async def action_quit(self) -> None:
-        """Leave; where a motor runs by an order from here, or is tripped by that, not unasked."""
-        if isinstance(self.screen, Leave):
-            return
-        if running := self.keeper.under_command() if self.keeper else []:
-            self.push_screen(Leave(self._left_running(running)), self._leave_motors)
-            return
-        asked = self._question("Leave the panel?", "q or Enter leaves   Esc stays")
-        if asked is None or isinstance(self.screen, Confirm):
-            self.exit()
-        else:
-            self.push_screen(asked, self._leave)
-
-    def _left_running(self, sessions: list[DriveSession]) -> str:
-        """Which motors run, and what each drive does when nobody asks it any more."""
-        lines = []
-        for session in sessions:
-            watch = self.keeper.watch(session.device) if self.keeper else None
-            does = "goes on running: it does not watch the line"
-            if watch is not None:
-                reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
-                does = f"acts {watch.timeout:g} s after the last request: {reaction}"
-            who = f"Device {session.device}, {session.profile.name}"
-            lines.append(f"{who}: left alone it {does.rstrip('.')}.")
-        return "\n".join([*lines, *self._unfinished()])
-
-    def _leave_motors(self, choice: Choice | None) -> None:
-        if choice == "leave":
-            self._settled = True
-            self.exit()
-        elif choice == "stop":
-            self.run_worker(self._stop_and_leave(), exclusive=True, group="leave")
-
-    async def _stop_and_leave(self) -> None:
-        """Stop what runs by an order from here, then leave; stay where one does not stop."""
-        if await asyncio.to_thread(self.stop_motors):
-            self._settled = True
-            self.exit()
-
-    def leave_now(self) -> None:
-        """End the screen; may be called in any thread."""
-        self._settled = True
-        loop = self._loop
-        if loop is not None and loop.is_running():
-            loop.call_soon_threadsafe(self.exit)
-
-    def stop_motors(self) -> bool:
-        """Stop every motor that runs by an order from here; True when none runs any more.
-
-        Waits for it; may be called in any thread but the loop's.
-        """
-        keeper, stopper = self.keeper, self.stopper
-        running = keeper.under_command() if keeper else []
-        if not running or stopper is None:
-            return True
-        try:
-            stopper.stop(running)
-        except LineClosed:
-            return False
-        return not stopper.wait(running, STOPPED_WITHIN).failed
-
-    def _leave(self, sure: bool | None) -> None:
-        if sure:
-            self.exit()
-
-    async def may_let_go(self, question: str, keys: str) -> bool:
-        """Whether the drives of the line may be left alone; asks where that trips one that runs.
-
-        Belongs into a worker: it waits for the answer.
-        """
-        asked = self._question(question, keys)
-        if asked is None:
-            return True
-        answer: asyncio.Future[bool | None] = asyncio.get_running_loop().create_future()
-
-        def told(sure: bool | None) -> None:
-            if not answer.done():  # who asked may have given up meanwhile
-                answer.set_result(sure)
-
-        self.push_screen(asked, told)
-        return bool(await answer)
-
-    def _question(self, question: str, keys: str) -> Confirm | None:
-        """What to ask before the drives are left alone; None where that trips none."""
-        alone = self.keeper.left_alone() if self.keeper else {}
-        told = self._unfinished()
-        if alone:
-            which = ", ".join(f"device {device} after {time:g} s" for device, time in alone.items())
-            told.append(
-                "These motors run, and their drives watch the line. Once nobody asks them any"
-                f" more, they act on their communication time-out: {which}."
-            )
-        return Confirm(question, "\n".join(told), keys) if told else None
-
-    def _unfinished(self) -> list[str]:
-        """What would be lost of the work on parameters."""
-        told = []
-        for device, editor in sorted(self._editors.items()):
-            if len(editor.edits):
-                told.append(f"Device {device}: {len(editor.edits)} staged edits are not written.")
-            if editor.unsaved:
-                count = len(editor.unsaved)
-                told.append(
-                    f"Device {device}: {count} written settings are not saved to EEPROM; they are"
-                    " lost at power-off."
-                )
-        return told
 
     def action_help(self) -> None:
         """Every key of the screen on top."""

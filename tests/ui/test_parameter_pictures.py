@@ -121,7 +121,7 @@ def test_parameters(
     prepare(editor)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    app._editors[2] = editor
+    app.editors[2] = editor
     app._commanders[2] = cast("Commander", FakeCommander(armed))
     app._commanders[2].session = editor.session
 
@@ -140,7 +140,7 @@ def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
     editor = editor_of(fakes.READY, reading=True)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    app._editors[2] = editor
+    app.editors[2] = editor
     app._commanders[2] = cast("Commander", FakeCommander())
     app._commanders[2].session = editor.session
 
