@@ -1,0 +1,181 @@
+"""What an assignment costs and saves on the wire, and the requests that use it.
+
+Also, for families without blocks: what neighbouring parameters cost in one read, and which
+stretch of them saves most.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from .frames import read_frame, read_write_frame, write_frame
+from .mapping import Assignment
+from .profile import Profile
+from .read_plan import ReadRequest, WireTiming, plan_reads, request_of, run_length
+from .schema import Parameter
+from .values import word_count
+
+
+@dataclass(frozen=True, slots=True)
+class Cost:
+    """What reading a set of parameters takes on the wire."""
+
+    microseconds: int
+    requests: int
+    """Requests, those that check a scanner's slots included."""
+
+
+@dataclass(frozen=True, slots=True)
+class Saving:
+    """The cost of the same set under two assignments."""
+
+    before: Cost
+    after: Cost
+
+    @property
+    def microseconds(self) -> int:
+        """What the second one saves; negative where it costs more."""
+        return self.before.microseconds - self.after.microseconds
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """A read of neighbours: the request, what it brings, what it takes and what it saves."""
+
+    request: ReadRequest
+    brings: tuple[str, ...]
+    """Codes of the wanted parameters in it."""
+    beside: tuple[str, ...]
+    """Codes that come with them for nothing but their words."""
+    cost: int
+    """Microseconds."""
+    alone: int
+    """Microseconds of reading the wanted ones one by one."""
+
+    @property
+    def saves(self) -> int:
+        """Microseconds that the stretch saves."""
+        return self.alone - self.cost
+
+
+def cost(
+    profile: Profile,
+    codes: Iterable[str],
+    timing: WireTiming,
+    slots: Mapping[str, int],
+    unreadable: Collection[str] = (),
+) -> Cost:
+    """What reading these takes with the slots in force, by the cheapest plan."""
+    plan = plan_reads(profile, codes, timing, slots, unreadable)
+    return Cost(plan.microseconds, len(plan.requests) + len(plan.checks))
+
+
+def saving(
+    profile: Profile,
+    codes: Collection[str],
+    timing: WireTiming,
+    before: Mapping[str, int],
+    after: Mapping[str, int],
+    unreadable: Collection[str] = (),
+) -> Saving:
+    """What reading these takes with the slots of today and with those that are proposed."""
+    return Saving(
+        cost(profile, codes, timing, before, unreadable),
+        cost(profile, codes, timing, after, unreadable),
+    )
+
+
+def span(plan: Assignment) -> tuple[int, int] | None:
+    """Address and number of words of the request that moves all slots in use; None without."""
+    block, length = plan.block, plan.length
+    if not length:
+        return None
+    return block.address, min(max(length, block.min_words), block.max_words)
+
+
+def frame(
+    profile: Profile,
+    device: int,
+    inputs: Assignment | None,
+    outputs: Assignment | None,
+    words: Sequence[int] = (),
+) -> bytes:
+    """The request that uses an assignment; empty where no slot is in use.
+
+    With inputs and outputs in use and function 23 in the drive, one exchange for both; else the
+    read of the inputs, or the write of the outputs where there are none. `words` are written to
+    the outputs, zeros where there are fewer.
+    """
+    read = span(inputs) if inputs else None
+    write = span(outputs) if outputs else None
+    filled = (*words, *([0] * write[1]))[: write[1]] if write else ()
+    if read and write and profile.function(23) is not None:
+        return read_write_frame(device, *read, write[0], filled)
+    if read:
+        return read_frame(device, *read)
+    return write_frame(device, write[0], filled) if write else b""
+
+
+def microseconds(
+    profile: Profile,
+    timing: WireTiming,
+    inputs: Assignment | None,
+    outputs: Assignment | None,
+) -> int:
+    """Time of the exchange that `frame` begins, its reply included; 0 without a slot in use."""
+    read = span(inputs) if inputs else None
+    write = span(outputs) if outputs else None
+    if read and write and profile.function(23) is not None:
+        seconds = timing.read_write(read[1], write[1])
+    elif read:
+        seconds = timing.read(read[1])
+    else:
+        seconds = timing.write(write[1], multiple=True) if write else 0.0
+    return round(seconds * 1e6)
+
+
+def stretches(
+    profile: Profile,
+    codes: Iterable[str],
+    timing: WireTiming,
+    unreadable: Collection[str] = (),
+) -> list[Stretch]:
+    """The reads of neighbours that save most for these parameters, the best first.
+
+    Each parameter counts for one stretch only. Empty where the drive reads single words only.
+    """
+    left = sorted((profile[code] for code in dict.fromkeys(codes)), key=lambda p: p.address)
+    found: list[Stretch] = []
+    while left:
+        runs = (
+            left[first:end] for first in range(len(left)) for end in range(first + 2, len(left) + 1)
+        )
+        made = (_stretch(profile, run, timing, unreadable) for run in runs)
+        best = max((s for s in made if s and s.saves > 0), key=lambda s: s.saves, default=None)
+        if best is None:
+            break
+        found.append(best)
+        left = [p for p in left if p.code not in best.brings]
+    return found
+
+
+def _stretch(
+    profile: Profile,
+    run: Sequence[Parameter],
+    timing: WireTiming,
+    unreadable: Collection[str],
+) -> Stretch | None:
+    count = run_length(profile, run, unreadable)
+    if count is None:
+        return None
+    codes = tuple(p.code for p in run)
+    request = request_of(run)
+    inside = range(request.address, request.address + count)
+    beside = tuple(
+        p.code
+        for at in inside
+        if (p := profile.at(at)) is not None and p.code not in codes and p.access != "w"
+    )
+    alone = sum(timing.read(word_count(p)) for p in run)
+    return Stretch(request, codes, beside, round(timing.read(count) * 1e6), round(alone * 1e6))

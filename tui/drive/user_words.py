@@ -1,0 +1,76 @@
+"""The four words that a person watches beside the monitoring set, as the Altivar 71 shows them.
+
+Each is an address with a format. A word that is not assigned, not known to the drive or
+protected shows `-----`, never a number.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+from .mapping import NONE, MappingError
+from .profile import Profile, parse_address
+from .values import NOT_AVAILABLE
+
+COUNT = 4
+Format = Literal["hex", "signed", "unsigned"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+
+
+@dataclass(frozen=True, slots=True)
+class UserWord:
+    """One word: its wire address, 0 where none is assigned, and how it is written."""
+
+    address: int = 0
+    format: Format = "hex"
+
+    def text(self, word: int | None) -> str:
+        """The word as it is shown; dashes where there is none."""
+        if not self.address or word is None:
+            return NOT_AVAILABLE
+        word &= 0xFFFF
+        if self.format == "hex":
+            return f"{word:04X} hex"
+        return str(word - 0x10000 if self.format == "signed" and word > 0x7FFF else word)
+
+    def next_format(self) -> UserWord:
+        """The same word in the next format."""
+        return replace(self, format=FORMATS[(FORMATS.index(self.format) + 1) % len(FORMATS)])
+
+
+UserWords = tuple[UserWord, ...]
+NO_WORDS: UserWords = (UserWord(),) * COUNT
+
+
+def word_named(profile: Profile, text: str, format: Format = "hex") -> UserWord:
+    """The word that a person names: a code, a number of the manual, any address, or `none`.
+
+    An address that the profile does not know is allowed: the drive decides. Raises MappingError
+    for an address above 65535 or a parameter that can only be written, UnknownParameter for a
+    name that is neither.
+    """
+    wanted = text.strip()
+    if wanted.casefold() in NONE:
+        return UserWord(0, format)
+    address = parse_address(wanted)
+    if address is not None and profile.at(address) is None and profile.get(wanted) is None:
+        return UserWord(address, format)
+    parameter = profile.find(wanted)
+    if parameter.access == "w":
+        raise MappingError(f"{parameter.code} can only be written; it has no value to show.")
+    return UserWord(parameter.address, format)
+
+
+def format_named(text: str) -> Format:
+    """The format of a name; raises MappingError."""
+    for format in FORMATS:
+        if format == text.strip().casefold():
+            return format
+    raise MappingError(f"{text!r} is no format. Write {', '.join(FORMATS)}.")
+
+
+def is_no_value(profile: Profile, words: Sequence[int]) -> bool:
+    """Whether the drive said in a reply that there is no such word, or that it is protected."""
+    return profile.data.reading.unknown_word in words
