@@ -1,0 +1,425 @@
+"""Blocks and scanner of simulated drives over a real line: read, compared, written, exchanged."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import json
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+
+from tests.session.sets_bench import Bench, bench
+from tui.bus.errors import DeviceException, RequestRefused
+from tui.bus.line import Reply
+from tui.drive.errors import ValueRefused
+from tui.drive.mapping import Assignment, block_of, empty, factory, pick
+from tui.drive.mapping_wire import frame, span
+from tui.drive.schema import Block
+from tui.drive.user_words import NO_WORDS, UserWord
+from tui.session.mapping import Force, Mapper, Verdict, wire_timing
+from tui.session.mapping_write import AssignmentRefused, exchange, write_assignment
+from tui.session.user_words import load_words, read_words, save_words
+
+EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]
+EXAMPLE_OUT = ["CMD", "LFRD", "HSP", "LSP", "ACC", "DEC"]
+READ_BLOCK = {"F875": 1, "F876": 2, "F877": 3, "F878": 4, "F879": 5}
+
+
+def block(here: Bench, direction: str) -> Block:
+    found = block_of(here.profile, direction)
+    assert found is not None
+    return found
+
+
+def plan_of(here: Bench, direction: str, codes: list[str]) -> Assignment:
+    plan = empty(block(here, direction))
+    for place, code in enumerate(codes):
+        plan = pick(here.profile, plan, place, code)
+    return plan
+
+
+def sets_of(plan: Assignment) -> dict[str, int]:
+    return plan.slots
+
+
+def sent(here: Bench, function: int) -> list[str]:
+    """The bodies of all requests of a function so far, without checksum."""
+    frames = [f.data for f in here.session.line.trace if f.direction == "out"]
+    return [data[:-2].hex() for data in frames if data[1] == function]
+
+
+async def write(here: Bench, plan: Assignment, **how: object) -> str:
+    done = await write_assignment(here.session, here.journal, plan, **how)  # type: ignore[arg-type]
+    return done.text
+
+
+# Looking
+
+
+async def test_the_scanner_as_it_leaves_the_factory() -> None:
+    with bench("atv71") as here:
+        view = await Mapper(here.session).look(block(here, "read"))
+        assert view.plan == factory(here.profile, view.block)
+        assert [s.parameter.code for s in view.slots if s.parameter] == ["ETA", "RFRD"]
+        assert {s.verdict for s in view.slots[:2]} == {Verdict.SAME}
+        assert {s.verdict for s in view.slots[2:]} == {Verdict.UNUSED}
+        assert view.slots[0].text == view.slots[0].direct_text
+        assert view.slots[0].force is Force.ACTIVE
+        outputs = await Mapper(here.session).look(block(here, "write"))
+        assert [s.parameter.code for s in outputs.slots if s.parameter] == ["CMD", "LFRD"]
+
+
+async def test_values_of_a_running_motor_are_the_same_or_moving() -> None:
+    with bench("atv71", run_hz=35.0) as here:
+        for slot, raw in plan_of(here, "read", EXAMPLE_IN).slots.items():
+            here.drive.set(slot, raw)
+        view = await Mapper(here.session).verify(block(here, "read"))
+        assert {s.verdict for s in view.slots} <= {Verdict.SAME, Verdict.MOVING}
+        assert view.slots[7].verdict is Verdict.SAME
+        assert all(s.text != "-----" for s in view.slots)
+
+
+async def test_an_address_that_the_drive_does_not_know_has_no_value() -> None:
+    with bench("atv71", sets={"NMA3": 3199}) as here:
+        view = await Mapper(here.session).look(block(here, "read"))
+        assert view.slots[2].verdict is Verdict.NONE
+        assert (view.slots[2].parameter, view.slots[2].text) == (None, "-----")
+        assert view.slots[1].verdict is Verdict.SAME
+
+
+async def test_a_slot_that_brings_something_else_differs() -> None:
+    with bench("atv71", sets={"NMA1": 9001, "NMA2": 9002, "ACC": 37, "DEC": 59}) as here:
+        line = here.session.line
+        honest = line.read
+
+        async def swapped(device: int, address: int, count: int = 1, **how: object) -> Reply:
+            reply = await honest(device, address, count, **how)  # type: ignore[arg-type]
+            if address != block(here, "read").address:
+                return reply
+            first, second, *rest = reply.words
+            return Reply((second, first, *rest), reply.time)
+
+        line.read = swapped  # type: ignore[method-assign]
+        view = await Mapper(here.session).verify(block(here, "read"))
+        assert [s.verdict for s in view.slots[:2]] == [Verdict.DIFFERS, Verdict.DIFFERS]
+
+
+async def test_a_scanner_changed_between_never_shows_one_value_as_another() -> None:
+    words = {"ACC": 37, "DEC": 59, "HSP": 523, "LSP": 41}
+    with bench("atv71", sets=words) as here:
+        codes = list(words)
+        orders = itertools.cycle(itertools.permutations(codes))
+        line, honest = here.session.line, here.session.line.read
+        changes = itertools.count()
+
+        def change() -> None:
+            for slot, raw in plan_of(here, "read", list(next(orders))).slots.items():
+                here.drive.set(slot, raw)
+
+        async def read(device: int, address: int, count: int = 1, **how: object) -> Reply:
+            # somebody else writes the slots at every second read, wherever that falls
+            if next(changes) % 3:
+                change()
+            return await honest(device, address, count, **how)  # type: ignore[arg-type]
+
+        change()
+        line.read = read  # type: ignore[method-assign]
+        mapper, verdicts = Mapper(here.session), set()
+        for _ in range(25):
+            view = await mapper.look(block(here, "read"))
+            for slot in view.slots:
+                verdicts.add(slot.verdict)
+                if slot.word is not None and slot.parameter is not None:
+                    assert slot.word == words[slot.parameter.code]
+        assert Verdict.CHANGED in verdicts
+
+
+async def test_a_drive_without_blocks_has_nothing_to_look_at() -> None:
+    with bench("atv312") as here:
+        assert here.profile.data.blocks == []
+
+
+# The indirect block of the Altivar 21
+
+
+async def test_a_block_is_configured_then_pending_then_active() -> None:
+    with bench("atv21", sets=READ_BLOCK, run_hz=35.0) as here:
+        mapper, read = Mapper(here.session), block(here, "read")
+        view = await mapper.verify(read)
+        assert [s.force for s in view.slots[:4]] == [Force.ACTIVE] * 4
+        assert {s.verdict for s in view.slots} <= {Verdict.SAME, Verdict.MOVING}
+        here.drive.set("F875", 2)
+        here.drive.set("F876", 1)
+        # words in the drive are not what the block brings yet
+        await here.session.line.write(1, here.profile["F877"].address, [4])
+        await here.session.line.write(1, here.profile["F878"].address, [3])
+        view = await mapper.verify(read)
+        assert [s.force for s in view.slots[2:4]] == [Force.PENDING] * 2
+        assert [s.brings for s in view.slots[2:4]] == ["FE03", "FE05"]
+        assert [s.verdict for s in view.slots[2:4]] == [Verdict.DIFFERS] * 2
+        here.drive.power_cycle()
+        await asyncio.sleep(2.5)
+        view = await mapper.verify(read)
+        assert Force.PENDING not in {s.force for s in view.slots}
+        assert [s.parameter.code for s in view.slots[2:4] if s.parameter] == ["FE05", "FE03"]
+
+
+async def test_what_was_written_waits_for_a_reset_even_where_all_values_are_zero() -> None:
+    with bench("atv21") as here:
+        mapper, read = Mapper(here.session), block(here, "read")
+        text = await write(here, plan_of(here, "read", ["FE03", "FD00"]))
+        assert "after the drive's next reset" in text
+        mapper.written = {"F875": 3, "F876": 2}
+        view = await mapper.verify(read)
+        assert [s.force for s in view.slots[:2]] == [Force.PENDING] * 2
+        here.drive.power_cycle()
+        mapper.note_reset()
+        await asyncio.sleep(2.5)
+        view = await mapper.verify(read)
+        assert [s.force for s in view.slots[:2]] == [Force.UNPROVED] * 2
+
+
+async def test_the_write_block_cannot_be_read() -> None:
+    with bench("atv21", sets={"F870": 1, "F871": 3}) as here:
+        view = await Mapper(here.session).look(block(here, "write"))
+        assert "can only be written" in view.trouble
+        assert [s.parameter.code for s in view.slots if s.parameter] == ["FA00", "FA01"]
+        assert {s.force for s in view.slots} == {Force.UNPROVED}
+        assert all(s.direct is not None for s in view.slots)
+
+
+@pytest.mark.parametrize("count", [2, 5])
+async def test_the_manuals_reads_of_the_block(count: int) -> None:
+    with bench("atv21", sets=READ_BLOCK) as here:
+        read = plan_of(here, "read", ["FD01", "FD00", "FE03", "FE05", "FC91"][:count])
+        stretch = span(read)
+        assert stretch is not None
+        reply = await here.session.line.read(1, *stretch)
+        assert len(reply.words) == count
+        assert sent(here, 3)[-1] == f"010318750{count:03x}"
+        assert frame(here.profile, 1, read, None)[:-2].hex() == sent(here, 3)[-1]
+        assert reply.words[1] == here.drive.raw("FD00")
+
+
+@pytest.mark.parametrize(("address", "count"), [(0x1876, 2), (0x1875, 6), (0x1874, 2), (0x1879, 5)])
+async def test_wrong_reads_of_the_block_never_leave_this_side(address: int, count: int) -> None:
+    with bench("atv21", sets=READ_BLOCK) as here:
+        with pytest.raises(RequestRefused):
+            await here.session.line.read(1, address, count)
+        assert sent(here, 3) == []
+
+
+@pytest.mark.parametrize(
+    ("address", "words"), [(0x1871, [0xC400, 0x1770]), (0x1870, [0xC400, 0x1770, 0])]
+)
+async def test_wrong_writes_of_the_block_never_leave_this_side(
+    address: int, words: list[int]
+) -> None:
+    with bench("atv21", sets={"F870": 1, "F871": 3}) as here:
+        with pytest.raises(RequestRefused):
+            await here.session.line.write(1, address, words)
+        assert sent(here, 16) == []
+
+
+async def test_a_write_block_that_selects_nothing_is_refused_by_the_drive() -> None:
+    with bench("atv21") as here:
+        with pytest.raises(DeviceException) as refused:
+            await here.session.line.write(1, 0x1870, [0xC400, 0x1770])
+        assert refused.value.code == 4
+        assert sent(here, 16) == ["01101870000204c4001770"]
+
+
+# Writing an assignment
+
+
+async def test_what_moves_is_taken_out_first() -> None:
+    with bench("atv71") as here:
+        plan = plan_of(here, "read", ["RFRD", "ETA", "LCR"])
+        assert "NMA1, NMA2, NMA3" in await write(here, plan)
+        first = here.profile["NMA1"].address
+        assert here.writes() == [
+            (first, 0), (first + 1, 0), (first, 8604), (first + 1, 3201), (first + 2, 3204),
+        ]  # fmt: skip
+        assert [here.drive.raw(slot) for slot in plan.block.slots] == list(plan.raws)
+        assert await write(here, plan) == "Nothing was to be changed."
+        kept = [json.loads(x) for x in here.journal.path.read_text().splitlines()]
+        assert [(e["code"], e["new_raw"], e["read_back"]) for e in kept][:2] == [
+            ("NMA1", 0, 0), ("NMA2", 0, 0),
+        ]  # fmt: skip
+        assert {e["why"] for e in kept} == {"scanner inputs"}
+
+
+@pytest.mark.parametrize("family", ["atv71", "atv21"])
+async def test_nothing_is_written_while_the_motor_turns(family: str) -> None:
+    with bench(family, run_hz=20.0) as here:
+        plan = plan_of(here, "read", ["LCR" if family == "atv71" else "FE03"])
+        with pytest.raises(AssignmentRefused, match=r"motor stopped only.*Nothing was written"):
+            await write(here, plan)
+        assert here.writes() == []
+
+
+async def test_nothing_is_written_once_the_drive_is_no_longer_armed() -> None:
+    with bench("atv71") as here:
+        left = iter([True, True])
+        plan = plan_of(here, "read", ["RFRD", "ETA", "LCR"])
+        with pytest.raises(AssignmentRefused, match=r"no longer armed.*Written before: NMA1, NMA2"):
+            await write(here, plan, allowed=lambda: next(left, False))
+        assert len(here.writes()) == 2
+
+
+async def test_what_somebody_else_changed_is_not_overwritten() -> None:
+    with bench("atv71") as here:
+        seen = await Mapper(here.session).slots(block(here, "read"))
+        here.drive.set("NMA4", 9001)
+        with pytest.raises(
+            AssignmentRefused, match=r"NMA4 was changed meanwhile.*unused is now ACC"
+        ):
+            await write(here, plan_of(here, "read", ["LCR"]), expected=seen)
+        assert here.writes() == []
+
+
+async def test_somebody_else_between_two_slots() -> None:
+    with bench("atv71") as here:
+        plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
+        honest = here.session.line.write
+
+        async def disturbed(*what: object, **how: object) -> float:
+            done = await honest(*what, **how)  # type: ignore[arg-type]
+            here.drive.set("NMA4", 9001)
+            return done
+
+        here.session.line.write = disturbed  # type: ignore[method-assign]
+        with pytest.raises(AssignmentRefused, match="NMA4 was changed meanwhile"):
+            await write(here, plan)
+        assert here.drive.raw("NMA4") == 9001
+
+
+async def test_a_read_only_line_writes_nothing() -> None:
+    with bench("atv71", read_only=True) as here, pytest.raises(RequestRefused):
+        await write(here, plan_of(here, "read", ["LCR"]))
+
+
+async def test_what_cannot_be_is_refused_before_anything_is_asked() -> None:
+    with bench("atv71") as here:
+        outputs = block(here, "write")
+        with pytest.raises(AssignmentRefused, match="NCA1 already"):
+            await write(here, plan_of(here, "write", ["CMD", "CMD"]))
+        with pytest.raises(AssignmentRefused, match="no parameter"):
+            await write(here, empty(outputs).with_raw(0, 3199))
+        assert list(here.session.line.trace) == []
+
+
+# Function 23
+
+
+async def both(here: Bench) -> tuple[Assignment, Assignment]:
+    inputs, outputs = plan_of(here, "read", EXAMPLE_IN), plan_of(here, "write", EXAMPLE_OUT)
+    for slot, raw in {**inputs.slots, **outputs.slots}.items():
+        here.drive.set(slot, raw)
+    return inputs, outputs
+
+
+async def test_eight_inputs_and_six_outputs_in_one_exchange() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        wanted = {"ACC": 45, "DEC": 55}
+        done = await exchange(here.session, here.journal, outputs, wanted, inputs)
+        (request,) = sent(here, 23)
+        held = {code: here.drive.raw(code) for code in EXAMPLE_OUT}
+        words = tuple(held[code] & 0xFFFF for code in EXAMPLE_OUT)
+        assert request == frame(here.profile, 1, inputs, outputs, words)[:-2].hex()
+        assert request.startswith("011731c5000831d900060c")
+        assert (held["ACC"], held["DEC"]) == (45, 55)
+        assert set(done.inputs) == set(EXAMPLE_IN)
+        assert done.outputs == held
+        kept = {e.code: (e.new_raw, e.read_back) for e in here.journal.recent}
+        assert kept["ACC"] == (45, 45)
+        assert set(kept) == set(EXAMPLE_OUT)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "error", "says"),
+    [
+        ({"LCR": 1}, AssignmentRefused, "No output slot stands for LCR"),
+        ({"ACC": 70000}, ValueRefused, "does not fit|out of range"),
+    ],
+)
+async def test_an_exchange_that_is_refused_here(
+    wanted: Mapping[str, int], error: type[Exception], says: str
+) -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        with pytest.raises(error, match=says):
+            await exchange(here.session, here.journal, outputs, wanted, inputs)
+        assert sent(here, 23) == []
+
+
+async def test_an_exchange_needs_arming_and_the_interlocks_of_an_order() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        with pytest.raises(AssignmentRefused, match="not armed"):
+            await exchange(here.session, here.journal, outputs, {}, inputs, allowed=lambda: False)
+        here.drive.set("CCC", 1)
+        here.drive.set("CHCF", 1)
+        here.drive.set("NCA1", 3204)
+        with pytest.raises(AssignmentRefused, match="changed by somebody else"):
+            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
+        assert sent(here, 23) == []
+
+
+async def test_outputs_moved_during_an_exchange_are_told() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        honest = here.session.line.read_write
+
+        async def moved(*what: object, **how: object) -> Reply:
+            here.drive.set("NCA5", 9002)
+            here.drive.set("NCA6", 9001)
+            return await honest(*what, **how)  # type: ignore[arg-type]
+
+        here.session.line.read_write = moved  # type: ignore[method-assign]
+        with pytest.raises(AssignmentRefused, match=r"NCA5, NCA6.*look at"):
+            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
+
+
+# User words
+
+
+async def test_user_words_are_read_and_kept_per_drive() -> None:
+    with bench("atv71", sets={"ACC": 37}) as here:
+        assert load_words(here.session) == NO_WORDS
+        words = (UserWord(9001, "signed"), UserWord(3199), UserWord(), UserWord(3201))
+        raws = await read_words(here.session, words)
+        assert raws[:3] == [37, None, None]
+        texts = [word.text(raw) for word, raw in zip(words, raws, strict=True)]
+        assert texts[:3] == ["37", "-----", "-----"]
+        assert texts[3].endswith(" hex")
+        assert save_words(here.session, words) == ""
+        assert load_words(here.session) == words
+        here.session.device = 2
+        assert load_words(here.session) == NO_WORDS
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{", '{"x": 1}'])
+async def test_damaged_user_words_are_none(text: str, own_folders: Path) -> None:
+    (own_folders / "state").mkdir(exist_ok=True)
+    (own_folders / "state" / "user-words.json").write_text(text)
+    with bench("atv71") as here:
+        assert load_words(here.session) == NO_WORDS
+
+
+async def test_a_drive_that_meets_the_unknown_with_silence_is_not_asked_for_it() -> None:
+    with bench("powerdrive") as here:
+        words = (UserWord(60000), *NO_WORDS[1:])
+        assert await read_words(here.session, words) == [None] * 4
+        assert list(here.session.line.trace) == []
+
+
+async def test_the_timing_is_that_of_the_line() -> None:
+    with bench("atv71") as here:
+        await here.session.read(["ETA"])
+        timing = wire_timing(here.session)
+        assert timing.character == pytest.approx(10 / 19200, rel=0.11)
+        assert 0 < timing.turnaround < 1
