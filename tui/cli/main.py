@@ -14,6 +14,7 @@ from .logs import start_logging
 
 COMMANDS = {
     "backup": ("backup", "Write every parameter of a drive to a file."),
+    "block": ("block", "Show or change a drive's indirect blocks or scanner."),
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
     "demo": ("panel", "Open the panel on five simulated, running drives."),
     "identify": ("identify", "Ask a drive who it is."),

@@ -1,0 +1,153 @@
+"""Indirect blocks and scanner on the command line: what is printed, written, and the statuses."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner, Result
+
+from tests.programs import port_of, simulated
+from tui.cli.main import main
+
+LONELY = ["atv31", "atv312", "powerdrive", "proxidrive", "varmeca"]
+
+
+@pytest.fixture
+def line() -> Iterator[str]:
+    """A simulated Altivar 71 at address 2 that several commands in turn can reach."""
+    with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
+        yield f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+
+
+def invoked(*arguments: str | Path) -> Result:
+    return CliRunner().invoke(main, ["block", *(str(a) for a in arguments)], prog_name="drivepanel")
+
+
+def run(status: int, *arguments: str | Path) -> str:
+    """Run to this exit status; what is printed on standard output."""
+    done = invoked(*arguments)
+    assert done.exit_code == status, done.output
+    assert "Traceback" not in done.stderr
+    return done.stdout
+
+
+def refused(status: int, *arguments: str | Path) -> str:
+    """What is said on standard error at this exit status."""
+    done = invoked(*arguments)
+    assert done.exit_code == status, done.output
+    assert "drivepanel: " in done.stderr
+    assert "Traceback" not in done.stderr
+    return done.stderr
+
+
+def slots(text: str) -> dict[str, Any]:
+    return {slot["slot"]: slot for b in json.loads(text)["blocks"] for slot in b["slots"]}
+
+
+def test_set_show_verify_save_load_factory(line: str, tmp_path: Path) -> None:
+    drive, file = ("-d", "2"), tmp_path / "scanner.toml"
+    shown = run(0, line, *drive)
+    assert "NMA1  ETA" in shown
+    assert "W8604" in shown
+    assert "8604 (16#219C)" in shown
+    assert "Request: 02 03 31 C5 00 02" in shown
+    dry = run(0, line, "set", "NMA3=LCR", "nma1=w8604", "NMA2=3201", "--dry-run", *drive)
+    assert "write  NMA1: ETA -> RFRD" in dry
+    assert slots(run(0, line, "--json", *drive))["NMA1"]["code"] == "ETA"
+    done = run(0, line, "set", "NMA3=LCR", "nma1=w8604", "NMA2=3201", "--arm", *drive)
+    assert "Written and read back: NMA1, NMA2, NMA3." in done
+    assert "Lost at power-off until saved" in done
+    found = slots(run(0, line, "verify", "--json", *drive))
+    assert [found[s]["code"] for s in ("NMA1", "NMA2", "NMA3", "NMA4")] == [
+        "RFRD", "ETA", "LCR", None,
+    ]  # fmt: skip
+    assert found["NMA2"]["direct"]["raw"] == found["NMA2"]["raw"]
+    assert {s["verdict"] for s in found.values()} <= {"same", "moving", "unused"}
+    assert "16 slots" in run(0, line, "save", file, *drive)
+    assert 'NMA3 = "LCR"  # W3204' in file.read_text()
+    refused(2, line, "save", file, *drive)
+    assert "NMA1, NMA2, NMA3" in run(0, line, "factory", "--arm", *drive)
+    assert "Nothing was to be changed" in run(0, line, "factory", "--arm", *drive)
+    assert "NMA1, NMA2, NMA3" in run(0, line, "load", file, "--arm", *drive)
+    assert slots(run(0, line, "--json", *drive))["NMA3"]["code"] == "LCR"
+
+
+def test_json_is_one_document_after_writing_too(line: str) -> None:
+    done = run(0, line, "set", "NCA3=ACC", "--arm", "--json", "-d", "2")
+    told = json.loads(done)
+    assert {b["id"] for b in told["blocks"]} == {"scanner-read", "scanner-write"}
+    assert slots(done)["NCA3"]["code"] == "ACC"
+    costs = told["monitoring_us"]
+    assert 0 < costs["with_blocks"] <= costs["direct"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "says"),
+    [
+        (("set", "NMA3=LCR"), 5, "Not armed"),
+        (("factory",), 5, "Not armed"),
+        (("set", "NMA9=LCR", "--arm"), 5, "no slot"),
+        (("set", "NCA3=ETA", "--arm"), 5, "can only be read"),
+        (("set", "NCA3=CMD", "--arm"), 5, "NCA1 already"),
+        (("set", "NMA3=LCR", "--arm", "--read-only"), 5, "read-only"),
+        (("set", "NMA3=NOPE", "--arm"), 2, "no parameter"),
+        (("set", "NMA3", "--arm"), 2, "SLOT=CODE"),
+        (("set", "--arm"), 2, "set needs"),
+        (("show", "NMA3"), 2, "nothing behind"),
+        (("load", "no-such-file.toml", "--arm"), 2, "cannot be read"),
+        (("look",), 2, "look"),
+    ],
+)
+def test_what_is_refused_and_with_which_status(
+    arguments: tuple[str, ...], status: int, says: str
+) -> None:
+    assert says in refused(status, "sim:atv71", *arguments)
+
+
+def test_a_bad_file_is_refused_with_its_line(tmp_path: Path) -> None:
+    file = tmp_path / "bad.toml"
+    run(0, "sim:atv71", "save", file)
+    text = file.read_text()
+    file.write_text(text.replace('NMA2 = "RFRD"', 'NMA2 = "NOPE"'))
+    number = next(n for n, x in enumerate(text.splitlines(), 1) if x.startswith("NMA2"))
+    assert f"bad.toml:{number}: NMA2" in refused(2, "sim:atv71", "load", file, "--arm")
+
+
+def test_a_drive_that_does_not_answer() -> None:
+    assert "answer" in refused(3, "sim:atv71@2", "-d", "9", "-p", "atv71")
+
+
+def test_a_running_motor_keeps_its_assignment() -> None:
+    with simulated("atv71@2", "--tcp", "127.0.0.1:0", "--run", "30") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        said = refused(5, line, "set", "NMA3=LCR", "--arm", "-d", "2")
+        assert "motor stopped only" in said
+        assert "Nothing was written" in said
+
+
+def test_the_indirect_block_counts_after_a_reset() -> None:
+    with simulated("atv21@1", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        done = run(0, line, "set", "F875=FD01", "F876=FD00", "--arm", "-p", "atv21")
+        assert "In force after the drive's next reset" in done
+        found = slots(run(1, line, "verify", "--json", "-p", "atv21"))
+        assert found["F875"]["force"] == "pending"
+        assert found["F875"]["verdict"] in ("differs", "no value")
+        assert "cannot be read" in run(0, line, "-p", "atv21")
+
+
+@pytest.mark.parametrize("family", LONELY)
+def test_a_family_without_blocks_says_so_and_shows_its_neighbours(family: str) -> None:
+    line = f"sim:{family}"
+    text = run(0, line, "-p", family)
+    assert "neither an indirect block nor a communication scanner" in text
+    assert "words from" in text
+    told = json.loads(run(0, line, "--json", "-p", family))
+    assert told["blocks"] == []
+    assert all(r["us"] < r["one_by_one_us"] and r["count"] >= 2 for r in told["reads"])
+    refused(5, line, "verify", "-p", family)
+    refused(5, line, "factory", "--arm", "-p", family)
