@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tui.bus.backoff import pause
-from tui.bus.devices import CALM, Devices
+from tui.bus.devices import LONG_MEMORY, SHORT_MEMORY, Devices
 from tui.bus.errors import LineBusy, LineClosed, Superseded
 from tui.bus.jobs import Job, JobQueue
 from tui.bus.line import Priority, Timing
@@ -186,15 +186,40 @@ def test_nothing_is_mistaken_over_modbus_tcp() -> None:
     assert devices.not_before(1, EXPECTED, Priority.POLL, 10.0) == 0.0
 
 
-def test_reply_that_came_twice_slows_the_same_request(devices: Devices) -> None:
+@pytest.mark.parametrize(("after", "memory"), [(0.04, LONG_MEMORY), (0.2, SHORT_MEMORY)])
+def test_reply_that_came_twice_slows_the_same_request(
+    devices: Devices, after: float, memory: float
+) -> None:
     devices.answered(1, EXPECTED, 0.01, 10.0)
     assert devices.not_before(1, EXPECTED, Priority.POLL, 10.0) == 0.0
-    assert devices.stray(LATE, 10.05)
+    assert devices.stray(LATE, 10.0 + after)
     devices.answered(1, EXPECTED, 0.01, 11.0)
-    assert devices.not_before(1, EXPECTED, Priority.POLL, 11.0) == pytest.approx(11.1)
-    for _ in range(CALM):
-        devices.answered(1, EXPECTED, 0.01, 12.0)
-    assert devices.not_before(1, EXPECTED, Priority.POLL, 13.0) == 0.0
+    assert devices.not_before(1, EXPECTED, Priority.POLL, 11.0) == pytest.approx(11 + 2 * after)
+    end = 10.0 + memory
+    devices.answered(1, EXPECTED, 0.01, end)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, end) > end
+    devices.answered(1, EXPECTED, 0.01, end + 1)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, end + 1) <= end + 1
+
+
+def test_what_repeats_quickly_stands_in_the_line(devices: Devices) -> None:
+    devices.answered(1, EXPECTED, 0.01, 10.0)
+    assert devices.stray(LATE, 10.02)
+    other = Read(2, 5, 1).expectation()
+    devices.answered(2, other, 0.01, 11.0)
+    assert devices.not_before(2, other, Priority.POLL, 11.0) == pytest.approx(11.04)
+
+
+def test_a_copy_of_the_reply_before_is_known_by_its_time(devices: Devices) -> None:
+    asked, reply = Read(1, 5, 1).pdu(), bytes([3, 2, 0, 7])
+    for _ in range(5):
+        devices.answered(1, EXPECTED, 0.01, 10.0, (asked, reply))
+    other = Read(1, 6, 1).pdu()
+    assert devices.is_repeat(1, other, reply, 0.03)
+    assert devices.is_repeat(1, other, reply, 0.001)
+    assert not devices.is_repeat(1, other, reply, 0.01), "as long as ever"
+    assert not devices.is_repeat(1, asked, reply, 0.03), "the same register"
+    assert not devices.is_repeat(1, other, bytes([3, 2, 0, 8]), 0.03), "another value"
 
 
 def test_frame_of_nobody_is_unexplained(devices: Devices) -> None:

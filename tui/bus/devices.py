@@ -27,10 +27,14 @@ QUIET_SHARE = 0.3
 """Longest that the whole line keeps quiet for one late device, as a share of the time-out."""
 FORGET = 0.99
 """What is left of the worst lateness after each reply in time."""
-CALM = 50
-"""Exchanges without a surplus reply after which a device is trusted again."""
-CALM_SECONDS = 30.0
-"""The same in time, where there are few exchanges."""
+SHORT = 0.1
+"""A wait between two like requests up to which a line that repeats replies is not soon trusted."""
+LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
+"""Seconds without a repeated reply after which a short wait, and a longer one, is over."""
+KNOWN = 4
+"""Turnarounds that must be known before one can be called unusual."""
+UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 1.5, 0.002
+"""Shares of the shortest and the longest recent turnaround, and seconds, that are usual."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +64,11 @@ class Device:
     """The longest that a reply came after its time-out."""
     settle: float = 0.0
     """Quiet time after each reply of a device that repeats its replies later."""
-    calm: int = 0
     repeated: float = 0.0
     """When a reply last came twice."""
+    asked: bytes = b""
+    replied: bytes = b""
+    """The last request that was answered, and its reply."""
     heard: float | None = None
     last: Expectation | None = None
     last_time: float = 0.0
@@ -78,6 +84,9 @@ class Devices:
         self._timing = timing
         self._mistakable = mistakable
         self._devices: dict[int, Device] = {}
+        self._settle = 0.0
+        self._repeated = 0.0
+        """Of the whole line: the short wait after each reply, and when one last came twice."""
         self.quiet_until = 0.0
 
     def __getitem__(self, device: int) -> Device:
@@ -155,10 +164,30 @@ class Devices:
         record.outstanding = [late for late in record.outstanding if late.expires > now]
         return record.outstanding
 
+    def is_repeat(self, device: int, pdu: bytes, reply: bytes, turnaround: float) -> bool:
+        """Whether a reply is more likely a copy of the one before than that of this request.
+
+        It is the same to the last bit, though other registers were asked for, and it came
+        earlier or later than this device ever answers.
+        """
+        record = self[device]
+        recent = record.recent.get(pdu[0], ())
+        if not self._mistakable or pdu[0] != Read.function or len(recent) < KNOWN:
+            return False
+        if reply != record.replied or pdu == record.asked:
+            return False
+        usual = (UNUSUAL_EARLY * min(recent), UNUSUAL_LATE * max(recent) + JITTER)
+        return not usual[0] <= turnaround <= usual[1]
+
     def answered(
-        self, device: int, expectation: Expectation, turnaround: float, now: float
+        self,
+        device: int,
+        expectation: Expectation,
+        turnaround: float,
+        now: float,
+        exchanged: tuple[bytes, bytes] = (b"", b""),
     ) -> None:
-        """A reply came, or a refusal."""
+        """A reply came, or a refusal; `exchanged` are the request and its reply."""
         record = self[device]
         record.answers = record.ever_answered = True
         record.heard = now
@@ -166,14 +195,20 @@ class Devices:
         record.silent_since = record.next_try = None
         _remember(record, expectation.function, turnaround)
         record.last, record.last_time = expectation, now
+        record.asked, record.replied = exchanged
         record.lateness *= FORGET
-        if record.settle and self._mistakable:
-            record.calm += 1
-            if record.calm > CALM or now - record.repeated > CALM_SECONDS:
-                record.settle = 0.0
-            else:
-                late = Outstanding(expectation, now, now, now + record.settle)
-                record.outstanding.append(late)
+        settle = self._settle_of(record, now)
+        if settle and self._mistakable:
+            record.outstanding.append(Outstanding(expectation, now, now, now + settle))
+
+    def _settle_of(self, record: Device, now: float) -> float:
+        """How long nothing like it is asked after a reply, where replies came twice."""
+        memory = LONG_MEMORY if record.settle <= SHORT else SHORT_MEMORY
+        if now - record.repeated > memory:
+            record.settle = 0.0
+        if now - self._repeated > LONG_MEMORY:
+            self._settle = 0.0
+        return max(record.settle, self._settle)
 
     def silent(self, device: int, expectation: Expectation, sent: float, now: float) -> None:
         """Nothing came in time: leave the device alone for a while, and await a late reply."""
@@ -218,7 +253,10 @@ class Devices:
             # the reply before came twice: from now on wait as long before asking the same again
             after = min(LATE_MARGIN * (now - record.last_time), self._timing.late_reply)
             record.settle = max(record.settle, after)
-            record.calm, record.repeated = 0, now
+            record.repeated = now
+            if after <= SHORT:
+                # what repeats frames quickly stands in the line, not in one drive
+                self._settle, self._repeated = max(self._settle, after), now
             again = Outstanding(record.last, record.last_time, now, now + record.settle)
             record.outstanding.append(again)
             return True

@@ -122,6 +122,8 @@ class Dispatcher:
             outcome = await master.exchange(self._sending(job))
             if outcome.verdict.kind is Kind.UNSURE:
                 outcome = await self._resolve_echo(master, job, outcome)
+            if self._is_repeat(job, outcome):
+                outcome = await self._ask_again(master, job, outcome)
         except LineLost:
             # failed with the others, once the line's state says that it is lost
             self._queue.put_back(job)
@@ -168,6 +170,24 @@ class Dispatcher:
             verdict.detail = "only the adapter's echo of it came back"
         return outcome
 
+    def _is_repeat(self, job: Job, outcome: Outcome) -> bool:
+        """Whether a reply may be a copy of the one before."""
+        verdict = outcome.verdict
+        return verdict.kind is Kind.REPLY and self._devices.is_repeat(
+            job.request.device, job.pdu, verdict.pdu, outcome.turnaround
+        )
+
+    async def _ask_again(self, master: Master, job: Job, doubted: Outcome) -> Outcome:
+        """The same once more: whichever of its two replies comes first, it is the right one."""
+        await master.quiet()
+        outcome = await master.exchange(self._sending(job))
+        if outcome.verdict.pdu != doubted.verdict.pdu and job.expectation is not None:
+            # it was a copy: one more reply to this request is on its way
+            device, now = job.request.device, self._clock()
+            self._devices.may_come(device, job.expectation, outcome.sent, now)
+        self._note_strays(doubted.verdict.strays, doubted.end)
+        return outcome
+
     def _conclude(self, job: Job, outcome: Outcome) -> None:
         """Note what became of a request, and hand it back or send it again."""
         request, verdict, now = job.request, outcome.verdict, self._clock()
@@ -179,7 +199,10 @@ class Dispatcher:
             verdict.kind, verdict.detail = Kind.NOTHING, "the gateway heard nothing of it"
         if verdict.kind in (Kind.REPLY, Kind.EXCEPTION):
             self._tally.replies += 1
-            self._devices.answered(request.device, job.expectation, outcome.turnaround, now)
+            exchanged = (job.pdu, verdict.pdu)
+            self._devices.answered(
+                request.device, job.expectation, outcome.turnaround, now, exchanged
+            )
         unexplained = self._note_strays(verdict.strays, outcome.end)
         if verdict.kind is Kind.WRONG and verdict.strays and request.device not in unexplained:
             verdict.kind = Kind.NOTHING
