@@ -8,7 +8,7 @@ import pytest
 
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Priority
-from tui.session.reader import Rating, Reader
+from tui.session.reader import PLANS_KEPT, Rating, Reader
 from tui.session.readings import Quality
 
 from .fakes import FakeLine, parameter, profile_of
@@ -141,3 +141,14 @@ def test_the_line_learns_the_limits_of_the_profile() -> None:
     assert (limits.max_read, limits.max_write) == (20, 12)
     assert (limits.max_read_23, limits.max_write_23) == (20, 10)
     assert limits.broadcast_functions == {6}
+
+
+async def test_plans_do_not_pile_up_without_end() -> None:
+    profile = profile_of(*(parameter(f"P{a}", a) for a in range(10, 120)))
+    line = FakeLine({a: a for a in range(10, 120)})
+    reader = Reader(line.as_line(), 1, profile)
+    for a in range(10, 118):
+        await reader.read([f"P{a}", f"P{a + 1}"])
+    assert len(reader._plans) <= PLANS_KEPT
+    readings = await reader.read(["P10", "P11"])
+    assert [reading.raw for reading in readings.values()] == [10, 11]

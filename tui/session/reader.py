@@ -26,6 +26,8 @@ never does."""
 USUAL_TURNAROUND = 0.005
 """Seconds that a drive takes to answer, until it is measured."""
 TURNAROUND_STEP = 0.001
+PLANS_KEPT = 64
+"""Read plans that are remembered; sets of codes and turnarounds change without end."""
 ASK_AGAIN = 30.0
 """Seconds after which a poll asks again for a parameter that the drive refused."""
 
@@ -202,6 +204,8 @@ class Reader:
         key = (codes, refused, turnaround, tuple(sorted((slots or {}).items())))
         if key not in self._plans:
             timing = self._timing(turnaround)
+            while len(self._plans) >= PLANS_KEPT:
+                del self._plans[next(iter(self._plans))]
             self._plans[key] = plan_reads(self.profile, sorted(codes), timing, slots, refused)
         return self._plans[key]
 
