@@ -195,6 +195,27 @@ async def test_noise_long_before_the_reply_does_not_end_the_wait(open_line: Open
         assert (await line.read(1, 5)).words == (5,)
 
 
+async def test_a_copy_of_the_reply_before_is_not_taken_for_a_lost_one(
+    open_line: OpenLine,
+) -> None:
+    """The first time that the line repeats a reply, and just then the right one is lost."""
+
+    def repeats(request: bytes, count: int) -> Sequence[Step]:
+        if count == 8:
+            return [0.1, reply(bytes(before))]
+        before[:] = request
+        return [reply(request)]
+
+    before = bytearray()
+    timing = Timing(first_timeout=2.0, min_timeout=0.5, late_reply=3.0)
+    with PtyPeer(repeats) as peer:
+        line = open_line(peer.path, timing)
+        for address in range(8):
+            assert (await line.read(1, address, priority=OPERATOR)).words == (address,)
+        assert (await line.read(1, 40, priority=OPERATOR)).words == (40,)
+        assert [request[3] for request in peer.requests][-2:] == [40, 40]
+
+
 async def test_duplicated_replies_shift_nothing(open_line: OpenLine) -> None:
     with PtyPeer(lambda request, _: [reply(request) * 2]) as peer:
         line = open_line(peer.path)
