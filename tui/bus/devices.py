@@ -31,6 +31,8 @@ SHORT = 0.1
 """A wait between two like requests up to which a line that repeats replies is not soon trusted."""
 LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
 """Seconds without a repeated reply after which a short wait, and a longer one, is over."""
+COPIES = 6
+"""Replies of a device of which a copy may still come."""
 KNOWN = 4
 """Turnarounds that must be known before one can be called unusual."""
 UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 1.5, 0.002
@@ -66,9 +68,10 @@ class Device:
     """Quiet time after each reply of a device that repeats its replies later."""
     repeated: float = 0.0
     """When a reply last came twice."""
-    asked: bytes = b""
-    replied: bytes = b""
-    """The last request that was answered, and its reply."""
+    exchanges: deque[tuple[bytes, bytes]] = field(
+        default_factory=lambda: deque(maxlen=COPIES), repr=False
+    )
+    """The last requests that were answered, with their replies."""
     heard: float | None = None
     last: Expectation | None = None
     last_time: float = 0.0
@@ -165,7 +168,7 @@ class Devices:
         return record.outstanding
 
     def is_repeat(self, device: int, pdu: bytes, reply: bytes, turnaround: float) -> bool:
-        """Whether a reply is more likely a copy of the one before than that of this request.
+        """Whether a reply is more likely a copy of one before than that of this request.
 
         It is the same to the last bit, though other registers were asked for, and it came
         earlier or later than this device ever answers.
@@ -174,7 +177,7 @@ class Devices:
         recent = record.recent.get(pdu[0], ())
         if not self._mistakable or pdu[0] != Read.function or len(recent) < KNOWN:
             return False
-        if reply != record.replied or pdu == record.asked:
+        if not any(reply == replied and pdu != asked for asked, replied in record.exchanges):
             return False
         usual = (UNUSUAL_EARLY * min(recent), UNUSUAL_LATE * max(recent) + JITTER)
         return not usual[0] <= turnaround <= usual[1]
@@ -195,7 +198,7 @@ class Devices:
         record.silent_since = record.next_try = None
         _remember(record, expectation.function, turnaround)
         record.last, record.last_time = expectation, now
-        record.asked, record.replied = exchanged
+        record.exchanges.append(exchanged)
         record.lateness *= FORGET
         settle = self._settle_of(record, now)
         if settle and self._mistakable:
