@@ -38,6 +38,7 @@ if TYPE_CHECKING:
     from tui.session.fault_record import Recorder
     from tui.session.journal import Journal
     from tui.session.keeper import Keeper
+    from tui.session.mapping_desk import MappingDesk
     from tui.session.stop import Stopper, StopSummary
 
 log = logging.getLogger("drivepanel")
@@ -104,6 +105,7 @@ class DrivePanelApp(Leaving):
         self._commanders: dict[int, Commander] = {}
         self._recorders: dict[int, Recorder] = {}
         self.editors: dict[int, Editor] = {}
+        self.desks: dict[int, MappingDesk] = {}
 
     @property
     def journal(self) -> Journal:
@@ -187,6 +189,15 @@ class DrivePanelApp(Leaving):
         known = self.editors.get(session.device)
         if known is None or known.session is not session:
             known = self.editors[session.device] = Editor(session, self.journal)
+        return known
+
+    def mapping_desk(self, session: DriveSession) -> MappingDesk:
+        """What proposes and writes the blocks of a drive of the open line."""
+        from tui.session.mapping_desk import MappingDesk
+
+        known = self.desks.get(session.device)
+        if known is None or known.session is not session:
+            known = self.desks[session.device] = MappingDesk(session, self.journal)
         return known
 
     def recorder(self, session: DriveSession) -> Recorder:
@@ -304,7 +315,7 @@ class DrivePanelApp(Leaving):
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
-        self._commanders, self._recorders, self.editors = {}, {}, {}
+        self._commanders, self._recorders, self.editors, self.desks = {}, {}, {}, {}
         from tui.session.keeper import Keeper
         from tui.session.stop import Stopper
 

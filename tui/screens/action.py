@@ -6,7 +6,8 @@ from dataclasses import dataclass
 
 CONNECTION, MONITOR, FRAMES = "connection", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control source", "faults", "parameters"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS)
+BLOCKS = "blocks"
+EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS)
 
 
 @dataclass(frozen=True, slots=True)

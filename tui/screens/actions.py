@@ -7,7 +7,18 @@ from __future__ import annotations
 
 from textual.binding import Binding, BindingType
 
-from .action import CONNECTION, EVERYWHERE, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES, Action
+from .action import (
+    BLOCKS,
+    CONNECTION,
+    EVERYWHERE,
+    FAULTS,
+    FRAMES,
+    MONITOR,
+    PARAMETERS,
+    SOURCES,
+    Action,
+)
+from .block_actions import BLOCK_ACTIONS
 from .parameter_actions import PARAMETER_ACTIONS
 
 ACTIONS: tuple[Action, ...] = (
@@ -74,7 +85,14 @@ ACTIONS: tuple[Action, ...] = (
         (CONNECTION,),
         line=False,
     ),
-    Action("arm", "a", "a", "arm", "Arm this drive, or end that.", (MONITOR, SOURCES, PARAMETERS)),
+    Action(
+        "arm",
+        "a",
+        "a",
+        "arm",
+        "Arm this drive, or end that.",
+        (MONITOR, SOURCES, PARAMETERS, BLOCKS),
+    ),
     Action("order('forward')", "r", "r", "run", "Run forward.", (MONITOR,)),
     Action("order('reverse')", "v", "v", "reverse", "Run reverse.", (MONITOR,)),
     Action("reference", "f", "f", "ref", "Type a reference in Hz or rpm.", (MONITOR,)),
@@ -205,6 +223,8 @@ ACTIONS: tuple[Action, ...] = (
     Action("leave", "escape,c,2", "Esc", "back", "Go back to Monitor.", (SOURCES,)),
     Action("parameters", "3", "3", "", "Parameters of this drive.", (MONITOR,), line=False),
     *PARAMETER_ACTIONS,
+    Action("blocks", "4", "4", "", "Indirect blocks or scanner.", (MONITOR,), line=False),
+    *BLOCK_ACTIONS,
     Action("leave", "escape,1", "Esc", "", "Go back to Connection.", (MONITOR,), line=False),
     Action(
         "step_drive(-1)",
@@ -288,6 +308,7 @@ def keys_of(screen: str) -> list[tuple[str, str]]:
 
 __all__ = [
     "ACTIONS",
+    "BLOCKS",
     "CONNECTION",
     "EVERYWHERE",
     "FAULTS",

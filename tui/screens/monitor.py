@@ -314,6 +314,12 @@ class MonitorScreen(OrderKeys):
 
         self.app.push_screen(ParametersScreen(self.session))
 
+    def action_blocks(self) -> None:
+        """The indirect blocks or the communication scanner of the drive."""
+        from .blocks import BlocksScreen
+
+        self.app.push_screen(BlocksScreen(self.session))
+
     def action_control_source(self) -> None:
         """Who commands the drive, and how that is changed."""
         from .control_source import ControlSourceScreen

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from tui.session.fault_record import Recorder
     from tui.session.keeper import Keeper
     from tui.session.lines import OpenLine
+    from tui.session.mapping_desk import MappingDesk
     from tui.session.stop import Stopper
     from tui.widgets.clock import Clock
 
@@ -47,6 +48,10 @@ class Panel(App[None]):
     @abstractmethod
     def editor(self, session: DriveSession) -> Editor:
         """What edits the parameters of a drive of the open line."""
+
+    @abstractmethod
+    def mapping_desk(self, session: DriveSession) -> MappingDesk:
+        """What proposes and writes the blocks of a drive of the open line."""
 
     @abstractmethod
     def recorder(self, session: DriveSession) -> Recorder:

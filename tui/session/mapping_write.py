@@ -197,6 +197,11 @@ async def exchange(
         raise RequestRefused("The line is read-only: nothing is written.")
     if not allowed():
         raise AssignmentRefused("The drive is not armed; nothing was written.")
+    if outputs.block.effective == "after-reset":
+        raise AssignmentRefused(
+            f"What {outputs.block.name.lower()} stands for since the last reset cannot be read:"
+            " nothing is written through it from here."
+        )
     work = _Exchange(session, journal, Asker(session), outputs, inputs)
     return await work.carry_out(wanted)
 

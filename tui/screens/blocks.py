@@ -1,0 +1,445 @@
+"""Blocks: what the slots of an indirect block or scanner bring, proposed, written, compared."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Horizontal
+from textual.events import Resize
+
+from tui.drive.errors import DriveError
+from tui.drive.mapping import describe, no_blocks, refusing
+from tui.drive.orders import OrderRefused
+from tui.drive.schema import Block
+from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, word_named
+from tui.session.drive_session import DriveSession
+from tui.session.mapping_desk import MappingDesk
+from tui.widgets.block_view import (
+    WIDE,
+    cost_lines,
+    detail_lines,
+    stretch_lines,
+    table_lines,
+    word_lines,
+)
+from tui.widgets.drawing import key_line, rule, wrapped
+from tui.widgets.lines import Lines
+from tui.widgets.palette import ALARM, ATTENTION, ATTENTION_BLOCK, FAINT, STRONG
+
+from .actions import BLOCKS, bindings, keys_of
+from .orders import OrderKeys
+
+LOOK = 0.25
+SAID_FOR = {"working": 60.0, "done": 15.0, "refused": 60.0}
+"""Seconds for which it is shown what the last work has come to."""
+STYLES = {"working": ATTENTION, "done": STRONG, "refused": ALARM}
+BELOW = 14
+"""Lines that are no slots: title, headings, details, cost, words, message, keys."""
+
+
+class BlocksScreen(OrderKeys):
+    """Two tables side by side; the desk reads, and writes when it is told so."""
+
+    CSS_PATH = "blocks.tcss"
+    BINDINGS: ClassVar = bindings(BLOCKS)
+    TITLE = "Blocks"
+    AUTO_FOCUS = ""
+
+    def __init__(self, session: DriveSession) -> None:
+        super().__init__()
+        self.session = session
+        self._side = 0
+        self._at = 0
+
+    @property
+    def desk(self) -> MappingDesk:
+        """What is known and proposed."""
+        return self.app.mapping_desk(self.session)
+
+    @property
+    def _block(self) -> Block | None:
+        blocks = self.desk.blocks
+        return blocks[self._side % len(blocks)] if blocks else None
+
+    def compose(self) -> ComposeResult:
+        """Title, tables, details, cost, user words, news, keys."""
+        yield Lines(id="title")
+        with Horizontal(id="tables"):
+            yield Lines(id="first")
+            yield Lines(id="second")
+        yield Lines(id="detail")
+        yield Lines(id="cost")
+        yield Lines(id="words")
+        yield Lines(id="message")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Begin to look."""
+        if not self.desk.blocks:
+            for id in ("#second", "#detail", "#cost"):
+                self.query_one(id).display = False
+        self.query_one("#keys", Lines).show([key_line(keys_of(BLOCKS))])
+        self.desk.start()
+        self.set_interval(LOOK, self.look)
+        self.call_after_refresh(self.look)
+
+    def on_unmount(self) -> None:
+        """Look no more; what is proposed stays."""
+        self.desk.stop()
+
+    def on_resize(self, _: Resize) -> None:
+        """More room, more lines a slot."""
+        self.call_after_refresh(self.look)
+
+    def look(self) -> None:
+        """Show what there is now; lines that stay the same are not drawn."""
+        if not self.is_current or not self.size.width:
+            return
+        width = self.size.width
+        self.query_one("#title", Lines).show([self._title(width)])
+        self.query_one("#words", Lines).show(word_lines(self.desk, self.desk.words, width))
+        self.query_one("#message", Lines).show(self._message(width))
+        if self.desk.blocks:
+            self._show_tables(width)
+        else:
+            self._show_neighbours(width)
+
+    def _show_tables(self, width: int) -> None:
+        desk, block = self.desk, self._block
+        assert block is not None
+        each = (width - 1) // 2
+        most = max(len(b.slots) for b in desk.blocks)
+        double = width >= WIDE and self.size.height - BELOW >= 2 * most
+        for id, one in zip(("#first", "#second"), desk.blocks, strict=False):
+            at = self._at if one is block else None
+            lines = table_lines(desk, one, each, at, double=double)
+            self.query_one(id, Lines).show(lines)
+        detail = [rule("Slot", width), *detail_lines(desk, block, self._at, width)]
+        self.query_one("#detail", Lines).show(detail)
+        self.query_one("#cost", Lines).show(cost_lines(desk, desk.saving(), width))
+
+    def _show_neighbours(self, width: int) -> None:
+        why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
+        head = rule("Neighbours of the monitoring set, one request each", width)
+        room = max(3, self.size.height - len(why) - 8)
+        found = stretch_lines(self.desk, self.desk.stretches(), width, room)
+        self.query_one("#first", Lines).show([*why, Text(""), head, *found])
+
+    def _title(self, width: int) -> Text:
+        title = rule(
+            f"Blocks · {self.session.profile.name} · device {self.session.device}", width - 12
+        )
+        armed = self.commander.armed_for
+        if armed is not None:
+            title.append(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
+        else:
+            title.append(" NOT ARMED", STRONG)
+        return title
+
+    def _message(self, width: int) -> list[Text]:
+        desk, now = self.desk, self.app.clock.monotonic()
+        said = desk.said
+        text, style = "", FAINT
+        if said is not None and (desk.busy or now - said.time < SAID_FOR[said.kind]):
+            text, style = said.text, STYLES[said.kind]
+        elif desk.trouble:
+            text, style = desk.trouble, ALARM
+        elif count := sum(len(desk.changes(block)) for block in desk.blocks):
+            text, style = f"{count} slots proposed otherwise: w writes them, u drops.", ATTENTION
+        elif why := self.commander.why_disarmed:
+            text = why
+        lines = [Text(f" {line}", style) for line in wrapped(text, width - 2, 2)]
+        return [*lines, Text(""), Text("")][:2]
+
+    # Keys that move
+
+    def action_move(self, step: int) -> None:
+        """Another slot."""
+        if (block := self._block) is not None:
+            self._at = min(max(0, self._at + step), len(block.slots) - 1)
+        self.look()
+
+    def action_other_table(self) -> None:
+        """The other table."""
+        if self.desk.blocks:
+            self._side = (self._side + 1) % len(self.desk.blocks)
+        self.action_move(0)
+
+    def action_leave(self) -> None:
+        """Back to Monitor; what is proposed stays."""
+        self.app.pop_screen()
+
+    # Keys that propose
+
+    def action_pick(self) -> None:
+        """Choose what the slot stands for."""
+        from .pick_parameter import PickParameter
+
+        block, place = self._block, self._at
+        if block is None:
+            self._refuse(no_blocks(self.session.profile))
+            return
+
+        def told(code: str | None) -> None:
+            if code is not None:
+                self._try(lambda: self.desk.pick(block, place, code))
+
+        slot = block.slots[place]
+        self.app.push_screen(PickParameter(self.session.profile, block, slot), told)
+
+    def action_shift(self, step: int) -> None:
+        """Move the slot's content."""
+        block, place = self._block, self._at
+        if block is not None and 0 <= place + step < len(block.slots):
+            self._try(lambda: self.desk.move(block, place, step))
+            self.action_move(step)
+
+    def action_clear(self) -> None:
+        """Propose the slot unused."""
+        if (block := self._block) is not None:
+            self._try(lambda: self.desk.clear(block, self._at))
+
+    def action_factory(self) -> None:
+        """Propose every slot as it left the factory."""
+
+        def work() -> None:
+            for block in self.desk.blocks:
+                self.desk.factory(block)
+
+        self._try(work)
+
+    def action_undo(self) -> None:
+        """Propose nothing."""
+        self.desk.drop()
+        self.look()
+
+    def _try(self, work: object) -> None:
+        assert callable(work)
+        try:
+            work()
+            self.desk.said = None
+        except DriveError as refused:
+            self.desk.refuse(str(refused))
+        self.look()
+
+    def _refuse(self, text: str) -> None:
+        self.desk.refuse(text)
+        self.look()
+
+    # Keys that write
+
+    def action_arm(self) -> None:
+        """Let writes to this drive through, or no longer."""
+        try:
+            if self.commander.armed_for is not None:
+                self.commander.disarm()
+            else:
+                self.commander.arm()
+        except OrderRefused as refused:
+            self.desk.refuse(str(refused))
+        self.look()
+
+    def _armed(self) -> bool:
+        return self.commander.armed_for is not None
+
+    def action_verify(self) -> None:
+        """Compare every slot several times."""
+        if self.desk.blocks:
+            self.desk.verify()
+        self.look()
+
+    def action_write(self) -> None:
+        """Say what follows, and write it."""
+        from .confirm import Confirm
+
+        desk = self.desk
+        todo = [(block, desk.changes(block)) for block in desk.blocks]
+        if not any(found for _, found in todo):
+            self._refuse("Nothing is proposed: Enter picks what the slot stands for.")
+            return
+        wrong = [p for block, found in todo if found for p in refusing(desk.problems(block))]
+        if wrong:
+            self._refuse(wrong[0].text)
+            return
+        if not self._armed():
+            self._refuse("Not armed: a arms this drive.")
+            return
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                desk.write(self._armed)
+            self.look()
+
+        keys = "y or Enter writes, each slot read back   Esc writes nothing"
+        count = sum(len(found) for _, found in todo)
+        self.app.push_screen(Confirm(f"Write {count} slots?", self._follows(), keys), told)
+
+    def _follows(self) -> str:
+        """What would be written, and what that means for others."""
+        profile, lines, told = self.session.profile, [], []
+        for block in self.desk.blocks:
+            found = self.desk.changes(block)
+            lines += [
+                f"{c.slot}: {describe(profile, block, c.old)} → {describe(profile, block, c.new)}"
+                for c in found
+            ]
+            if found and block.effective == "after-reset":
+                told.append("It counts after the drive's next reset or switch-on.")
+            if found and any(profile[s].storage == "ram-until-saved" for s in block.slots):
+                told.append("Lost at power-off until saved (Parameters, s).")
+            if found and block.direction == "write":
+                told.append("What a master writes to these outputs goes elsewhere from then on.")
+        told.append(
+            "Another master on this line may rely on today's assignment: its program must follow."
+        )
+        return "\n".join([*lines[:8], *([" …"] if len(lines) > 8 else []), "", *told])
+
+    def action_exchange(self) -> None:
+        """Write values through the outputs."""
+        from .ask import Ask
+        from .confirm import Confirm
+
+        desk = self.desk
+        if not self._armed():
+            self._refuse("Not armed: a arms this drive.")
+            return
+
+        def wrong(text: str) -> str:
+            try:
+                desk.outputs_typed(text)
+            except DriveError as refused:
+                return str(refused)
+            return ""
+
+        def sure(text: str) -> None:
+            def told(sure: bool | None) -> None:
+                if sure:
+                    desk.exchange(desk.outputs_typed(text), self._armed)
+                self.look()
+
+            follows = (
+                f"{text}. The other outputs in use are written with what they hold now."
+                " A command word or reference can move the motor."
+            )
+            keys = "y or Enter writes, read back   Esc writes nothing"
+            self.app.push_screen(Confirm("Write through the outputs?", follows, keys), told)
+
+        def given(text: str | None) -> None:
+            if text:
+                sure(text)
+
+        about = "CODE=VALUE for one or more output slots in use, like LFRD=1500 ACC=5.0"
+        self.app.push_screen(Ask("Write through the outputs", wrong, about=about), given)
+
+    # Files and user words
+
+    def action_save(self) -> None:
+        """Ask for a file, and save what is proposed, else today's assignment."""
+        from .ask import Ask
+
+        plans = [p for block in self.desk.blocks if (p := self.desk.proposed(block))]
+        if not plans:
+            self._refuse("Nothing was read yet that could be saved.")
+            return
+
+        def given(name: str | None) -> None:
+            if name:
+                self._try(lambda: self._save(Path(name).expanduser()))
+
+        proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
+        about = "The assignment shown, proposals included; one slot a line (TOML)."
+        text = str(Path.cwd() / proposed)
+        self.app.push_screen(Ask("Save to", _named, text=text, about=about), given)
+
+    def _save(self, path: Path) -> None:
+        from tui.drive.mapping_file import dumps
+        from tui.drive.set_file import write_file
+
+        desk, profile = self.desk, self.session.profile
+        plans = [plan for block in desk.blocks if (plan := desk.proposed(block))]
+        note = f"{profile.name}, device {self.session.device}, {self.session.line_text}"
+        write_file(path, dumps(profile, plans, note))
+        self.app.notify(f"Saved: {path}", timeout=5)
+
+    def action_load(self) -> None:
+        """Ask for a file, and propose what it holds."""
+        from .ask import Ask
+
+        if not self.desk.blocks:
+            self._refuse(no_blocks(self.session.profile))
+            return
+
+        def given(name: str | None) -> None:
+            if name:
+                self._try(lambda: self._load(Path(name).expanduser()))
+
+        about = "A file saved here. It is proposed, not written."
+        self.app.push_screen(Ask("Load from", _there, about=about), given)
+
+    def _load(self, path: Path) -> None:
+        from tui.drive.mapping import MappingError
+        from tui.drive.mapping_file import loads
+
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise MappingError(f"{path} cannot be read: {error}.") from error
+        for plan in loads(text, path.name, self.session.profile).values():
+            self.desk.propose(plan)
+
+    def action_words(self) -> None:
+        """Choose the four user words."""
+        from .ask import Ask
+
+        profile = self.session.profile
+
+        def wrong(text: str) -> str:
+            try:
+                self._words_typed(text)
+            except DriveError as refused:
+                return str(refused)
+            return ""
+
+        def given(text: str | None) -> None:
+            if text is not None:
+                self.desk.assign_words(self._words_typed(text))
+                self.look()
+
+        def spelled(word: UserWord) -> str:
+            parameter = profile.at(word.address) if word.address else None
+            name = parameter.code if parameter else f"W{word.address}"
+            return f"{name if word.address else 'none'} {word.format}"
+
+        about = (
+            "Four, with commas between: a code or address and hex, signed or unsigned."
+            " -----: not assigned, not known to the drive, or protected."
+        )
+        text = ", ".join(spelled(word) for word in self.desk.words)
+        self.app.push_screen(Ask("User words", wrong, text=text, about=about), given)
+
+    def _words_typed(self, text: str) -> UserWords:
+        """Four words from `LCR signed, W7121 hex, none`; raises DriveError."""
+        found: list[UserWord] = []
+        for part in text.split(",")[:COUNT]:
+            name, _, format = part.strip().partition(" ")
+            found.append(
+                word_named(
+                    self.session.profile, name or "none", format_named(format.strip() or "hex")
+                )
+            )
+        return (*found, *(UserWord(),) * (COUNT - len(found)))
+
+
+def _named(name: str) -> str:
+    """What is wrong with a name for a new file."""
+    if not name.strip():
+        return "A name is needed."
+    return f"{name} is there already." if Path(name).expanduser().exists() else ""
+
+
+def _there(name: str) -> str:
+    """What is wrong with the name of a file to read."""
+    return "" if Path(name.strip()).expanduser().is_file() else f"There is no file {name}."

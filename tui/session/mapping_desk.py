@@ -1,0 +1,370 @@
+"""The blocks of one drive at a desk: watched, an assignment proposed, written, compared.
+
+The values come in through a worker of the line's loop, as long as somebody looks. What is
+proposed belongs to the thread of the screen and is kept until it is written or dropped.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Coroutine, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from tui.bus.errors import LineError
+from tui.bus.line import LineStatus, Worker
+from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.mapping import (
+    Assignment,
+    Change,
+    MappingError,
+    Problem,
+    changes,
+    factory,
+    pick,
+    problems,
+    slots_of,
+    target,
+)
+from tui.drive.mapping_wire import Saving, Stretch, saving, stretches
+from tui.drive.schema import Block
+from tui.drive.shown import number_of
+from tui.drive.user_words import UserWords
+from tui.drive.values import encode
+
+from .drive_session import DriveSession
+from .journal import Journal
+from .mapping import BlockView, Force, Mapper, Verdict, wire_timing
+from .mapping_write import exchange, write_assignment
+from .monitor import monitoring_codes, rates_of
+from .user_words import load_words, read_words, save_words
+
+AGAIN = 1.0
+"""Seconds between two looks at the blocks."""
+AFTER_ERROR = 1.0
+WAS_OFF = 3.0
+"""Seconds of silence after which a drive that answers again was switched off, not disturbed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """What the last work has come to; `kind` is working, done or refused."""
+
+    text: str
+    kind: str
+    time: float
+
+
+@dataclass(slots=True)
+class MappingDesk:
+    """What is known of a drive's blocks, what is proposed, and the work on them."""
+
+    session: DriveSession
+    journal: Journal
+    views: dict[str, BlockView] = field(default_factory=dict)
+    """By the id of the block, as last seen; replaced as a whole by the line's thread."""
+    plans: dict[str, Assignment] = field(default_factory=dict)
+    """What is proposed, by the id of the block, where that is not today's assignment."""
+    words: UserWords = field(default_factory=tuple)
+    word_raws: list[int | None] = field(default_factory=list)
+    said: Said | None = None
+    trouble: str = ""
+    """Why nothing can be read now; empty while that works."""
+    mapper: Mapper = field(init=False)
+    _seen: dict[str, dict[str, int]] = field(default_factory=dict)
+    """The slots as the person saw them when a proposal was begun, by the id of the block."""
+    _reader: Worker | None = None
+    _work: Worker | None = None
+    _verify: bool = False
+    _silent: float | None = None
+    _costs: dict[object, Saving] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.mapper = Mapper(self.session)
+        self.words = load_words(self.session)
+        self.word_raws = [None] * len(self.words)
+
+    @property
+    def blocks(self) -> list[Block]:
+        """The blocks of the family, what is read first."""
+        return sorted(self.session.profile.data.blocks, key=lambda b: b.direction != "read")
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being written."""
+        return self._work is not None and not self._work.done()
+
+    # Reading
+
+    def start(self) -> None:
+        """Begin to look."""
+        self.stop()
+        self._reader = self.session.line.spawn(self._watch, f"blocks {self.session.device}")
+
+    def stop(self) -> None:
+        """Look no more; what is being written goes on."""
+        if self._reader is not None:
+            self._reader.cancel()
+            self._reader = None
+
+    def verify(self) -> None:
+        """Compare every slot several times at the next look, and tell what came of it."""
+        self._verify = True
+        self._say("Comparing each slot with direct reads", "working")
+
+    async def _watch(self) -> None:
+        while True:
+            try:
+                await self._look()
+            except (LineError, DriveError) as error:
+                self._silent = self._silent or time.monotonic()
+                self.trouble = str(error)
+                await asyncio.sleep(AFTER_ERROR)
+            else:
+                self.trouble = ""
+                self._look_for_a_reset()
+                await asyncio.sleep(0.0 if self._verify else AGAIN)
+
+    async def _look(self) -> None:
+        verify, self._verify = self._verify, False
+        for block in self.blocks:
+            look = self.mapper.verify if verify else self.mapper.look
+            view = await look(block)
+            self.views = {**self.views, block.id: view}
+        self.word_raws = await read_words(self.session, self.words)
+        if verify:
+            text, good = _verdict(list(self.views.values()))
+            self._say(text, "done" if good else "refused")
+
+    def _look_for_a_reset(self) -> None:
+        since, self._silent = self._silent, None
+        latest = self.session.monitor.latest
+        off = since is not None and time.monotonic() - since > WAS_OFF
+        if off or (latest is not None and latest.state.kind == "starting"):
+            self.mapper.note_reset()
+
+    # Proposing
+
+    def today(self, block: Block) -> Assignment | None:
+        """What the drive holds; None while that is not known."""
+        view = self.views.get(block.id)
+        return view.plan if view else None
+
+    def proposed(self, block: Block) -> Assignment | None:
+        """What is proposed, else today's assignment."""
+        return self.plans.get(block.id) or self.today(block)
+
+    def propose(self, plan: Assignment) -> None:
+        """Propose an assignment; one that equals today's is no proposal. Raises MappingError."""
+        today = self.today(plan.block)
+        if today is None:
+            raise MappingError(f"{plan.block.name} could not be read yet.")
+        if self.busy:
+            raise MappingError("Something is being written; wait until that is done.")
+        if plan.raws == today.raws:
+            self.plans.pop(plan.block.id, None)
+            return
+        if plan.block.id not in self.plans:
+            self._seen[plan.block.id] = today.slots
+        self.plans[plan.block.id] = plan
+
+    def pick(self, block: Block, place: int, text: str) -> None:
+        """Propose what a person names for a slot. Raises MappingError, UnknownParameter."""
+        self.propose(pick(self.session.profile, self._base(block), place, text))
+
+    def move(self, block: Block, place: int, step: int) -> None:
+        """Propose a slot's content one place up or down. Raises MappingError."""
+        self.propose(self._base(block).moved(place, step))
+
+    def clear(self, block: Block, place: int) -> None:
+        """Propose an unused slot. Raises MappingError."""
+        self.propose(self._base(block).cleared(place))
+
+    def factory(self, block: Block) -> None:
+        """Propose what the drive left the factory with. Raises MappingError."""
+        self.propose(factory(self.session.profile, block))
+
+    def drop(self) -> None:
+        """Propose nothing any more."""
+        self.plans.clear()
+        self._seen.clear()
+
+    def _base(self, block: Block) -> Assignment:
+        plan = self.proposed(block)
+        if plan is None:
+            raise MappingError(f"{block.name} could not be read yet.")
+        return plan
+
+    def changes(self, block: Block) -> list[Change]:
+        """What writing the proposal would change now."""
+        plan, today = self.plans.get(block.id), self.today(block)
+        return changes(today.slots, plan) if plan and today else []
+
+    def problems(self, block: Block) -> list[Problem]:
+        """What is wrong with the proposal, or with today's assignment where there is none."""
+        plan = self.proposed(block)
+        return problems(self.session.profile, plan, self.mapper.lacking) if plan else []
+
+    # What it costs
+
+    def saving(self) -> Saving | None:
+        """The time of a fast monitoring cycle under today's slots and under the proposed ones."""
+        today = [plan for block in self.blocks if (plan := self.today(block))]
+        after = [plan for block in self.blocks if (plan := self.proposed(block))]
+        if not today:
+            return None
+        timing = wire_timing(self.session)
+        before_raws, after_raws = slots_of(today), slots_of(after)
+        key = (tuple(before_raws.items()), tuple(after_raws.items()), timing)
+        if key not in self._costs:
+            codes = rates_of(self.session.profile).fast
+            self._costs = {
+                key: saving(self.session.profile, codes, timing, before_raws, after_raws)
+            }
+        return self._costs[key]
+
+    def stretches(self) -> list[Stretch]:
+        """For families without blocks: which neighbours to read in one request."""
+        codes = monitoring_codes(self.session.profile)
+        return stretches(self.session.profile, codes, wire_timing(self.session))
+
+    # User words
+
+    def assign_words(self, words: UserWords) -> None:
+        """Watch other words from now on, and keep them for this drive."""
+        self.words, self.word_raws = words, [None] * len(words)
+        if wrong := save_words(self.session, words):
+            self._say(wrong, "refused")
+
+    # Writing
+
+    def write(self, allowed: Callable[[], bool]) -> None:
+        """Write what is proposed; returns at once."""
+        plans = [self.plans[b.id] for b in self.blocks if b.id in self.plans]
+
+        async def work() -> str:
+            texts = []
+            for plan in plans:
+                done = await write_assignment(
+                    self.session,
+                    self.journal,
+                    plan,
+                    expected=self._seen.get(plan.block.id),
+                    allowed=lambda: allowed() and not self._ordered(),
+                )
+                if done.after_reset:
+                    self.mapper.written |= {c.slot: c.new for c in done.changes}
+                self.views = {
+                    **self.views,
+                    plan.block.id: await self.mapper.look(plan.block),
+                }
+                self.plans.pop(plan.block.id, None)
+                texts.append(done.text)
+            return " ".join(dict.fromkeys(texts))
+
+        self._run(work)
+
+    def outputs_typed(self, text: str) -> dict[str, int]:
+        """Raw values by code from `LFRD=1500 ACC=5.0`, for the outputs of now.
+
+        Raises ValueRefused and MappingError with what is wrong.
+        """
+        profile, block = self.session.profile, self._outputs().block
+        stand = {p.code: p for raw in self._outputs().raws if (p := target(profile, block, raw))}
+        raws = self.session.monitor.known.raws()
+        found: dict[str, int] = {}
+        for part in text.replace(",", ".").split():
+            code, sign, value = part.partition("=")
+            parameter = profile.find(code)
+            if not sign or parameter.code not in stand:
+                raise ValueRefused(f"{part!r}: write CODE=VALUE with one of {', '.join(stand)}.")
+            scale = profile.scale(parameter, raws)
+            found[parameter.code] = encode(parameter, value, profile.names(parameter), scale).raw
+        if not found:
+            raise ValueRefused(f"Write CODE=VALUE with one of {', '.join(stand)}.")
+        return found
+
+    def exchange(self, wanted: Mapping[str, int], allowed: Callable[[], bool]) -> None:
+        """Write through the outputs, with the inputs in the same exchange; returns at once."""
+        outputs = self._outputs()
+        read = next((b for b in self.blocks if b.direction == "read"), None)
+        inputs = self.today(read) if read else None
+
+        async def work() -> str:
+            done = await exchange(
+                self.session, self.journal, outputs, wanted, inputs, allowed=allowed
+            )
+            sent = ", ".join(f"{c} {self._number(c, done.outputs[c])}" for c in wanted)
+            back = ", ".join(f"{c} {self._number(c, raw)}" for c, raw in done.inputs.items())
+            return f"Written: {sent}." + (f" Came back: {back}." if back else "")
+
+        self._run(work)
+
+    def _outputs(self) -> Assignment:
+        block = next((b for b in self.blocks if b.direction == "write"), None)
+        plan = self.today(block) if block else None
+        if plan is None or not plan.length:
+            raise MappingError("No output slot is in use.")
+        return plan
+
+    def _number(self, code: str, raw: int) -> str:
+        profile = self.session.profile
+        number = number_of(profile, profile[code], raw, self.session.monitor.known.raws())
+        return str(raw) if number is None else f"{number:f}"
+
+    def _ordered(self) -> bool:
+        """Whether an order to the drive is being carried out."""
+        worker = self.session.busy
+        return worker is not None and not worker.done()
+
+    def _run(self, work: Callable[[], Coroutine[Any, Any, str]]) -> None:
+        session = self.session
+        if self.busy or self._ordered():
+            self._say("Another order is still being carried out.", "refused")
+            return
+        if session.line.state.status is not LineStatus.CONNECTED:
+            self._say("The line is lost; nothing is written.", "refused")
+            return
+
+        async def guarded() -> None:
+            try:
+                self._say(await work(), "done")
+            except (LineError, DriveError) as error:
+                self._say(str(error), "refused")
+
+        self._say("Writing, each slot read back", "working")
+        # a stop goes out before each of these writes; with an order under way they end
+        self._work = session.line.spawn(guarded, f"blocks write {session.device}")
+
+    def refuse(self, text: str) -> None:
+        """Tell why something was not done."""
+        self._say(text, "refused")
+
+    def tell(self, text: str) -> None:
+        """Tell what was done."""
+        self._say(text, "done")
+
+    def _say(self, text: str, kind: str) -> None:
+        self.said = Said(text, kind, time.monotonic())
+
+
+def _verdict(views: list[BlockView]) -> tuple[str, bool]:
+    """What a comparison of all blocks has come to, and whether all is well."""
+    wrong: list[str] = []
+    counted = 0
+    for view in views:
+        if view.block.direction != "read":
+            continue
+        if view.trouble:
+            wrong.append(view.trouble)
+        for slot in view.slots:
+            counted += slot.verdict in (Verdict.SAME, Verdict.MOVING)
+            if slot.verdict in (Verdict.DIFFERS, Verdict.CHANGED, Verdict.NONE):
+                brings = f", brings {slot.brings}" if slot.brings else ""
+                waits = " until the next reset" if slot.force is Force.PENDING else ""
+                wrong.append(f"{slot.code} {slot.verdict}{brings}{waits}")
+    text = f"{counted} slots bring the same as direct reads."
+    if wrong:
+        return f"{'; '.join(wrong)}. {text}", False
+    return text, True
