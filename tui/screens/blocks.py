@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
@@ -10,13 +9,10 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal
 from textual.events import Resize
 
-from tui.drive.errors import DriveError
 from tui.drive.mapping import describe, no_blocks, refusing
 from tui.drive.orders import OrderRefused
 from tui.drive.schema import Block
-from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, word_named
 from tui.session.drive_session import DriveSession
-from tui.session.mapping_desk import MappingDesk
 from tui.widgets.block_view import (
     WIDE,
     cost_lines,
@@ -30,17 +26,17 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, ATTENTION_BLOCK, FAINT, STRONG
 
 from .actions import BLOCKS, bindings, keys_of
-from .orders import OrderKeys
+from .block_keys import BlockKeys
 
 LOOK = 0.25
 SAID_FOR = {"working": 60.0, "done": 15.0, "refused": 60.0}
 """Seconds for which it is shown what the last work has come to."""
 STYLES = {"working": ATTENTION, "done": STRONG, "refused": ALARM}
-BELOW = 14
+BELOW = 16
 """Lines that are no slots: title, headings, details, cost, words, message, keys."""
 
 
-class BlocksScreen(OrderKeys):
+class BlocksScreen(BlockKeys):
     """Two tables side by side; the desk reads, and writes when it is told so."""
 
     CSS_PATH = "blocks.tcss"
@@ -53,11 +49,6 @@ class BlocksScreen(OrderKeys):
         self.session = session
         self._side = 0
         self._at = 0
-
-    @property
-    def desk(self) -> MappingDesk:
-        """What is known and proposed."""
-        return self.app.mapping_desk(self.session)
 
     @property
     def _block(self) -> Block | None:
@@ -216,19 +207,6 @@ class BlocksScreen(OrderKeys):
         self.desk.drop()
         self.look()
 
-    def _try(self, work: object) -> None:
-        assert callable(work)
-        try:
-            work()
-            self.desk.said = None
-        except DriveError as refused:
-            self.desk.refuse(str(refused))
-        self.look()
-
-    def _refuse(self, text: str) -> None:
-        self.desk.refuse(text)
-        self.look()
-
     # Keys that write
 
     def action_arm(self) -> None:
@@ -241,9 +219,6 @@ class BlocksScreen(OrderKeys):
         except OrderRefused as refused:
             self.desk.refuse(str(refused))
         self.look()
-
-    def _armed(self) -> bool:
-        return self.commander.armed_for is not None
 
     def action_verify(self) -> None:
         """Compare every slot several times."""
@@ -296,150 +271,3 @@ class BlocksScreen(OrderKeys):
             "Another master on this line may rely on today's assignment: its program must follow."
         )
         return "\n".join([*lines[:8], *([" …"] if len(lines) > 8 else []), "", *told])
-
-    def action_exchange(self) -> None:
-        """Write values through the outputs."""
-        from .ask import Ask
-        from .confirm import Confirm
-
-        desk = self.desk
-        if not self._armed():
-            self._refuse("Not armed: a arms this drive.")
-            return
-
-        def wrong(text: str) -> str:
-            try:
-                desk.outputs_typed(text)
-            except DriveError as refused:
-                return str(refused)
-            return ""
-
-        def sure(text: str) -> None:
-            def told(sure: bool | None) -> None:
-                if sure:
-                    desk.exchange(desk.outputs_typed(text), self._armed)
-                self.look()
-
-            follows = (
-                f"{text}. The other outputs in use are written with what they hold now."
-                " A command word or reference can move the motor."
-            )
-            keys = "y or Enter writes, read back   Esc writes nothing"
-            self.app.push_screen(Confirm("Write through the outputs?", follows, keys), told)
-
-        def given(text: str | None) -> None:
-            if text:
-                sure(text)
-
-        about = "CODE=VALUE for one or more output slots in use, like LFRD=1500 ACC=5.0"
-        self.app.push_screen(Ask("Write through the outputs", wrong, about=about), given)
-
-    # Files and user words
-
-    def action_save(self) -> None:
-        """Ask for a file, and save what is proposed, else today's assignment."""
-        from .ask import Ask
-
-        plans = [p for block in self.desk.blocks if (p := self.desk.proposed(block))]
-        if not plans:
-            self._refuse("Nothing was read yet that could be saved.")
-            return
-
-        def given(name: str | None) -> None:
-            if name:
-                self._try(lambda: self._save(Path(name).expanduser()))
-
-        proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
-        about = "The assignment shown, proposals included; one slot a line (TOML)."
-        text = str(Path.cwd() / proposed)
-        self.app.push_screen(Ask("Save to", _named, text=text, about=about), given)
-
-    def _save(self, path: Path) -> None:
-        from tui.drive.mapping_file import dumps
-        from tui.drive.set_file import write_file
-
-        desk, profile = self.desk, self.session.profile
-        plans = [plan for block in desk.blocks if (plan := desk.proposed(block))]
-        note = f"{profile.name}, device {self.session.device}, {self.session.line_text}"
-        write_file(path, dumps(profile, plans, note))
-        self.app.notify(f"Saved: {path}", timeout=5)
-
-    def action_load(self) -> None:
-        """Ask for a file, and propose what it holds."""
-        from .ask import Ask
-
-        if not self.desk.blocks:
-            self._refuse(no_blocks(self.session.profile))
-            return
-
-        def given(name: str | None) -> None:
-            if name:
-                self._try(lambda: self._load(Path(name).expanduser()))
-
-        about = "A file saved here. It is proposed, not written."
-        self.app.push_screen(Ask("Load from", _there, about=about), given)
-
-    def _load(self, path: Path) -> None:
-        from tui.drive.mapping import MappingError
-        from tui.drive.mapping_file import loads
-
-        try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise MappingError(f"{path} cannot be read: {error}.") from error
-        for plan in loads(text, path.name, self.session.profile).values():
-            self.desk.propose(plan)
-
-    def action_words(self) -> None:
-        """Choose the four user words."""
-        from .ask import Ask
-
-        profile = self.session.profile
-
-        def wrong(text: str) -> str:
-            try:
-                self._words_typed(text)
-            except DriveError as refused:
-                return str(refused)
-            return ""
-
-        def given(text: str | None) -> None:
-            if text is not None:
-                self.desk.assign_words(self._words_typed(text))
-                self.look()
-
-        def spelled(word: UserWord) -> str:
-            parameter = profile.at(word.address) if word.address else None
-            name = parameter.code if parameter else f"W{word.address}"
-            return f"{name if word.address else 'none'} {word.format}"
-
-        about = (
-            "Four, with commas between: a code or address and hex, signed or unsigned."
-            " -----: not assigned, not known to the drive, or protected."
-        )
-        text = ", ".join(spelled(word) for word in self.desk.words)
-        self.app.push_screen(Ask("User words", wrong, text=text, about=about), given)
-
-    def _words_typed(self, text: str) -> UserWords:
-        """Four words from `LCR signed, W7121 hex, none`; raises DriveError."""
-        found: list[UserWord] = []
-        for part in text.split(",")[:COUNT]:
-            name, _, format = part.strip().partition(" ")
-            found.append(
-                word_named(
-                    self.session.profile, name or "none", format_named(format.strip() or "hex")
-                )
-            )
-        return (*found, *(UserWord(),) * (COUNT - len(found)))
-
-
-def _named(name: str) -> str:
-    """What is wrong with a name for a new file."""
-    if not name.strip():
-        return "A name is needed."
-    return f"{name} is there already." if Path(name).expanduser().exists() else ""
-
-
-def _there(name: str) -> str:
-    """What is wrong with the name of a file to read."""
-    return "" if Path(name.strip()).expanduser().is_file() else f"There is no file {name}."

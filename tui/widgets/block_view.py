@@ -20,6 +20,8 @@ from tui.session.mapping_desk import MappingDesk
 from .drawing import cut, rule, wrapped
 from .palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG
 
+BOTH = 50
+"""Columns of a table from which the direct value stands in it too."""
 WIDE = 110
 """Columns from which each slot takes two lines."""
 VERDICT_STYLES = {
@@ -46,7 +48,7 @@ def table_lines(
     """The slots of one block under its heading; `at` is the place of the cursor, if it is here."""
     view = desk.views.get(block.id)
     plan = desk.plans.get(block.id)
-    right = "proposed" if plan else ""
+    right = "proposed" if plan else "through the block · direct" if width >= BOTH else ""
     lines = [rule(block.name, width, right)]
     for place, code in enumerate(block.slots):
         slot = view.slots[place] if view else Slot(code, None)
@@ -66,7 +68,9 @@ def _slot_line(
     text.append(f"{slot.code:<5}", STRONG if chosen else PLAIN)
     used = slot.raw not in (0, None)
     stands = describe(profile, block, slot.raw)
-    text.append(cut(stands, 9 if width < 50 else 12), PLAIN if used else FAINT)
+    if used and slot.parameter is None:
+        stands = f"{slot.raw}?"
+    text.append(cut(stands, 9 if width < BOTH else 12), PLAIN if used else FAINT)
     changed = proposed is not None and proposed != slot.raw
     if changed:
         text.append(cut(f" → {describe(profile, block, proposed)}", 12), ATTENTION)
@@ -78,7 +82,7 @@ def _slot_line(
     if slot.force is Force.PENDING:
         verdict = "pending"
     shown = slot.text if used else ""
-    both = width >= 50
+    both = width >= BOTH
     value_room = max(4, (room - 9) // 2 if both else room - 9)
     text.append(f"{cut(shown, value_room).rstrip():>{value_room}}", PLAIN)
     if both:
@@ -171,7 +175,7 @@ def _force_text(slot: Slot) -> str:
 
 
 def cost_lines(desk: MappingDesk, saving: Saving | None, width: int) -> list[Text]:
-    """What a monitoring cycle costs before and after, and the frame; always three lines."""
+    """What a monitoring cycle costs before and after, and the frame; always four lines."""
     inputs, outputs = _plans(desk)
     lines = [rule("On the wire", width)]
     text = Text(" ", no_wrap=True)
@@ -189,11 +193,23 @@ def cost_lines(desk: MappingDesk, saving: Saving | None, width: int) -> list[Tex
         if whole:
             text.append(f"   one exchange {_ms(whole)}", FAINT)
     text.truncate(width)
-    sent = hex_text(frame(desk.session.profile, desk.session.device, inputs, outputs))
-    hexes = Text(" frame ", FAINT)
-    hexes.append(sent or "none: no slot is in use", PLAIN if sent else FAINT)
-    hexes.truncate(width, overflow="ellipsis")
-    return [*lines, text, hexes]
+    sent = frame(desk.session.profile, desk.session.device, inputs, outputs, _output_words(desk))
+    hexes = wrapped(hex_text(sent) or "none: no slot is in use", width - 8, 2)
+    frames = [
+        Text(f" {'frame' if not line else '':<6}{hexes[line] if line < len(hexes) else ''}", PLAIN)
+        for line in range(2)
+    ]
+    return [*lines, text, *frames]
+
+
+def _output_words(desk: MappingDesk) -> list[int]:
+    """What the outputs hold now, for the frame; 0 where that is not known."""
+    for block in desk.blocks:
+        view = desk.views.get(block.id)
+        if block.direction == "write" and view is not None:
+            held = [slot.direct.raw if slot.direct else None for slot in view.slots]
+            return [(raw or 0) & 0xFFFF for raw in held]
+    return []
 
 
 def _plans(desk: MappingDesk) -> tuple[Assignment | None, Assignment | None]:

@@ -1,0 +1,195 @@
+"""Pictures of the Blocks screen in its main states, at both sizes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, cast
+
+import pytest
+from textual.pilot import Pilot
+
+from tui.drive import library
+from tui.drive.mapping import target
+from tui.drive.schema import Block
+from tui.drive.user_words import UserWord
+from tui.screens.blocks import BlocksScreen
+from tui.session.command import Commander
+from tui.session.drive_session import DriveSession
+from tui.session.journal import Journal
+from tui.session.mapping import BlockView, Force, Slot, Verdict
+from tui.session.mapping_desk import MappingDesk, Said
+
+from . import fakes
+from .test_command_pictures import FakeCommander
+from .test_pictures import SIZES, Compare
+
+INPUTS = (3201, 8604, 3204, 3205, 3207, 3209, 9630, 0)
+OUTPUTS = (8501, 8602, 3104, 3105, 9001, 9002, 0, 0)
+HELD = {**fakes.READY, "CMD": 0, "LFRD": 0, "HSP": 500, "LSP": 0, "ACC": 30, "DEC": 30, "INR": 1}
+ATV21 = {"FD01": 0x6404, "FD00": 3500, "FE03": 812, "FE05": 7000, "FE90": 1050, "FC91": 0}
+
+
+class StillDesk(MappingDesk):
+    """A desk whose values do not change."""
+
+    def start(self) -> None:
+        """Nothing is read."""
+
+    def stop(self) -> None:
+        """Nothing was read."""
+
+    def _say(self, text: str, kind: str) -> None:
+        """Said at the moment of every fake."""
+        self.said = Said(text, kind, fakes.NOW)
+
+
+def session_on(family: str) -> DriveSession:
+    session = fakes.session_of(fakes.snapshot_of(library.load("atv71"), fakes.READY))
+    session.profile = library.load(family)
+    return session
+
+
+def view_of(
+    session: DriveSession, block: Block, raws: tuple[int, ...], held: Mapping[str, int]
+) -> BlockView:
+    """Slots that all bring what they stand for."""
+    profile = session.profile
+    slots = []
+    for code, raw in zip(block.slots, raws, strict=True):
+        parameter = target(profile, block, raw)
+        if parameter is None:
+            verdict = Verdict.UNUSED if raw == 0 else Verdict.NONE
+            slots.append(Slot(code, raw, verdict=verdict))
+            continue
+        reading = fakes.readings_of(
+            profile, {**held, parameter.code: held.get(parameter.code, 0)}, fakes.NOW
+        )[parameter.code]
+        text = f"{reading.text} {reading.unit}".strip()
+        force = Force.ACTIVE if block.effective == "at-once" else Force.UNPROVED
+        slots.append(Slot(code, raw, parameter, reading.raw, text, reading, Verdict.SAME, force))
+    return BlockView(block, tuple(slots))
+
+
+def scanner() -> MappingDesk:
+    session = session_on("atv71")
+    desk = StillDesk(session, Journal())
+    session.monitor.known.put("INR", 1)
+    first, second = desk.blocks
+    desk.views = {
+        first.id: view_of(session, first, INPUTS, HELD),
+        second.id: view_of(session, second, OUTPUTS, HELD),
+    }
+    desk.words = (
+        UserWord(3204, "signed"), UserWord(3205, "signed"), UserWord(7121), UserWord(),
+    )  # fmt: skip
+    desk.word_raws = [53, 725, 0, None]
+    return desk
+
+
+def proposed(desk: MappingDesk) -> None:
+    first = desk.blocks[0]
+    desk.pick(first, 7, "LFT")
+    desk.move(first, 2, 1)
+
+
+def wrong(desk: MappingDesk) -> None:
+    desk.pick(desk.blocks[1], 6, "CMD")
+
+
+def differs(desk: MappingDesk) -> None:
+    block = desk.blocks[0]
+    view = desk.views[block.id]
+    bad = Slot("NMA1", 3201, view.slots[0].parameter, 1480, "raw 1480", view.slots[0].direct,
+               Verdict.DIFFERS, Force.ACTIVE)  # fmt: skip
+    unknown = Slot("NMA2", 3199, None, None, verdict=Verdict.NONE)
+    desk.views[block.id] = BlockView(block, (bad, unknown, *view.slots[2:]))
+    desk.said = Said(
+        "NMA1 differs; NMA2 no value. 5 slots bring the same as direct reads.",
+        "refused",
+        fakes.NOW,
+    )
+
+
+def indirect() -> MappingDesk:
+    session = session_on("atv21")
+    desk = StillDesk(session, Journal())
+    first, second = desk.blocks
+    view = view_of(session, first, (1, 2, 3, 4, 11), ATV21)
+    active = tuple(
+        Slot(s.code, s.raw, s.parameter, s.word, s.text, s.direct, s.verdict, Force.ACTIVE)
+        for s in view.slots[:3]
+    )
+    pending = tuple(
+        Slot(s.code, s.raw, s.parameter, 77, "raw 77", s.direct, Verdict.DIFFERS,
+             Force.PENDING, "FC91")
+        for s in view.slots[3:]
+    )  # fmt: skip
+    desk.views = {
+        first.id: BlockView(first, (*active, *pending)),
+        second.id: BlockView(
+            second,
+            view_of(session, second, (1, 3), {"FA00": 0, "FA01": 0}).slots,
+            "Write block can only be written: what it would take cannot be read.",
+        ),
+    }
+    return desk
+
+
+def empty() -> MappingDesk:
+    return StillDesk(session_on("atv71"), Journal())
+
+
+def without(family: str) -> Callable[[], MappingDesk]:
+    return lambda: StillDesk(session_on(family), Journal())
+
+
+def nothing(_: MappingDesk) -> None:
+    """As it is."""
+
+
+STATES: dict[str, tuple[Callable[[], MappingDesk], Any, float | None, list[str]]] = {
+    "scanner": (scanner, nothing, None, []),
+    "outputs": (scanner, nothing, 52.0, ["tab", "down", "down"]),
+    "proposed": (scanner, proposed, 52.0, ["down", "down"]),
+    "write": (scanner, proposed, 52.0, ["w"]),
+    "not-armed": (scanner, proposed, None, ["w"]),
+    "wrong": (scanner, wrong, 52.0, ["tab", *["down"] * 6, "w"]),
+    "differs": (scanner, differs, None, []),
+    "pick": (scanner, nothing, None, ["down", "enter"]),
+    "pick-found": (scanner, nothing, None, ["down", "enter", *"current"]),
+    "pick-nothing": (scanner, nothing, None, ["down", "enter", *"xyz"]),
+    "words": (scanner, nothing, None, ["m"]),
+    "exchange": (scanner, nothing, 52.0, ["x", *"ACC=5.0"]),
+    "exchange-sure": (scanner, nothing, 52.0, ["x", *"ACC=5.0", "enter"]),
+    "indirect": (indirect, nothing, None, ["down", "down", "down"]),
+    "indirect-outputs": (indirect, nothing, None, ["tab"]),
+    "reading": (empty, nothing, None, []),
+    "none": (without("atv312"), nothing, None, []),
+    "neighbours": (without("powerdrive"), nothing, None, []),
+    "help": (scanner, nothing, None, ["question_mark"]),
+}
+
+
+@SIZES
+@pytest.mark.parametrize("state", STATES)
+def test_blocks(
+    snap_compare: Compare, state: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    make, prepare, armed, keys = STATES[state]
+    monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
+    desk = make()
+    prepare(desk)
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+    app.desks[2] = desk
+    app._commanders[2] = cast("Commander", FakeCommander(armed))
+    app._commanders[2].session = desk.session
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(BlocksScreen(desk.session))
+        await pilot.pause()
+        await pilot.press(*keys)
+        await pilot.pause()
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
