@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -332,10 +333,19 @@ class MappingDesk:
                 self._say(await work(), "done")
             except (LineError, DriveError) as error:
                 self._say(str(error), "refused")
+                await self._see_again()
 
         self._say("Writing, each slot read back", "working")
         # a stop goes out before each of these writes; with an order under way they end
         self._work = session.line.spawn(guarded, f"blocks write {session.device}")
+
+    async def _see_again(self) -> None:
+        """After a refusal the person looks at what the drive holds now, and may write again."""
+        with suppress(LineError, DriveError):
+            for id, plan in self.plans.items():
+                view = await self.mapper.look(plan.block)
+                self.views = {**self.views, id: view}
+                self._seen[id] = view.raws
 
     def refuse(self, text: str) -> None:
         """Tell why something was not done."""

@@ -1,0 +1,185 @@
+"""Blocks and scanner by keys: simulated drives over a real line, the whole panel above."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from textual.widgets import Input
+
+from tui.screens.ask import Ask
+from tui.screens.blocks import BlocksScreen
+from tui.screens.confirm import Confirm
+from tui.screens.monitor import MonitorScreen
+from tui.screens.pick_parameter import PickParameter
+
+from .test_command_flows import Bench, bench
+from .test_flows import shown, until
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+async def to_blocks(made: Bench, sees: str = "ETA") -> None:
+    await made.pilot.press("4")
+    await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))
+    await until(made.pilot, lambda: sees in shown(made.app, "first"))
+
+
+async def message(made: Bench, *parts: str) -> None:
+    def said() -> str:
+        return " ".join(shown(made.app, "message").split())
+
+    await until(made.pilot, lambda: all(part in said() for part in parts))
+
+
+async def pick(made: Bench, typed: str) -> None:
+    await made.pilot.press("enter")
+    await until(made.pilot, lambda: isinstance(made.app.screen, PickParameter))
+    await made.pilot.press(*typed, "enter")
+    await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))
+
+
+async def answer(made: Bench, key: str, text: str) -> None:
+    await made.pilot.press(key)
+    await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+    made.app.screen.query_one(Input).value = text
+    await made.pilot.press("enter")
+
+
+async def write(made: Bench) -> None:
+    await made.pilot.press("w")
+    await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+    assert "Another master" in str(made.app.screen.query_one("#follows").render())
+    await made.pilot.press("y")
+
+
+async def test_pick_move_write_and_verify() -> None:
+    async with bench("atv71") as made:
+        await to_blocks(made)
+        await made.pilot.press("down", "down")
+        await pick(made, "lcr")
+        await until(made.pilot, lambda: "→ LCR" in shown(made.app, "first"))
+        await made.pilot.press("left_square_bracket")
+        await message(made, "2 slots proposed otherwise")
+        assert made.drive().raw("NMA2") == 8604
+        await made.pilot.press("w")
+        await message(made, "Not armed")
+        await made.pilot.press("a")
+        await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
+        await write(made)
+        await message(made, "Written and read back: NMA2, NMA3", "Lost at power-off")
+        assert [made.drive().raw(f"NMA{n}") for n in (1, 2, 3)] == [3201, 3204, 8604]
+        await made.pilot.press("v")
+        await message(made, "3 slots bring the same as direct reads")
+        await made.pilot.press("F")
+        await message(made, "2 slots proposed otherwise")
+        await made.pilot.press("u", "escape")
+        await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
+
+
+async def test_nothing_is_written_while_the_motor_turns_and_stop_works_here() -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        await to_blocks(made)
+        await made.pilot.press("down", "down", "down")
+        await pick(made, "otr")
+        await write(made)
+        await message(made, "motor stopped only", "Nothing was written")
+        assert made.drive().raw("NMA4") == 0
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, PickParameter))
+        await made.pilot.press("f12")
+        await made.stopped()
+
+
+async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
+    async with bench("atv71") as made:
+        await to_blocks(made)
+        await made.pilot.press("a", "down", "down")
+        await pick(made, "lcr")
+        made.drive().set("NMA1", 9001)
+        await until(made.pilot, lambda: "ACC" in shown(made.app, "first"))
+        await write(made)
+        await message(made, "NMA1 was changed meanwhile")
+        assert made.drive().raw("NMA1") == 9001
+        # now that it was told, it may be overwritten
+        await until(made.pilot, lambda: "→ ETA" in shown(made.app, "first"))
+        await until(made.pilot, lambda: not made.app.desks[1].busy)
+        await write(made)
+        await message(made, "Written and read back: NMA1, NMA3")
+
+
+async def test_save_and_load(tmp_path: Path) -> None:
+    async with bench("atv71") as made:
+        await to_blocks(made)
+        file = tmp_path / "scanner.toml"
+        await answer(made, "s", str(file))
+        await until(made.pilot, file.exists)
+        text = file.read_text("utf-8")
+        file.write_text(text.replace('NMA3 = "none"', 'NMA3 = "LCR"'), "utf-8")
+        await answer(made, "l", str(file))
+        await until(made.pilot, lambda: "→ LCR" in shown(made.app, "first"))
+        await made.pilot.press("u")
+        file.write_text(text.replace('NMA3 = "none"', 'NMA3 = "NOPE"'), "utf-8")
+        await answer(made, "l", str(file))
+        await message(made, "scanner.toml:", "NMA3")
+
+
+async def test_outputs_are_written_when_armed_only() -> None:
+    async with bench("atv71") as made:
+        await to_blocks(made)
+        for slot, code in {"NCA1": "ACC", "NCA2": "DEC"}.items():
+            made.drive().set(slot, made.drive().profile[code].address)
+        await until(made.pilot, lambda: "DEC" in shown(made.app, "second"))
+        await made.pilot.press("x")
+        await message(made, "Not armed")
+        await made.pilot.press("a")
+        await answer(made, "x", "ACC=5.5")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        await made.pilot.press("y")
+        await message(made, "Written: ACC 5.5", "Came back: ETA")
+        assert made.drive().raw("ACC") == 55
+
+
+async def test_user_words_are_kept_for_the_drive() -> None:
+    async with bench("atv71") as made:
+        made.drive().set("ACC", 37)
+        await to_blocks(made)
+        await answer(made, "m", "acc unsigned, W3199 hex")
+        await until(made.pilot, lambda: "ACC 37" in shown(made.app, "words"))
+        assert "W3199 -----" in shown(made.app, "words")
+        await made.pilot.press("m")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+        made.app.screen.query_one(Input).value = "ACC octal"
+        await made.pilot.press("enter")
+        fault = made.app.screen.query_one("#fault")
+        await until(made.pilot, lambda: "no format" in str(fault.render()))
+
+
+async def test_an_indirect_block_waits_for_a_reset() -> None:
+    async with bench("atv21") as made:
+        await to_blocks(made, "F875")
+        await until(made.pilot, lambda: "unused" in shown(made.app, "first"))
+        await pick(made, "fd01")
+        await made.pilot.press("down")
+        await pick(made, "fd00")
+        await made.pilot.press("a")
+        await write(made)
+        await message(made, "after the drive's next reset")
+        await until(made.pilot, lambda: "pending" in shown(made.app, "first"))
+        made.drive().power_cycle()
+        await until(made.pilot, lambda: "F875 FD01" in shown(made.app, "first"))
+
+
+@pytest.mark.parametrize("family", ["atv312", "powerdrive"])
+async def test_a_family_without_blocks(family: str) -> None:
+    async with bench(family) as made:
+        await to_blocks(made, "neither")
+        for key in ("enter", "tab", "c", "F", "w", "v", "l", "right_square_bracket"):
+            await made.pilot.press(key)
+        assert isinstance(made.app.screen, BlocksScreen)
+        await made.pilot.press("2")
+        await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
