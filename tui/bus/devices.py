@@ -35,8 +35,8 @@ COPIES = 6
 """Replies of a device of which a copy may still come."""
 KNOWN = 4
 """Turnarounds that must be known before one can be called unusual."""
-UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 1.5, 0.002
-"""Shares of the shortest and the longest recent turnaround, and seconds, that are usual."""
+UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 2.0, 0.002
+"""Shares of the shortest recent turnaround and of their median, and seconds, that are usual."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,8 +179,9 @@ class Devices:
             return False
         if not any(reply == replied and pdu != asked for asked, replied in record.exchanges):
             return False
-        usual = (UNUSUAL_EARLY * min(recent), UNUSUAL_LATE * max(recent) + JITTER)
-        return not usual[0] <= turnaround <= usual[1]
+        # the median: one late reply must not make every lateness usual
+        early, late = UNUSUAL_EARLY * min(recent), UNUSUAL_LATE * median(recent) + JITTER
+        return not early <= turnaround <= late
 
     def answered(
         self,
