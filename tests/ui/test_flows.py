@@ -13,6 +13,7 @@ from textual.widgets import OptionList
 from tui.app import DrivePanelApp
 from tui.screens.actions import ACTIONS, EVERYWHERE
 from tui.screens.ask import Ask
+from tui.screens.blocks import BlocksScreen
 from tui.screens.confirm import Confirm
 from tui.screens.connection import ConnectionScreen
 from tui.screens.control_source import ControlSourceScreen
@@ -194,6 +195,7 @@ def test_every_action_has_a_method_and_words() -> None:
         ControlSourceScreen,
         FaultsScreen,
         ParametersScreen,
+        BlocksScreen,
     )
     owners = {(screen.TITLE or "connection").lower(): screen for screen in screens}
     for action in ACTIONS:

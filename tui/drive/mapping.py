@@ -42,7 +42,7 @@ class Assignment:
     def moved(self, place: int, step: int) -> Assignment:
         """The same with a slot's content one place up (-1) or down (1), the other one there."""
         other = place + step
-        if not 0 <= other < len(self.raws):
+        if not (0 <= place < len(self.raws) and 0 <= other < len(self.raws)):
             return self
         return self.with_raw(place, self.raws[other]).with_raw(other, self.raws[place])
 

@@ -8,7 +8,7 @@ HERE = (BLOCKS,)
 
 BLOCK_ACTIONS: tuple[Action, ...] = (
     Action("pick", "enter", "Enter", "pick", "Choose what the slot stands for.", HERE),
-    Action("other_table", "tab,left,right", "Tab", "side", "Inputs or outputs.", HERE),
+    Action("other_table", "tab,left,right", "Tab", "", "Inputs or outputs.", HERE, line=False),
     Action("move(-1)", "up", "Up", "", "One slot up.", HERE, line=False),
     Action("move(1)", "down", "Down", "", "One slot down.", HERE, line=False),
     Action(
@@ -24,10 +24,10 @@ BLOCK_ACTIONS: tuple[Action, ...] = (
         "shift(1)",
         "right_square_bracket",
         "]",
-        "move",
+        "",
         "Propose the slot's content one place down.",
         HERE,
-        both="[ ]",
+        line=False,
     ),
     Action("clear", "c", "c", "", "Propose the slot unused.", HERE, line=False),
     Action("factory", "F", "F", "", "Propose the factory assignment.", HERE, line=False),
@@ -46,5 +46,5 @@ BLOCK_ACTIONS: tuple[Action, ...] = (
         line=False,
     ),
     Action("words", "m", "m", "", "Choose the four user words.", HERE, line=False),
-    Action("leave", "escape,2", "Esc", "back", "Go back to Monitor.", HERE),
+    Action("leave", "escape,2", "Esc", "", "Go back to Monitor.", HERE, line=False),
 )
