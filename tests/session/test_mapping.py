@@ -13,14 +13,18 @@ import pytest
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.line import Reply
+from tui.drive import library
 from tui.drive.errors import ValueRefused
 from tui.drive.mapping import Assignment, block_of, empty, factory, pick
 from tui.drive.mapping_wire import frame, span
 from tui.drive.schema import Block
 from tui.drive.user_words import NO_WORDS, UserWord
+from tui.session.drive_session import DriveSession
+from tui.session.lines import open_line
 from tui.session.mapping import Force, Mapper, Verdict, wire_timing
 from tui.session.mapping_write import AssignmentRefused, exchange, write_assignment
 from tui.session.user_words import load_words, read_words, save_words
+from tui.simulator import DriveSpec, LineTiming, Simulation
 
 EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]
 EXAMPLE_OUT = ["CMD", "LFRD", "HSP", "LSP", "ACC", "DEC"]
@@ -423,3 +427,24 @@ async def test_the_timing_is_that_of_the_line() -> None:
         timing = wire_timing(here.session)
         assert timing.character == pytest.approx(10 / 19200, rel=0.11)
         assert 0 < timing.turnaround < 1
+
+
+async def test_trembling_values_of_a_real_line_are_no_difference() -> None:
+    sets = {"F875": 1, "F876": 2, "F877": 3, "F878": 4, "F879": 11}
+    timing = LineTiming(19200, "8N1", True)
+    simulation = Simulation([DriveSpec("atv21", 1, sets=sets, run_hz=35.0)], timing=timing)
+    simulation.start()
+    opened = open_line(f"serial:{simulation.serve_pty()},19200,8N1", wait=5.0)
+    try:
+        session = DriveSession(opened.line, 1, library.load("atv21"))
+        mapper = Mapper(session)
+        read = block_of(session.profile, "read")
+        assert read is not None
+        for _ in range(3):
+            view = await mapper.look(read)
+            assert Verdict.CHANGED not in {s.verdict for s in view.slots}
+            assert Force.PENDING not in {s.force for s in view.slots}
+            assert {s.verdict for s in view.slots} <= {Verdict.SAME, Verdict.MOVING}
+    finally:
+        opened.close()
+        simulation.stop()

@@ -9,7 +9,7 @@ comparison, with every parameter that could stand in it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
 from tui.bus.errors import DeviceException
@@ -137,11 +137,14 @@ class Mapper:
         """The slots of a block, what each brings, the same read directly, and the verdict.
 
         More rounds make surer: a slot differs only if every round says so, and is the same only
-        if every one says that.
+        if every one says that. Where a slot seems to differ, it is looked at again anyway.
         """
         held = await self.slots(block)
         view = await self._round(block, held)
-        for _ in range(rounds - 1):
+        for number in range(1, ROUNDS):
+            doubtful = any(slot.verdict is Verdict.DIFFERS for slot in view.slots)
+            if number >= rounds and not doubtful:
+                break
             again = await self._round(block, await self.slots(block))
             view = _both(view, again)
         return view
@@ -297,7 +300,10 @@ def compare(
     if parameter.bits:
         # between two words of bits: every bit as in one of them
         return Verdict.DIFFERS if (word ^ first) & (word ^ second) & 0xFFFF else Verdict.MOVING
-    return Verdict.MOVING if min(first, second) <= word <= max(first, second) else Verdict.DIFFERS
+    # a value that trembles may have been beyond both: as far again as it went between them
+    margin = abs(second - first)
+    within = min(first, second) - margin <= word <= max(first, second) + margin
+    return Verdict.MOVING if within else Verdict.DIFFERS
 
 
 def _both(one: BlockView, other: BlockView) -> BlockView:
@@ -313,11 +319,14 @@ def _two(one: Slot, other: Slot) -> Slot:
     if one.verdict != verdict and {one.verdict, verdict} <= _COMPARED:
         verdict = Verdict.MOVING
     force = other.force
-    if Force.PENDING in (one.force, other.force):
-        force = Force.PENDING
-    elif Force.ACTIVE in (one.force, other.force):
+    if one.force is not other.force:
         # one comparison that leaves a single parameter is enough, if none speaks against it
-        force = Force.ACTIVE
+        against = Force.PENDING in (one.force, other.force)
+        force = Force.UNPROVED if against else Force.ACTIVE
+    if verdict is Verdict.MOVING and other.verdict is Verdict.DIFFERS:
+        # its value of the round in which it fitted
+        other = replace(other, word=one.word, text=one.text, direct=one.direct, brings="")
+    brings = other.brings if force is Force.PENDING else ""
     return Slot(
         other.code,
         other.raw,
@@ -327,7 +336,7 @@ def _two(one: Slot, other: Slot) -> Slot:
         other.direct,
         verdict,
         force,
-        other.brings or one.brings,
+        brings,
     )
 
 

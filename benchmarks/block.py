@@ -1,0 +1,168 @@
+"""Cycle time of Monitor with and without an indirect block or scanner, on a real-time line.
+
+    python -m benchmarks.block [--bauds 9600,19200] [--seconds S]
+
+The same drive, the same values: first with every slot unused, then with slots that stand for
+some of them. Times of cycles are taken between snapshots; the
+design is what the read plan counts.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import time
+from dataclasses import asdict, dataclass
+from itertools import pairwise
+from statistics import median
+
+from rich.console import Console
+from rich.table import Table
+
+from tui.drive.library import load
+from tui.drive.mapping import block_of, empty, pick
+from tui.drive.mapping_wire import cost
+from tui.drive.profile import Profile
+from tui.drive.read_plan import WireTiming
+from tui.session.drive_session import DriveSession
+from tui.session.lines import open_line
+from tui.session.monitor import Snapshot, rates_of
+from tui.simulator import DriveSpec, LineTiming, Simulation
+
+EIGHT = ("ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT")
+CASES: tuple[tuple[str, str, tuple[str, ...], tuple[str, ...]], ...] = (
+    ("atv21", "monitoring", (), ("FD01", "FD00", "FE03", "FE05", "FE90")),
+    ("atv71", "monitoring", (), ("RFRD", "ETA", "LCR", "OTR", "ULN", "THD", "THR", "LFT")),
+    ("atv71", "manual's eight", EIGHT, EIGHT),
+)
+"""Family, name of the set of values, its codes (the monitoring set's fast ones where there are
+none), and what the slots stand for."""
+RUN_HZ = 35.0
+PROVED_WITHIN = 30.0
+"""Seconds in which the monitor must have begun to use the block."""
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """One family at one baud, without or with its block; times in ms."""
+
+    family: str
+    set: str
+    baud: int
+    block: str
+    values: int
+    requests: int
+    design_ms: float
+    cycle_ms: float | None
+    cycles: int
+    used: float
+    """Share of the cycles that came through the block."""
+
+
+def slots_for(profile: Profile, codes: tuple[str, ...]) -> dict[str, int]:
+    """Raw values of the slots of the read block, standing for these from the first on."""
+    block = block_of(profile, "read")
+    assert block is not None
+    plan = empty(block)
+    for place, code in enumerate(codes):
+        plan = pick(profile, plan, place, code)
+    return plan.slots
+
+
+async def measured(
+    case: tuple[str, str, tuple[str, ...], tuple[str, ...]],
+    baud: int,
+    seconds: float,
+    *,
+    with_block: bool,
+) -> Row:
+    """Let Monitor run on a drive, and take the time of its cycles."""
+    family, name, given, stand = case
+    profile = load(family)
+    codes = given or rates_of(profile).fast
+    line_timing = LineTiming(baud, "8N1", True)
+    spec_turnaround = float(profile.data.link.turnaround_ms) / 1000
+    timing = WireTiming(line_timing.character, line_timing.silence, spec_turnaround)
+    block = block_of(profile, "read")
+    assert block is not None
+    slots = slots_for(profile, stand if with_block else ())
+    simulation = Simulation([DriveSpec(family, 1, sets=slots, run_hz=RUN_HZ)], timing=line_timing)
+    simulation.start()
+    opened = open_line(f"serial:{simulation.serve_pty()},{baud},8N1", wait=5.0)
+    session = DriveSession(opened.line, 1, profile)
+    taken: list[Snapshot] = []
+    session.monitor.listen(taken.append)
+    try:
+        session.monitor.start(list(codes), period=0.05)
+        await _settled(taken, with_block=with_block)
+        taken.clear()
+        await asyncio.sleep(seconds)
+    finally:
+        session.close()
+        opened.close()
+        simulation.stop()
+    good = [one for one in taken if not one.error]
+    gaps = [b.time - a.time for a, b in pairwise(good)]
+    counted = cost(profile, codes, timing, slots if with_block else {})
+    return Row(
+        family=family,
+        set=name,
+        baud=baud,
+        block=block.name if with_block else "",
+        values=len(codes),
+        requests=counted.requests,
+        design_ms=counted.microseconds / 1000,
+        cycle_ms=median(gaps) * 1000 if gaps else None,
+        cycles=len(good),
+        used=sum(bool(one.block) for one in good) / len(good) if good else 0.0,
+    )
+
+
+async def _settled(taken: list[Snapshot], *, with_block: bool) -> None:
+    """Wait until the monitor knows the drive's turnaround, and uses the block if it shall."""
+    end = time.monotonic() + PROVED_WITHIN
+    while time.monotonic() < end:
+        if len(taken) > 5 and (not with_block or taken[-1].block):
+            return
+        await asyncio.sleep(0.05)
+
+
+def main() -> None:
+    """Measure, print the table, and all figures as JSON in the last line."""
+    parser = argparse.ArgumentParser(description="Monitor with and without a block.")
+    parser.add_argument("--bauds", default="9600,19200")
+    parser.add_argument("--seconds", type=float, default=10.0, help="length of a run")
+    given = parser.parse_args()
+    console = Console(width=120)
+    table = Table(title="Cycle of Monitor in ms, without and with the block")
+    for heading in (
+        "drive", "set", "baud", "block", "values", "requests", "design", "measured", "cycles",
+        "used",
+    ):  # fmt: skip
+        table.add_column(
+            heading, justify="left" if heading in ("drive", "set", "block") else "right"
+        )
+    rows = []
+    for case in CASES:
+        for baud in map(int, given.bauds.split(",")):
+            for with_block in (False, True):
+                row = asyncio.run(measured(case, baud, given.seconds, with_block=with_block))
+                rows.append(row)
+                cycle = f"{row.cycle_ms:.1f}" if row.cycle_ms else "-"
+                table.add_row(
+                    row.family, row.set, str(baud), row.block or "none", str(row.values),
+                    str(row.requests),
+                    f"{row.design_ms:.1f}", cycle, str(row.cycles), f"{row.used:.0%}",
+                )  # fmt: skip
+    console.print(table)
+    console.print(
+        "The panel leaves a part of the line to its operator, and learns the slots again now and"
+        " then: cycles are longer than the design by that. The cost of a scanner holds the read"
+        " of its slots after each use."
+    )
+    print(json.dumps({"benchmark": "block", "rows": [asdict(row) for row in rows]}))
+
+
+if __name__ == "__main__":
+    main()
