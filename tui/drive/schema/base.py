@@ -1,0 +1,30 @@
+"""What the tables of a profile have in common: the kinds of numbers and texts they hold."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta, Struct
+
+WordAddress = Annotated[int, Meta(ge=0, le=0xFFFF)]
+RawWord = Annotated[int, Meta(ge=-0x8000, le=0xFFFF)]
+DeviceAddress = Annotated[int, Meta(ge=0, le=255)]
+DecimalText = Annotated[str, Meta(pattern=r"^[0-9]+(\.[0-9]+)?$")]
+Identifier = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")]
+BitNumber = Annotated[int, Meta(ge=0, le=15)]
+
+Confidence = Literal["manual", "manual+public", "public-x2", "public", "analogy", "unverified"]
+"""How surely a fact is known, best first; below `public` it is shown as unverified."""
+
+Effective = Literal["at-once", "after-reset"]
+
+
+class Table(Struct, frozen=True, forbid_unknown_fields=True):
+    """One table of a profile: frozen, and an unknown key in it is an error."""
+
+
+class When(Table, frozen=True, kw_only=True):
+    """A condition on another parameter's raw value."""
+
+    parameter: str
+    values: list[int]

@@ -1,0 +1,176 @@
+"""The state chart of a drive: its states, and what may be ordered in them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .base import BitNumber, Confidence, Identifier, RawWord, Table, When, WordAddress
+
+StateKind = Literal[
+    "starting", "blocked", "ready", "stopped", "running", "stopping", "fault", "unknown"
+]
+
+
+class State(Table, frozen=True, kw_only=True):
+    """A state of the drive, recognised in a status word; the first that fits counts."""
+
+    id: Identifier
+    name: str
+    kind: StateKind
+    mask: WordAddress
+    value: WordAddress
+
+
+class Transition(Table, frozen=True, kw_only=True):
+    """A command that takes the drive from one state to another."""
+
+    number: str = ""
+    source: Identifier
+    target: Identifier
+    command: RawWord | None = None
+    """Command word that makes it; absent where the drive goes by itself."""
+    edge_bit: BitNumber | None = None
+    name: str = ""
+
+
+class DirectionBit(Table, frozen=True, kw_only=True):
+    """A status bit that tells the direction of rotation."""
+
+    parameter: str
+    bit: BitNumber
+    reverse: Literal[0, 1] = 1
+
+
+class StatusBit(Table, frozen=True, kw_only=True):
+    """A status bit with a meaning of its own and the value at which it holds."""
+
+    parameter: str
+    bit: BitNumber
+    value: Literal[0, 1] = 1
+
+
+class ChannelBits(Table, frozen=True, kw_only=True):
+    """Some bits of a word that tell who commands the drive."""
+
+    parameter: str
+    shift: Annotated[int, Meta(ge=0, le=15)]
+    mask: Annotated[int, Meta(ge=1, le=0xFFFF)]
+    """Mask of the value after it was shifted down."""
+    names: dict[str, str]
+
+
+OrderId = Literal[
+    "forward",
+    "reverse",
+    "stop",
+    "quick-stop",
+    "freewheel",
+    "emergency-stop",
+    "dc-braking",
+    "reset",
+    "take-control",
+    "hand-back",
+]
+
+
+class Order(Table, frozen=True, kw_only=True):
+    """What a person may order of a drive, as the words that are written one after another.
+
+    Of several orders with one id the first counts whose states and conditions hold.
+    """
+
+    id: OrderId
+    name: str
+    words: list[RawWord]
+    parameter: str = ""
+    """Where the words go; the chart's command word where empty."""
+    states: list[Identifier] = []
+    """States in which it may be given; any where empty."""
+    when: list[When] = []
+    """Raw values that must be known and hold."""
+    broadcast: bool = False
+    """True where its word can start no motor on any drive that hears it."""
+    note: str = ""
+    confidence: Confidence = "manual"
+
+
+class Interlock(Table, frozen=True, kw_only=True):
+    """What must hold before an order that can move the motor is sent."""
+
+    parameter: str
+    mask: WordAddress = 0xFFFF
+    values: list[int]
+    """Raw values, behind the mask, with which it may be given."""
+    orders: list[OrderId] = []
+    """Orders that it holds for; those that run or brake where empty."""
+    when: list[When] = []
+    """Raw values with which it counts at all."""
+    text: str
+    """What is wrong otherwise, as a sentence."""
+    remedy: str = ""
+
+
+class OptionChoice(Table, frozen=True, kw_only=True):
+    """One setting of an option: the bits behind its mask, and their name."""
+
+    bits: WordAddress
+    name: str
+
+
+class CommandOption(Table, frozen=True, kw_only=True):
+    """Bits of a command word that stay as they are from order to order."""
+
+    id: Identifier
+    name: str
+    parameter: str
+    mask: WordAddress
+    choices: list[OptionChoice]
+    stopped_only: bool = False
+    note: str = ""
+    confidence: Confidence = "manual"
+
+
+class Chart(Table, frozen=True, kw_only=True):
+    """A state chart: how the status word tells the state, and how commands change it."""
+
+    id: Identifier
+    name: str
+    kind: Literal["drivecom", "io", "altivar21", "leroy-somer"]
+    when: When | None = None
+    """Where it applies; absent: always, or where no other does."""
+    status: str
+    command: str = ""
+    states: list[State]
+    transitions: list[Transition] = []
+    orders: list[Order] = []
+    interlocks: list[Interlock] = []
+    options: list[CommandOption] = []
+    direction: DirectionBit | None = None
+    reached: StatusBit | None = None
+    alarm: StatusBit | None = None
+    local: StatusBit | None = None
+    channel: ChannelBits | None = None
+    note: str = ""
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class CommandExample(Table, frozen=True, kw_only=True):
+    """A whole command word with what it does, for the person who reads words."""
+
+    word: WordAddress
+    does: str
+    note: str = ""
+    confidence: Confidence = "manual"
+
+
+class Reference(Table, frozen=True, kw_only=True):
+    """A way to give the drive its frequency or speed."""
+
+    parameter: str
+    kind: Literal["frequency", "speed"]
+    signed: bool = False
+    feedback: str = ""
+    note: str = ""

@@ -1,0 +1,37 @@
+"""Who commands the drive and who gives its reference, and the settings that make it so."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from .base import Identifier, RawWord, Table
+
+
+class Setting(Table, frozen=True, kw_only=True):
+    """A parameter and the raw value that it is to hold."""
+
+    parameter: str
+    value: RawWord
+
+
+class Way(Table, frozen=True, kw_only=True):
+    """Where the command or the reference comes from, and what chooses between two sources."""
+
+    sources: Annotated[list[str], Meta(min_length=1, max_length=2)]
+    """One source, or two: that without the switch and that with it."""
+    switch: str = ""
+
+
+class ControlSource(Table, frozen=True, kw_only=True):
+    """A configuration of who commands the drive and who gives its reference."""
+
+    id: Identifier
+    name: str
+    command: Way
+    reference: Way
+    settings: list[Setting]
+    """What makes it, in the order in which it is written."""
+    note: str = ""
+    source: str = ""

@@ -1,0 +1,74 @@
+"""What a profile says of itself, and how a drive of its family is recognised."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .base import BitNumber, Identifier, Table
+
+
+class Source(Table, frozen=True, kw_only=True):
+    """A document that facts were taken from."""
+
+    id: Identifier
+    title: str
+    note: str = ""
+
+
+class Erratum(Table, frozen=True, kw_only=True):
+    """A place where a manual is wrong or contradicts itself, and what this profile follows."""
+
+    place: str
+    printed: str
+    right: str
+    why: str = ""
+
+
+class Head(Table, frozen=True, kw_only=True):
+    """The first table of a profile, all that a listing reads."""
+
+    id: Identifier
+    name: str
+    vendor: str
+    version: str
+    summary: str = ""
+
+
+class IdentificationObject(Table, frozen=True, kw_only=True):
+    """One object of the answer to function 43/14."""
+
+    id: Annotated[int, Meta(ge=0, le=255)]
+    meaning: Literal["vendor", "reference", "version", "name"]
+    example: str = ""
+    """What a simulated drive answers."""
+
+
+class Model(Table, frozen=True, kw_only=True):
+    """A model known by a code word of the drive, with its rating."""
+
+    code: int
+    reference: str = ""
+    voltage: str = ""
+    power_kw: str = ""
+    variant: str = ""
+    class_b: bool = False
+
+
+class Identification(Table, frozen=True, kw_only=True):
+    """How a drive of this family is recognised."""
+
+    reference_prefixes: list[str] = []
+    """Beginnings of object 1 (reference) that belong to this family."""
+    objects: list[IdentificationObject] = []
+    conformity: int = 1
+    highest_read_device_id: Annotated[int, Meta(ge=1, le=4)] = 1
+    exception_has_mei_byte: bool = False
+    """True where a refused function 43 is answered with the MEI byte before the code."""
+    model_parameter: str = ""
+    class_parameter: str = ""
+    class_bit: BitNumber | None = None
+    models: list[Model] = []
+    note: str = ""
+    source: str = ""

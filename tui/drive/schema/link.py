@@ -1,0 +1,135 @@
+"""The drive on the line: link settings, slave addresses, functions, exceptions and wiring."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .base import DecimalText, DeviceAddress, RawWord, Table, WordAddress
+
+PastLimit = Literal["exception", "silence"]
+
+
+class LinkChoice(Table, frozen=True, kw_only=True):
+    """One raw value of a link setting and what it means on the line."""
+
+    raw: RawWord
+    text: str
+    baud: int | None = None
+    format: Annotated[str, Meta(pattern=r"^8[NEO][12]$")] | None = None
+    parity: Literal["N", "E", "O"] | None = None
+    note: str = ""
+
+
+class LinkSetting(Table, frozen=True, kw_only=True):
+    """A parameter of the drive that sets its side of the line."""
+
+    parameter: str
+    role: Literal["address", "baud", "format", "parity", "protocol", "timeout", "delay"]
+    factory: RawWord | None = None
+    choices: list[LinkChoice] = []
+    note: str = ""
+
+
+class Link(Table, frozen=True, kw_only=True):
+    """Line settings of the drive as it leaves the factory, and the parameters behind them."""
+
+    baud: int
+    format: Annotated[str, Meta(pattern=r"^8[NEO][12]$")]
+    formats: list[str] = []
+    bauds: list[int] = []
+    end_of_frame_characters: DecimalText = "3.5"
+    turnaround_ms: DecimalText = "5"
+    """Turnaround a simulated drive shows, in ms."""
+    settings: list[LinkSetting] = []
+    note: str = ""
+    source: str = ""
+
+
+class Server(Table, frozen=True, kw_only=True):
+    """A further Modbus server in the same drive, at an address of its own."""
+
+    parameter: str
+    name: str
+    note: str = ""
+
+
+class Addresses(Table, frozen=True, kw_only=True):
+    """Slave addresses a drive of this family takes."""
+
+    first: DeviceAddress = 1
+    last: DeviceAddress = 247
+    factory: DeviceAddress = 1
+    broadcast: DeviceAddress | None = 0
+    zero_digit_is_group: bool = False
+    """True where an address with a zero digit (10, 20, 105) calls a group of drives."""
+    off: int | None = None
+    """Raw address at which the drive's server is switched off."""
+    servers: list[Server] = []
+    note: str = ""
+    source: str = ""
+
+
+class Function(Table, frozen=True, kw_only=True):
+    """A Modbus function the drive supports, and its limits."""
+
+    code: Annotated[int, Meta(ge=1, le=127)]
+    name: str
+    max_read: Annotated[int, Meta(ge=1, le=125)] | None = None
+    max_write: Annotated[int, Meta(ge=1, le=123)] | None = None
+    broadcast: bool = False
+    past_limit: PastLimit = "exception"
+    past_limit_exception: int = 3
+    subfunctions: list[int] = []
+    note: str = ""
+    source: str = ""
+
+
+class Reading(Table, frozen=True, kw_only=True):
+    """Which shapes of a read the drive answers."""
+
+    single_words_only: bool = False
+    """True where only one word, or a block declared below, can be read."""
+    unknown_word: WordAddress | None = None
+    """Word that stands for an unknown or protected parameter inside a longer read."""
+    unknown_exception: int | None = 2
+    """Exception for a read of unknown words only; absent where the manual names none."""
+    gaps_readable: bool = False
+    """True where a read may run over addresses that carry no parameter."""
+    note: str = ""
+    source: str = ""
+
+
+class ExceptionCode(Table, frozen=True, kw_only=True):
+    """What an exception code means on this family."""
+
+    code: Annotated[int, Meta(ge=1, le=255)]
+    name: str
+    meaning: str
+    remedy: str = ""
+
+
+class Pin(Table, frozen=True, kw_only=True):
+    """One pin of a connector."""
+
+    pin: str
+    signal: str
+    note: str = ""
+
+
+class Connector(Table, frozen=True, kw_only=True):
+    """A connector of the drive and its pins."""
+
+    name: str
+    pins: list[Pin]
+    warnings: list[str] = []
+    source: str = ""
+
+
+class LineRule(Table, frozen=True, kw_only=True):
+    """A rule for the wiring of the line."""
+
+    subject: str
+    rule: str
+    source: str = ""

@@ -1,0 +1,96 @@
+"""What is watched of a drive, its faults, and its own watch over the line."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .base import Confidence, RawWord, Table
+
+
+class MonitoringValue(Table, frozen=True, kw_only=True):
+    """One value of the monitoring set."""
+
+    parameter: str
+    rate: Literal["fast", "slow", "on-change"] = "fast"
+    """When it is read: in every cycle, in every tenth, or when the state has changed."""
+    low: str = ""
+    """Lower end of its bar, in its unit."""
+    high: str = ""
+    """Upper end of its bar, in its unit, or the code of a parameter that holds it."""
+
+
+class SpeedFormula(Table, frozen=True, kw_only=True):
+    """Speed in rpm from the raw output frequency and the motor's poles."""
+
+    frequency: str
+    poles: str
+    result: str = ""
+    note: str = ""
+
+
+class Monitoring(Table, frozen=True, kw_only=True):
+    """What is watched: the values, in the order of a print-out."""
+
+    values: list[MonitoringValue]
+    speed_from: SpeedFormula | None = None
+    note: str = ""
+
+
+class FaultCode(Table, frozen=True, kw_only=True):
+    """A fault of the drive."""
+
+    raw: Annotated[int, Meta(ge=0, le=0xFFFF)]
+    code: str
+    name: str
+    cause: str = ""
+    remedy: str = ""
+
+
+class Faults(Table, frozen=True, kw_only=True):
+    """Where faults are read and what their codes mean."""
+
+    parameter: str = ""
+    """The parameter that holds the present or last fault."""
+    shows_last: bool = False
+    """True where it keeps the last fault after the fault is gone."""
+    history: list[str] = []
+    stored: list[list[str]] = []
+    """What the drive keeps of the moment of each fault of its history, in the same order."""
+    codes: list[FaultCode] = []
+    none: int = 0
+    note: str = ""
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class Reaction(Table, frozen=True, kw_only=True):
+    """What the drive does when the line has gone silent."""
+
+    raw: RawWord
+    code: str = ""
+    name: str
+    does: str
+    trips: bool
+    motor_keeps_running: bool = False
+    never_set: bool = False
+    """True where it makes a lost line go unnoticed: it is set at the keypad, or not at all."""
+
+
+class CommunicationFault(Table, frozen=True, kw_only=True):
+    """The drive's watch over the line."""
+
+    timeout: str
+    off: int | None = None
+    """Raw time-out at which the watch is off."""
+    reaction: str = ""
+    reactions: list[Reaction] = []
+    starts: str
+    """When the watch begins, in words."""
+    needs_write: bool = False
+    """True where it begins only after a command or reference was written."""
+    fault: int | None = None
+    warnings: list[str] = []
+    note: str = ""
+    source: str = ""

@@ -1,0 +1,181 @@
+"""One parameter: where it lies, how its raw value is read, who may write it and when."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from msgspec import Meta
+
+from .base import BitNumber, Confidence, DecimalText, Effective, Identifier, Table, WordAddress
+
+WordType = Literal["uint16", "int16", "uint32", "int32"]
+Access = Literal["r", "rw", "rw-stopped", "w"]
+Storage = Literal["ram", "eeprom", "ram-until-saved", "unknown"]
+
+
+class Enumeration(Table, frozen=True, kw_only=True):
+    """Named raw values shared by several parameters; keys are raw values in decimal."""
+
+    id: Identifier
+    values: dict[str, str]
+
+
+class Bit(Table, frozen=True, kw_only=True):
+    """One named bit of a word."""
+
+    bit: BitNumber
+    name: str
+    off: str = ""
+    on: str = ""
+    alarm: bool = False
+    """True where a set bit is an alarm."""
+    note: str = ""
+
+
+class ScaleBy(Table, frozen=True, kw_only=True):
+    """A scale that follows another parameter's raw value (ramps after Inr)."""
+
+    parameter: str
+    scales: dict[str, DecimalText]
+    absent: DecimalText | None = None
+    """Scale where the drive says that it has no such parameter; without it the scale is unknown."""
+
+
+class UnitBy(Table, frozen=True, kw_only=True):
+    """A unit told by some bits of another parameter (counters of energy and time)."""
+
+    parameter: str
+    shift: Annotated[int, Meta(ge=0, le=15)]
+    mask: Annotated[int, Meta(ge=1, le=0xFFFF)]
+    """Mask of the value after it was shifted down."""
+    units: dict[str, str]
+
+
+Quantity = Literal[
+    "command_word",
+    "command_word_2",
+    "extended_command_word",
+    "status_word",
+    "status_word_2",
+    "status_word_3",
+    "extended_status_word",
+    "alarm_word",
+    "life_alarm_word",
+    "output_frequency",
+    "frequency_reference",
+    "ramp_output",
+    "speed",
+    "speed_reference",
+    "motor_current",
+    "motor_voltage",
+    "mains_voltage",
+    "dc_bus",
+    "torque",
+    "power",
+    "input_power",
+    "drive_thermal",
+    "motor_thermal",
+    "motor_load",
+    "drive_load",
+    "energy",
+    "run_hours",
+    "power_on_hours",
+    "fault",
+    "fault_history_1",
+    "fault_history_2",
+    "fault_history_3",
+    "fault_history_4",
+    "fault_history_5",
+    "fault_history_6",
+    "fault_history_7",
+    "fault_history_8",
+    "digital_inputs",
+    "digital_outputs",
+    "analogue_input_1",
+    "analogue_input_2",
+    "command_channel",
+    "reference_channel",
+    "command_frequency",
+    "command_speed",
+    "acceleration",
+    "deceleration",
+    "acceleration_2",
+    "deceleration_2",
+    "ramp_increment",
+    "high_speed",
+    "low_speed",
+    "max_frequency",
+    "rated_frequency",
+    "rated_voltage",
+    "rated_current",
+    "rated_speed",
+    "motor_poles",
+    "drive_current",
+    "thermal_current",
+    "switching_frequency",
+    "access_level",
+    "control_profile",
+    "save_settings",
+    "line_address",
+    "line_baud",
+    "line_format",
+    "line_timeout",
+    "line_fault_reaction",
+    "preset_speed_1",
+    "preset_speed_2",
+    "preset_speed_3",
+    "preset_speed_4",
+    "preset_speed_5",
+    "preset_speed_6",
+    "preset_speed_7",
+    "stop_type",
+    "drive_reference",
+    "software_version",
+]
+"""What a parameter means across families: the same name, the same thing."""
+
+
+class Parameter(Table, frozen=True, kw_only=True):
+    """One word (or pair of words) of a drive."""
+
+    code: str
+    name: str
+    number: str
+    """Address as the manual writes it: W9001, 16#FD00, 1.05."""
+    address: WordAddress
+    type: WordType = "uint16"
+    low_word_first: bool = True
+    """Order of the two words of a 32-bit value."""
+    unit: str = ""
+    scale: DecimalText = "1"
+    scale_by: ScaleBy | None = None
+    unit_by: UnitBy | None = None
+    base: str = ""
+    """What a percentage is a percentage of, as far as it is known."""
+    rating: str = ""
+    """Parameter that carries 100 % in a physical unit, where the value is a percentage."""
+    min: int | None = None
+    max: int | None = None
+    min_from: str = ""
+    max_from: str = ""
+    """Parameters that limit this one further (LSP..HSP)."""
+    factory: int | None = None
+    factory_text: str = ""
+    """Factory setting in words where it depends on the rating or the market."""
+    enumeration: str = ""
+    values: dict[str, str] = {}
+    """Names of raw values; of special ones where the parameter is a number."""
+    bits: list[Bit] = []
+    reserved: list[BitNumber] = []
+    """Bits that must never be written as 1."""
+    access: Access
+    storage: Storage = "unknown"
+    effective: Effective = "at-once"
+    group: str
+    quantity: Quantity | None = None
+    """What the parameter means across families; at most one parameter a quantity."""
+    forbidden: str = ""
+    """Why the panel never writes it, where it must not."""
+    note: str = ""
+    source: str
+    confidence: Confidence
