@@ -9,19 +9,18 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from .backup import profile_option
 from .errors import DONE, DRIVE_REFUSED, USAGE, Failure, told
 from .options import (
     Target,
     connect,
-    device_option,
     json_option,
     line_argument,
     on_line,
     read_only_option,
+    settings_options,
 )
 from .orders import arm_option, need_arming
-from .sets import dry_run_option
+from .sets import dry_run_option, write_down
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -57,19 +56,16 @@ class Wanted:
 @arm_option
 @json_option
 @read_only_option
-@profile_option
-@device_option
+@settings_options
 @told
 def block(
-    line_text: str,
+    target: Target,
     action: str,
     words: tuple[str, ...],
     dry_run: bool,
     arm: bool,
     as_json: bool,
     read_only: bool,
-    profile_id: str | None,
-    device: int,
 ) -> None:
     """Show, compare or change what a drive's indirect blocks or communication scanner bring.
 
@@ -89,13 +85,12 @@ def block(
     writes = action in WRITING and not dry_run
     if writes:
         need_arming(arm, "this changes what the drive's blocks stand for")
-    target = Target(line_text, device, profile_id)
 
     async def work(opened: OpenLine) -> int:
         session = await connect(opened, target)
-        return await _carry_out(session, line_text, wanted)
+        return await _carry_out(session, target.line_text, wanted)
 
-    status = on_line(line_text, work, read_only=read_only or not writes)
+    status = on_line(target.line_text, work, read_only=read_only or not writes)
     if status != DONE:
         raise click.exceptions.Exit(status)
 
@@ -151,17 +146,12 @@ def _status(views: list[BlockView]) -> int:
 
 def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
     from tui.drive.mapping_file import dumps
-    from tui.drive.parameter_set import SetError
-    from tui.drive.set_file import write_file
 
     plans = [plan for view in views if (plan := view.plan) is not None]
     if len(plans) != len(views):
         raise Failure("Not every slot could be read; nothing was saved.", DRIVE_REFUSED)
     note = f"{session.profile.name}, device {session.device}, {session.line_text}"
-    try:
-        write_file(file, dumps(session.profile, plans, note))
-    except SetError as error:
-        raise Failure(str(error), USAGE) from error
+    write_down(file, dumps(session.profile, plans, note))
     click.echo(f"{file}: {sum(len(plan.raws) for plan in plans)} slots of {session.profile.name}")
     return DONE
 

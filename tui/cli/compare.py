@@ -7,15 +7,13 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .backup import take_set
 from .errors import USAGE, Failure, told
-from .options import Target, connect, on_line
-from .sets import set_in
+from .options import Target, devices_option
+from .sets import set_in, set_of_drive
 
 if TYPE_CHECKING:
     from tui.drive.compare import Format
     from tui.drive.parameter_set import ParameterSet
-    from tui.session.lines import OpenLine
 
 FACTORY = "factory"
 DIFFERENT = 1
@@ -34,15 +32,7 @@ DIFFERENT = 1
     help="Form of the table.",
 )
 @click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drives.")
-@click.option(
-    "-d",
-    "--device",
-    "devices",
-    type=click.IntRange(1, 247),
-    multiple=True,
-    metavar="ADDRESS",
-    help="Slave address of the drive; twice where A and B are two drives.",
-)
+@devices_option("Slave address of the drive; twice where A and B are two drives.")
 @told
 def compare(
     a: str,
@@ -95,8 +85,4 @@ def _set_of(text: str, target: Target) -> ParameterSet:
         return set_in(Path(text))
     if Path(text).suffix == ".toml":
         raise Failure(f"{text} is not there.", USAGE)
-
-    async def work(opened: OpenLine) -> ParameterSet:
-        return await take_set(await connect(opened, target))
-
-    return on_line(text, work, read_only=True)
+    return set_of_drive(target)[1]

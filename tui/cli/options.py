@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import functools
 from collections.abc import Callable, Coroutine
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -16,6 +17,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 Command = Callable[..., Any]
+Option = Callable[[Command], Command]
 
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
@@ -25,33 +27,40 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON a
 
 read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
 
-
+SLAVE_ADDRESS = click.IntRange(1, 247)
 device_option = click.option(
     "-d",
     "--device",
-    type=click.IntRange(1, 247),
+    type=SLAVE_ADDRESS,
     default=1,
     show_default=True,
     metavar="ADDRESS",
     help="Slave address of the drive.",
 )
+profile_option = click.option(
+    "-p", "--profile", "profile_id", metavar="ID", help="Profile of the drive."
+)
+rated_current_option = click.option(
+    "--rated-current",
+    "rated_current",
+    type=float,
+    metavar="A",
+    help="Rated current of the drive in A, for families that give currents in %.",
+)
 
 
-def drive_options(command: Command) -> Command:
-    """Which drive on the line, and by which profile."""
-    for option in (
-        click.option(
-            "--rated-current",
-            "rated_current",
-            type=float,
-            metavar="A",
-            help="Rated current of the drive in A, for families that give currents in %.",
-        ),
-        click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drive."),
-        device_option,
-    ):
-        command = option(command)
-    return command
+def devices_option(help_text: str, **more: Any) -> Option:
+    """The option -d of a command that takes several drives; `more` goes to click."""
+    return click.option(
+        "-d",
+        "--device",
+        "devices",
+        type=SLAVE_ADDRESS,
+        multiple=True,
+        metavar="ADDRESS",
+        help=help_text,
+        **more,
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,6 +71,34 @@ class Target:
     device: int
     profile_id: str | None
     rated_current: float | None = None
+
+
+def _target_of(*options: Option) -> Option:
+    """Options that, with the LINE of `line_argument`, reach the command as one `target`."""
+
+    def decorate(command: Command) -> Command:
+        @functools.wraps(command)
+        def handed_over(
+            line_text: str,
+            device: int,
+            profile_id: str | None,
+            rated_current: float | None = None,
+            **others: Any,
+        ) -> Any:
+            return command(target=Target(line_text, device, profile_id, rated_current), **others)
+
+        decorated: Command = handed_over
+        for option in reversed(options):
+            decorated = option(decorated)
+        return decorated
+
+    return decorate
+
+
+drive_options = _target_of(device_option, profile_option, rated_current_option)
+"""Which drive on the line, and by which profile, for commands that show values."""
+settings_options = _target_of(profile_option, device_option)
+"""The same for commands about settings, where a current is a word like any other."""
 
 
 def on_line(

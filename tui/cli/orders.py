@@ -209,11 +209,8 @@ def _ordered(
 @read_only_option
 @told
 def reference(
-    line_text: str,
+    target: Target,
     text: str,
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
     arm: bool,
     read_only: bool,
 ) -> None:
@@ -224,7 +221,7 @@ def reference(
         commander = desk.commander
         return (await carried_out(commander, lambda: commander.refer(text))).text
 
-    _ordered(Target(line_text, device, profile_id, rated_current), read_only, work)
+    _ordered(target, read_only, work)
 
 
 @click.command()
@@ -234,10 +231,7 @@ def reference(
 @read_only_option
 @told
 def reset(
-    line_text: str,
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
+    target: Target,
     arm: bool,
     read_only: bool,
 ) -> None:
@@ -249,7 +243,7 @@ def reset(
         await _out_of_fault(desk, outcome)
         return f"{outcome.text.partition(':')[0]}: {desk.latest.state.headline}"
 
-    _ordered(Target(line_text, device, profile_id, rated_current), read_only, work)
+    _ordered(target, read_only, work)
 
 
 async def _out_of_fault(desk: Desk, outcome: Outcome) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .errors import USAGE, Failure, told
-from .options import read_only_option
+from .options import SLAVE_ADDRESS, read_only_option
 from .signals import ending_by_signal
 
 if TYPE_CHECKING:
@@ -106,7 +106,7 @@ def demo(low_bandwidth: bool, on_hangup: str) -> None:
 @click.option(
     "-d",
     "--device",
-    type=click.IntRange(1, 247),
+    type=SLAVE_ADDRESS,
     metavar="ADDRESS",
     help="Watch the drive at this slave address at once; without it, look for drives.",
 )

@@ -31,11 +31,8 @@ if TYPE_CHECKING:
 @json_option
 @told
 def read(
-    line_text: str,
+    target: Target,
     codes: tuple[str, ...],
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
@@ -46,16 +43,14 @@ def read(
     """
     from .output import print_json, print_readings, readings_json
 
-    target = Target(line_text, device, profile_id, rated_current)
-
     async def work(opened: OpenLine) -> tuple[DriveSession, dict[str, Reading]]:
         session = await connect(opened, target)
         wanted = [session.profile.find(code).code for code in codes]
         return session, await session.read(wanted)
 
-    session, readings = on_line(line_text, work, read_only=read_only)
+    session, readings = on_line(target.line_text, work, read_only=read_only)
     if as_json:
-        print_json(readings_json(line_text, session, readings))
+        print_json(readings_json(target.line_text, session, readings))
     else:
         print_readings(readings)
     refused = [reading for reading in readings.values() if reading.raw is None]

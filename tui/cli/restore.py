@@ -8,15 +8,23 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .backup import profile_option
 from .errors import DONE, DRIVE_REFUSED, status_of, told
-from .options import Target, connect, line_argument, on_line, read_only_option
+from .options import (
+    Target,
+    connect,
+    devices_option,
+    line_argument,
+    on_line,
+    profile_option,
+    read_only_option,
+)
 from .orders import arm_option, need_arming
 from .sets import (
     codes_of,
     confirm_option,
     counter,
     dry_run_option,
+    file_argument,
     save_option,
     say_afterwards,
     say_result,
@@ -36,7 +44,7 @@ NAMED = 12
 
 @click.command()
 @line_argument
-@click.argument("file", type=click.Path(path_type=Path))
+@file_argument
 @dry_run_option
 @arm_option
 @click.option("--line-settings", is_flag=True, help="Write address, baud and format too.")
@@ -45,16 +53,10 @@ NAMED = 12
 @save_option
 @read_only_option
 @profile_option
-@click.option(
-    "-d",
-    "--device",
-    "devices",
-    type=click.IntRange(1, 247),
-    multiple=True,
+@devices_option(
+    "Slave address of the drive; several times for several drives.",
     default=(1,),
     show_default=True,
-    metavar="ADDRESS",
-    help="Slave address of the drive; several times for several drives.",
 )
 @told
 def restore(

@@ -378,10 +378,7 @@ async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
 @json_option
 @told
 def run(
-    line_text: str,
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
+    target: Target,
     reverse: bool,
     reference: str | None,
     seconds: float | None,
@@ -395,6 +392,5 @@ def run(
     So do SIGTERM, SIGHUP, a closed standard output and the end of --for.
     """
     need_arming(arm, "run starts the motor")
-    target = Target(line_text, device, profile_id, rated_current)
     wish = Wish("reverse" if reverse else "forward", reference, seconds, leave_running, as_json)
-    on_line(line_text, lambda opened: run_motor(opened, target, wish), read_only=read_only)
+    on_line(target.line_text, lambda opened: run_motor(opened, target, wish), read_only=read_only)

@@ -12,17 +12,21 @@ from typing import TYPE_CHECKING
 import click
 
 from .errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, USAGE, Failure
+from .options import Target, connect, on_line
 
 if TYPE_CHECKING:
     from tui.drive.parameter_set import ParameterSet
     from tui.session.applying import Result
     from tui.session.drive_session import DriveSession
+    from tui.session.lines import OpenLine
     from tui.session.upload import Upload
 
 OUTAGE = 20.0
 """Seconds for which a read-out waits for a lost line to come back."""
 LOOK = 0.1
 
+file_argument = click.argument("file", type=click.Path(path_type=Path))
+force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
 confirm_option = click.option(
     "--confirm",
     "confirmed",
@@ -49,9 +53,52 @@ def set_in(path: Path) -> ParameterSet:
         raise Failure(str(error), USAGE) from error
 
 
+def refuse_existing(file: Path, *, force: bool) -> None:
+    """Raise Failure with status 2 where a file would be lost; asked before the line is opened."""
+    if file.exists() and not force:
+        raise Failure(f"{file} is there already. Use another name, or --force.", USAGE)
+
+
+def write_down(file: Path, text: str, *, force: bool = False) -> None:
+    """Write a file whole or not at all; raises Failure with status 2 where that cannot be."""
+    from tui.drive.parameter_set import SetError
+    from tui.drive.set_file import write_file
+
+    try:
+        write_file(file, text, force=force)
+    except SetError as error:
+        raise Failure(str(error), USAGE) from error
+
+
 def codes_of(session: DriveSession, names: Iterable[str]) -> frozenset[str]:
     """The codes that a person named in any notation; raises UnknownParameter."""
     return frozenset(session.profile.find(name).code for name in names)
+
+
+def set_of_drive(target: Target) -> tuple[DriveSession, ParameterSet]:
+    """A drive and every readable parameter of it, read now on a line that is not written to."""
+
+    async def work(opened: OpenLine) -> tuple[DriveSession, ParameterSet]:
+        session = await connect(opened, target)
+        return session, await take_set(session)
+
+    return on_line(target.line_text, work, read_only=True)
+
+
+async def take_set(session: DriveSession) -> ParameterSet:
+    """Every readable parameter of a drive, with who it is, as far as it says so."""
+    from tui.bus.errors import ExchangeError
+    from tui.session.identify import identify
+    from tui.session.upload import Upload
+
+    if session.identity is None and session.profile.function(43) is not None:
+        try:
+            session.identity = await identify(session.line, session.device)
+        except ExchangeError:
+            session.identity = None
+    upload = Upload(session, progress=counter("Read"))
+    await read_out(upload)
+    return upload.parameter_set()
 
 
 async def read_out(upload: Upload) -> None:

@@ -219,24 +219,19 @@ def _watch_text(status: Status) -> str:
 @json_option
 @told
 def status(
-    line_text: str,
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
+    target: Target,
     read_only: bool,
     as_json: bool,
 ) -> None:
     """Tell what a drive does, who commands it, and what it does when the line falls silent."""
     from .output import print_json
 
-    target = Target(line_text, device, profile_id, rated_current)
-
     async def work(opened: OpenLine) -> Status:
         return await status_of_drive(await connect(opened, target), opened)
 
-    found = on_line(line_text, work, read_only=read_only)
+    found = on_line(target.line_text, work, read_only=read_only)
     if as_json:
-        print_json(status_json(line_text, found))
+        print_json(status_json(target.line_text, found))
         return
     for title, text in status_lines(found):
         click.echo(f"{title:<17} {text or '-----'}")

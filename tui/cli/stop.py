@@ -38,10 +38,7 @@ LOOK = 0.05
 @read_only_option
 @told
 def stop(
-    line_text: str,
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
+    target: Target,
     every: bool,
     addresses: str | None,
     quick: bool,
@@ -56,7 +53,6 @@ def stop(
     if read_only:
         raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
-    target = Target(line_text, device, profile_id, rated_current)
     devices = _devices(addresses) if every else None
 
     async def work(opened: OpenLine) -> int:
@@ -64,9 +60,9 @@ def stop(
             session = await connect(opened, target)
             return await _stop_one(opened, session, order)
         wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
-        return await _stop_all(opened, wanted, order, profile_id)
+        return await _stop_all(opened, wanted, order, target.profile_id)
 
-    if worst := on_line(line_text, work):
+    if worst := on_line(target.line_text, work):
         raise click.exceptions.Exit(worst)
 
 

@@ -57,11 +57,8 @@ WAITING_LONGEST = 64
 @json_option
 @told
 def watch(
-    line_text: str,
+    target: Target,
     codes: tuple[str, ...],
-    device: int,
-    profile_id: str | None,
-    rated_current: float | None,
     every: float,
     count: int | None,
     csv_path: Path | None,
@@ -72,7 +69,6 @@ def watch(
 
     What can no longer be read keeps its last value with the quality stale. Ctrl-C ends it.
     """
-    target = Target(line_text, device, profile_id, rated_current)
 
     async def work(opened: OpenLine) -> None:
         from tui.session.monitor import monitoring_codes
@@ -82,14 +78,16 @@ def watch(
         shown = wanted or monitoring_codes(session.profile)
         with ExitStack() as stack:
             outputs = [
-                JsonOutput(line_text, session) if as_json else stack.enter_context(text_output())
+                JsonOutput(target.line_text, session)
+                if as_json
+                else stack.enter_context(text_output())
             ]
             if csv_path is not None:
                 outputs.append(stack.enter_context(csv_output(csv_path, session, shown)))
             await _follow(session, wanted, shown, every, count, outputs)
 
     with suppress(KeyboardInterrupt):
-        on_line(line_text, work, read_only=read_only)
+        on_line(target.line_text, work, read_only=read_only)
 
 
 async def _follow(

@@ -6,9 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .backup import profile_option
 from .errors import DONE, told
-from .options import Target, connect, device_option, line_argument, on_line, read_only_option
+from .options import Target, connect, line_argument, on_line, read_only_option, settings_options
 from .orders import arm_option, need_arming
 from .sets import (
     codes_of,
@@ -34,19 +33,16 @@ if TYPE_CHECKING:
 @confirm_option
 @save_option
 @read_only_option
-@profile_option
-@device_option
+@settings_options
 @told
 def write(
-    line_text: str,
+    target: Target,
     wanted: tuple[str, ...],
     dry_run: bool,
     arm: bool,
     confirmed: tuple[str, ...],
     save: bool,
     read_only: bool,
-    profile_id: str | None,
-    device: int,
 ) -> None:
     """Write settings of a drive, each read back: ACC=3.5s HSP=50 CHCF=Separate.
 
@@ -56,7 +52,6 @@ def write(
     typed = _pairs(wanted)
     if not dry_run:
         need_arming(arm, "this writes settings of the drive")
-    target = Target(line_text, device, profile_id)
 
     async def work(opened: OpenLine) -> int:
         session = await connect(opened, target)
@@ -67,7 +62,7 @@ def write(
             return DONE
         return await _write(session, edits, confirmed, save=save)
 
-    status = on_line(line_text, work, read_only=read_only or dry_run)
+    status = on_line(target.line_text, work, read_only=read_only or dry_run)
     if status != DONE:
         raise click.exceptions.Exit(status)
 
