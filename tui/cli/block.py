@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
+from .block_output import show_blocks, show_neighbours
 from .errors import DONE, DRIVE_REFUSED, USAGE, Failure, told
 from .options import (
     Target,
@@ -23,19 +23,15 @@ from .orders import arm_option, need_arming
 from .sets import dry_run_option, write_down
 
 if TYPE_CHECKING:
-    from rich.table import Table
-
     from tui.drive.mapping import Assignment
-    from tui.drive.mapping_wire import Stretch
     from tui.session.drive_session import DriveSession
     from tui.session.lines import OpenLine
-    from tui.session.mapping import BlockView, Slot
+    from tui.session.mapping import BlockView
 
 DIFFERENT = 1
 """Exit status of `verify` where a slot does not bring what it stands for."""
 ACTIONS = ("show", "verify", "set", "factory", "load", "save")
 WRITING = frozenset({"set", "factory", "load"})
-HEADINGS = ("Slot", "Stands for", "Name", "Number", "Wire address", "Brings", "Direct", "", "")
 
 
 @dataclass(frozen=True, slots=True)
@@ -111,15 +107,23 @@ async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> i
     if not has_blocks(session.profile):
         if wanted.action != "show":
             raise MappingError(no_blocks(session.profile))
-        await _show_neighbours(session, line_text, as_json=wanted.as_json)
+        await _measure_answer(session)
+        show_neighbours(session, line_text, as_json=wanted.as_json)
         return DONE
     if wanted.action in WRITING:
         return await _write(session, line_text, wanted)
     views = await _looked_at(session, verify=wanted.action == "verify")
     if wanted.action == "save":
         return _save(session, views, Path(wanted.words[0]))
-    _show(session, line_text, views, as_json=wanted.as_json)
+    show_blocks(session, line_text, views, as_json=wanted.as_json)
     return _status(views) if wanted.action == "verify" else DONE
+
+
+async def _measure_answer(session: DriveSession) -> None:
+    """One read, after which it is known how long this drive takes to answer."""
+    status = session.profile.quantity("status_word")
+    if status is not None:
+        await session.read([status.code])
 
 
 async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
@@ -190,7 +194,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     finally:
         journal.close()
     if wanted.as_json:
-        _show(session, line_text, await _looked_at(session, verify=False), as_json=True)
+        show_blocks(session, line_text, await _looked_at(session, verify=False), as_json=True)
     return DONE
 
 
@@ -246,184 +250,3 @@ def _pair(text: str) -> tuple[str, str]:
     if not sign or not slot.strip():
         raise click.UsageError(f"{text!r} is not written SLOT=CODE, like NMA3=LCR or F875=none.")
     return slot.strip(), code.strip()
-
-
-# Showing
-
-
-def _show(session: DriveSession, line_text: str, views: list[BlockView], *, as_json: bool) -> None:
-    from .output import console, print_json
-
-    costs = _costs(session, views)
-    if as_json:
-        print_json(
-            {
-                **_head(session, line_text),
-                "blocks": [view_json(session, view) for view in views],
-                "monitoring_us": {"direct": costs[0], "with_blocks": costs[1]},
-            }
-        )
-        return
-    out = console()
-    for view in views:
-        out.print(_table(session, view))
-        if view.trouble:
-            click.echo(view.trouble)
-        if view.block.effective == "after-reset" and view.raws:
-            click.echo(_AFTER_RESET)
-        if frame_text := _frame(session, view):
-            click.echo(f"Request: {frame_text}")
-        click.echo("")
-    click.echo(
-        f"The monitoring set takes {costs[0] / 1000:.1f} ms a cycle on the wire read directly,"
-        f" {costs[1] / 1000:.1f} ms with this assignment."
-    )
-
-
-_AFTER_RESET = (
-    "What counts since the last reset cannot be read: it is told by comparison with direct reads."
-)
-
-
-def _head(session: DriveSession, line_text: str) -> dict[str, Any]:
-    return {"line": line_text, "device": session.device, "profile": session.profile.id}
-
-
-def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
-    """Microseconds of a fast cycle of the monitoring set, directly and with these slots."""
-    from tui.drive.mapping_wire import saving
-    from tui.session.mapping import wire_timing
-    from tui.session.monitor import rates_of
-
-    raws = {slot: raw for view in views for slot, raw in view.raws.items()}
-    fast = rates_of(session.profile).fast
-    found = saving(session.profile, fast, wire_timing(session), {}, raws)
-    return found.before.microseconds, found.after.microseconds
-
-
-def _frame(session: DriveSession, view: BlockView) -> str:
-    from tui.drive.frames import hex_text
-    from tui.drive.mapping_wire import frame
-
-    inputs = view.plan if view.block.direction == "read" else None
-    outputs = view.plan if view.block.direction == "write" else None
-    return hex_text(frame(session.profile, session.device, inputs, outputs))
-
-
-def view_json(session: DriveSession, view: BlockView) -> dict[str, Any]:
-    """The object of one block."""
-    block = view.block
-    return {
-        "id": block.id,
-        "name": block.name,
-        "direction": block.direction,
-        "address": block.address,
-        "effective": block.effective,
-        "trouble": view.trouble or None,
-        "request": _frame(session, view) or None,
-        "slots": [_slot_json(slot) for slot in view.slots],
-    }
-
-
-def _slot_json(slot: Slot) -> dict[str, Any]:
-    from .output import reading_json
-
-    parameter = slot.parameter
-    return {
-        "slot": slot.code,
-        "holds": slot.raw,
-        "code": parameter.code if parameter else None,
-        "number": parameter.number if parameter else None,
-        "address": parameter.address if parameter else None,
-        "raw": slot.word,
-        "text": slot.text,
-        "direct": reading_json(slot.direct) if slot.direct else None,
-        "verdict": str(slot.verdict),
-        "force": str(slot.force) or None,
-        "brings": slot.brings or None,
-    }
-
-
-def _table(session: DriveSession, view: BlockView) -> Table:
-    from rich.table import Table
-    from rich.text import Text
-
-    title = f"{view.block.name}, 16#{view.block.address:04X}"
-    table = Table(
-        title=Text(title, style="bold"),
-        title_justify="left",
-        box=None,
-        padding=(0, 2, 0, 0),
-        header_style="dim",
-    )
-    for heading in HEADINGS:
-        table.add_column(heading, no_wrap=heading != "Name")
-    for slot in view.slots:
-        table.add_row(*(Text(cell) for cell in _cells(session, view, slot)))
-    return table
-
-
-def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...]:
-    from tui.drive.mapping import describe
-
-    stands = describe(session.profile, view.block, slot.raw)
-    if slot.parameter is None:
-        return (slot.code, stands, "", "", "", "", "", str(slot.verdict), "")
-    parameter = slot.parameter
-    force = str(slot.force) if view.block.effective == "after-reset" else ""
-    return (
-        slot.code,
-        stands,
-        parameter.name,
-        parameter.number,
-        f"{parameter.address} (16#{parameter.address:04X})",
-        slot.text,
-        slot.direct_text,
-        str(slot.verdict),
-        f"{force}, brings {slot.brings}" if slot.brings else force,
-    )
-
-
-# Families without blocks
-
-
-async def _show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> None:
-    """That there is no block, and which neighbours are worth reading in one request."""
-    from tui.drive.mapping import no_blocks
-    from tui.drive.mapping_wire import stretches
-    from tui.session.mapping import wire_timing
-    from tui.session.monitor import monitoring_codes
-
-    from .output import print_json
-
-    status = session.profile.quantity("status_word")
-    if status is not None:
-        # measured: how long this drive takes to answer
-        await session.read([status.code])
-    codes = monitoring_codes(session.profile)
-    found = stretches(session.profile, codes, wire_timing(session))
-    text = no_blocks(session.profile)
-    if as_json:
-        reads = [stretch_json(stretch) for stretch in found]
-        print_json({**_head(session, line_text), "blocks": [], "why": text, "reads": reads})
-        return
-    click.echo(text)
-    for stretch in found:
-        request = stretch.request
-        click.echo(
-            f"{request.count:2d} words from {request.address} (16#{request.address:04X}):"
-            f" {', '.join(stretch.brings)}; {stretch.cost / 1000:.1f} ms,"
-            f" one by one {stretch.alone / 1000:.1f} ms"
-        )
-
-
-def stretch_json(stretch: Stretch) -> Mapping[str, Any]:
-    """The object of one read of neighbours."""
-    return {
-        "address": stretch.request.address,
-        "count": stretch.request.count,
-        "codes": list(stretch.brings),
-        "beside": list(stretch.beside),
-        "us": stretch.cost,
-        "one_by_one_us": stretch.alone,
-    }
