@@ -142,6 +142,20 @@ def test_an_indirect_block_is_used_when_its_slots_are_known() -> None:
     assert spans(plan_reads(profile, wanted, TIMING)) == [(500, 1), (900, 1)]
 
 
+def test_a_place_of_an_indirect_block_that_is_not_known_is_read_over() -> None:
+    profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
+    plan = plan_reads(profile, codes([500, 900]), TIMING, slots={"P2165": 2, "P2167": 1})
+    (request,) = plan.requests
+    assert (request.address, request.count) == (0x1875, 3)
+    assert [(place.code, place.offset) for place in request.places] == [("P900", 0), ("P500", 2)]
+
+
+def test_a_scanner_is_not_read_over_an_unused_slot() -> None:
+    profile = profile_of([500, 900, 1200, 2165, 2166, 2167], single=True, blocks=[SCANNER])
+    plan = plan_reads(profile, codes([500, 1200]), TIMING, slots={"P2165": 500, "P2167": 1200})
+    assert spans(plan) == [(500, 1), (1200, 1)]
+
+
 def test_a_block_with_a_free_first_slot_is_not_used() -> None:
     profile = profile_of([500, 900, 2165, 2166, 2167], single=True, blocks=[BLOCK])
     plan = plan_reads(profile, codes([900]), TIMING, slots={"P2165": 0, "P2166": 2})
@@ -197,7 +211,7 @@ def test_no_use_of_a_block_is_cheaper(slots: list[int], wanted: set[int], *, che
     for first in range(3):
         for count in range(1, 4 - first):
             used = slots[first : first + count]
-            if 0 not in used and wanted & set(used):
+            if (not checked or 0 not in used) and wanted & set(used):
                 rest = plan_reads(profile, codes(sorted(wanted - set(used))), TIMING).seconds
                 costs.append(rest + TIMING.read(count) * (2 if checked else 1))
     assert plan.seconds == pytest.approx(min(costs))

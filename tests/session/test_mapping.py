@@ -21,9 +21,10 @@ from tui.drive.schema import Block
 from tui.drive.user_words import NO_WORDS, UserWord
 from tui.session.drive_session import DriveSession
 from tui.session.lines import open_line
-from tui.session.mapping import Force, Mapper, Verdict, wire_timing
+from tui.session.mapping import Force, Mapper, wire_timing
 from tui.session.mapping_write import AssignmentRefused, exchange, write_assignment
 from tui.session.user_words import load_words, read_words, save_words
+from tui.session.verdict import Verdict
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]

@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import time
 from collections.abc import Callable, Iterator, Mapping
+from typing import Protocol
 
 import pytest
 
@@ -14,19 +15,19 @@ from tui.session.drive_session import DriveSession
 from tui.session.lines import OpenLine, open_line
 from tui.session.monitor import Snapshot
 from tui.session.readings import Quality
-from tui.simulator import DriveSpec, Simulation
+from tui.simulator import DriveSpec, LineTiming, Simulation
 
 SCATTERED = {"NCV": 7, "VCAL": 2, "INV": 120, "LSP": 41, "HSP": 523, "ACC": 37, "DEC": 59}
 """Words of an Altivar 71 that lie apart from each other and stay as they are set."""
 
 
 @pytest.fixture
-def start() -> Iterator[Callable[[DriveSpec], tuple[Simulation, OpenLine]]]:
+def start() -> Iterator[Start]:
     """A simulated drive and a line to it, closed afterwards."""
     opened: list[tuple[Simulation, OpenLine]] = []
 
-    def begin(spec: DriveSpec) -> tuple[Simulation, OpenLine]:
-        simulation = Simulation([spec])
+    def begin(spec: DriveSpec, timing: LineTiming | None = None) -> tuple[Simulation, OpenLine]:
+        simulation = Simulation([spec], timing=timing)
         simulation.start()
         line = open_line(f"serial:{simulation.serve_pty()},19200,8N1", wait=5.0)
         opened.append((simulation, line))
@@ -38,7 +39,12 @@ def start() -> Iterator[Callable[[DriveSpec], tuple[Simulation, OpenLine]]]:
         simulation.stop()
 
 
-Start = Callable[[DriveSpec], tuple[Simulation, OpenLine]]
+class Start(Protocol):
+    """Begins a simulated drive; its line is as fast as it can be, or as slow as a real one."""
+
+    def __call__(
+        self, spec: DriveSpec, timing: LineTiming | None = None
+    ) -> tuple[Simulation, OpenLine]: ...
 
 
 async def until(holds: Callable[[], bool], seconds: float = 20.0) -> None:
@@ -122,6 +128,7 @@ async def test_a_scanner_changed_under_way_never_shows_one_value_as_another(star
     drive.close()
 
 
+BLOCK_CODES = ["FD01", "FD00", "FE03", "FE05", "FE90"]
 BLOCK = {"F875": 1, "F876": 2, "F877": 3, "F878": 4, "F879": 11}
 
 
@@ -148,7 +155,7 @@ async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None
     # what is chosen now counts from the next reset on: the block goes on bringing the same
     for slot, raw in {"F875": 2, "F876": 1}.items():
         await opened.line.write(1, drive.profile[slot].address, [raw])
-    await until(lambda: not snapshots[-1].block)
+    await until(lambda: not {"F875", "F876"} & drive.monitor.reader.in_force.keys())
     assert simulation.drive(1).raw("F875") == 2
     simulation.drive(1).power_cycle()
     await asyncio.sleep(3.0)
@@ -158,4 +165,30 @@ async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None
             # a frequency of 35.00 Hz or on its way there is no status word of this drive
             assert status.raw is not None
             assert status.raw & 0x6000 or snapshot.state.kind in ("starting", "fault", "blocked")
+    drive.close()
+
+
+async def test_on_a_slow_line_every_place_is_proved_while_values_move(start: Start) -> None:
+    _, opened = start(
+        DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0), LineTiming(19200, "8N1", True)
+    )
+    drive = DriveSession(opened.line, 1, library.load("atv21"))
+    drive.monitor.start(period=0.05)
+    await until(lambda: drive.monitor.reader.in_force == BLOCK, 60.0)
+    # all five in one request, in little more than the time of two words
+    assert drive.monitor.reader.seconds(BLOCK_CODES) < 2 * drive.monitor.reader.seconds(["FE22"])
+    drive.close()
+
+
+async def test_a_pending_choice_is_never_proved(start: Start) -> None:
+    simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
+    drive = DriveSession(opened.line, 1, library.load("atv21"))
+    # chosen since the last reset: the block brings what it brought before
+    for slot, raw in {"F876": 3, "F877": 2}.items():
+        await opened.line.write(1, drive.profile[slot].address, [raw])
+    assert simulation.drive(1).raw("F876") == 3
+    drive.monitor.start(period=0.05)
+    await until(lambda: {"F875", "F878", "F879"} <= drive.monitor.reader.in_force.keys(), 60.0)
+    await asyncio.sleep(3.0)
+    assert not {"F876", "F877"} & drive.monitor.reader.in_force.keys()
     drive.close()

@@ -16,7 +16,8 @@ from tui.screens.blocks import BlocksScreen
 from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
 from tui.session.journal import Journal
-from tui.session.mapping import BlockView, Force, Slot, Verdict
+from tui.session.mapping import BlockView, Force, Slot
+from tui.session.verdict import Verdict
 from tui.session.mapping_desk import MappingDesk, Said
 
 from . import fakes

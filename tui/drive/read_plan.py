@@ -159,21 +159,28 @@ class _Stretch:
 
 
 def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iterator[_Stretch]:
-    """Every read of a read block whose slots all stand for a known parameter."""
+    """Every read of a read block from one known slot to another.
+
+    What is not known between them is left out of an indirect block's words; a scanner may end
+    at an unused slot, and is not read over one.
+    """
     if block.direction != "read":
         return
+    over_holes = block.effective == "after-reset"
     assigned = [_assigned(profile, block, slots.get(slot)) for slot in block.slots]
     first_ones = [0] if block.fixed_start else range(len(assigned))
     for first in first_ones:
         places: list[Place] = []
         for offset, code in enumerate(assigned[first : first + block.max_words]):
             if code is None:
+                if over_holes:
+                    continue
                 break
             places.append(Place(code, offset))
-            if len(places) >= block.min_words:
-                names = block.slots[first : first + len(places)]
+            if offset + 1 >= block.min_words:
+                names = [block.slots[first + place.offset] for place in places]
                 yield _Stretch(
-                    ReadRequest(block.address + first, len(places), tuple(places)),
+                    ReadRequest(block.address + first, offset + 1, tuple(places)),
                     {name: slots[name] for name in names},
                     checked=block.effective == "at-once",
                 )

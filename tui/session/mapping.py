@@ -25,22 +25,11 @@ from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 from .asking import Asker
 from .drive_session import DriveSession
 from .readings import Reading
+from .verdict import Verdict, compare
 
 ROUNDS = 3
 """Comparisons that must all fail before a slot is said to bring something else."""
 USUAL_TURNAROUND = 0.005
-
-
-class Verdict(StrEnum):
-    """How what a slot brings compares with the parameter read directly."""
-
-    SAME = "same"
-    MOVING = "moving"
-    DIFFERS = "differs"
-    CHANGED = "changed meanwhile"
-    NONE = "no value"
-    UNUSED = "unused"
-    UNREAD = "not compared"
 
 
 class Force(StrEnum):
@@ -264,6 +253,9 @@ class Mapper:
         """Whether the slot is in force, and what it brings where that is something else."""
         if block.effective == "at-once":
             return Force.ACTIVE, ""
+        if self.session.monitor.reader.in_force.get(slot) == raw:
+            # the monitor compares all the time, and has proved it
+            return Force.ACTIVE, ""
         waits = self.written.get(slot) == raw
         if word is None or block.direction == "write":
             return (Force.PENDING if waits else Force.UNPROVED), ""
@@ -285,25 +277,6 @@ class Mapper:
         if raw not in raws:
             return Force.PENDING, fits[0].parameter if len(fits) == 1 else ""
         return (Force.PENDING if waits else Force.UNPROVED), ""
-
-
-def compare(
-    parameter: Parameter, word: int, before: Reading | None, after: Reading | None
-) -> Verdict:
-    """How a raw value compares with direct readings just before and just after it."""
-    first = before.raw if before else None
-    second = after.raw if after else None
-    if first is None or second is None:
-        return Verdict.UNREAD
-    if first == second:
-        return Verdict.SAME if word == first else Verdict.DIFFERS
-    if parameter.bits:
-        # between two words of bits: every bit as in one of them
-        return Verdict.DIFFERS if (word ^ first) & (word ^ second) & 0xFFFF else Verdict.MOVING
-    # a value that trembles may have been beyond both: as far again as it went between them
-    margin = abs(second - first)
-    within = min(first, second) - margin <= word <= max(first, second) + margin
-    return Verdict.MOVING if within else Verdict.DIFFERS
 
 
 def _both(one: BlockView, other: BlockView) -> BlockView:

@@ -36,10 +36,11 @@ from tui.drive.values import encode
 
 from .drive_session import DriveSession
 from .journal import Journal
-from .mapping import BlockView, Force, Mapper, Verdict, wire_timing
+from .mapping import BlockView, Force, Mapper, wire_timing
 from .mapping_write import exchange, write_assignment
 from .monitor import monitoring_codes, rates_of
 from .user_words import load_words, read_words, save_words
+from .verdict import Verdict
 
 AGAIN = 1.0
 """Seconds between two looks at the blocks."""

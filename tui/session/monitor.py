@@ -227,12 +227,13 @@ class Monitor:
 
     async def _learn(self, cycle: int) -> None:
         """See now and then what the drive's block brings; what fails is asked again next time."""
-        if not self._learn_due and cycle % SLOW_FACTOR:
-            return
-        self._learn_due = True
         with suppress(LineError, DriveError):
-            await self.reader.learn_slots()
-            self._learn_due = False
+            if self._learn_due or cycle % SLOW_FACTOR == 0:
+                self._learn_due = True
+                await self.reader.learn_slots()
+                self._learn_due = False
+            else:
+                await self.reader.compare_slots()
 
     async def _cycle(
         self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
@@ -273,8 +274,9 @@ class Monitor:
             line=self.line.state,
             block=self._using,
         )
-        if not error:
+        if not error and snapshot.state.kind != self._kind:
             self._kind = snapshot.state.kind
+            self.reader.compare_soon()
         if snapshot.state.kind in RESET_NEAR:
             self.reader.distrust()
         self._latest = snapshot

@@ -91,7 +91,7 @@ class Reader:
     def seconds(self, codes: Iterable[str]) -> float:
         """What reading these costs on the wire by plan, without retries."""
         sure, unsure = self._by_trust(frozenset(codes).difference(self._refused))
-        return self._plan(sure, self._slots.in_force()).seconds + self._plan(unsure).seconds
+        return self._plan(sure, self.in_force).seconds + self._plan(unsure).seconds
 
     def groups(self, codes: Iterable[str]) -> list[tuple[str, ...]]:
         """The codes that come in one request each."""
@@ -112,16 +112,28 @@ class Reader:
         """Read directly what a block brings only until the drive's next reset."""
         self._slots.distrust()
 
+    @property
+    def in_force(self) -> dict[str, int]:
+        """Raw values by slot of what surely stands in each place of a block or scanner now."""
+        return self._slots.in_force()
+
     async def learn_slots(self) -> None:
-        """Find out what the drive's block or scanner brings; polls use it from then on.
+        """Find out what the drive's block or scanner stands for; polls use it from then on.
 
         To be called again now and then: others may change it. Raises the line's errors.
         """
+        await self._slots.learn(self._poll)
 
-        async def ask(codes: Iterable[str]) -> Mapping[str, Reading]:
-            return await self.read(codes, priority=Priority.POLL)
+    async def compare_slots(self) -> None:
+        """Go on to prove what an indirect block brings, by a few requests. Raises line errors."""
+        await self._slots.compare(self._poll)
 
-        await self._slots.learn(ask)
+    def compare_soon(self) -> None:
+        """The drive does something else now: what looked alike in its block may no longer."""
+        self._slots.compare_soon()
+
+    async def _poll(self, codes: Iterable[str]) -> Mapping[str, Reading]:
+        return await self.read(codes, priority=Priority.POLL)
 
     async def _read_sources(self, codes: list[str], priority: Priority) -> None:
         sources = {source for code in codes for source in _depends_on(self.profile[code])}
@@ -139,7 +151,7 @@ class Reader:
     async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
         sure, unsure = self._by_trust(codes.difference(self._refused, found))
-        slots = self._slots.in_force() if priority >= Priority.POLL else {}
+        slots = self.in_force if priority >= Priority.POLL else {}
         found.update(await self._follow(self._plan(sure, slots), priority))
         for request in self._plan(unsure).requests:
             found.update(await self._exchange_unsure(request, priority))

@@ -14,8 +14,9 @@ from tui.drive.profile import is_verified
 from tui.drive.schema import Block, Parameter
 from tui.drive.user_words import UserWords
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.mapping import BlockView, Force, Slot, Verdict, wire_timing
+from tui.session.mapping import BlockView, Force, Slot, wire_timing
 from tui.session.mapping_desk import MappingDesk
+from tui.session.verdict import Verdict
 
 from .drawing import cut, rule, wrapped
 from .palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG

@@ -1,0 +1,166 @@
+"""What an indirect block brings is told by its words: never wrongly, and soon where it can be."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tui.drive import library
+from tui.drive.mapping import block_of
+from tui.drive.schema import Block
+from tui.drive.values import decode
+from tui.session.proof import Proof
+from tui.session.readings import Quality, Reading
+
+PROFILE = library.load("atv21")
+FOUND = block_of(PROFILE, "read")
+assert FOUND is not None
+BLOCK: Block = FOUND
+CODES = [choice.parameter for choice in BLOCK.choices]
+RAWS = {choice.parameter: choice.raw for choice in BLOCK.choices}
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A value that stays, goes evenly, or trembles."""
+
+    base: int
+    slope: float = 0.0
+    noise: int = 0
+
+    def at(self, time: float, chance: random.Random) -> int:
+        return round(self.base + self.slope * time) + chance.randint(-self.noise, self.noise)
+
+
+signals = st.builds(
+    Signal,
+    base=st.sampled_from([0, 1, 2, 100, 105, 3500, 3520, 7000]),
+    slope=st.sampled_from([0.0, 0.0, 0.0, 300.0, -50.0]),
+    noise=st.sampled_from([0, 0, 1, 2, 20]),
+)
+
+
+def reading(code: str, raw: int) -> Reading:
+    parameter = PROFILE[code]
+    return Reading(
+        parameter,
+        raw,
+        decode(parameter, raw, PROFILE.names(parameter), PROFILE.scale(parameter, {}, set())),
+        Quality.GOOD,
+        0.0,
+    )
+
+
+def compared(
+    behind: Mapping[str, str],
+    signal: Mapping[str, Signal],
+    rounds: int,
+    chance: random.Random,
+    chosen: Mapping[str, str] | None = None,
+) -> Proof:
+    """A proof after so many rounds; `behind` is what the slots really bring."""
+    proof = Proof(PROFILE, BLOCK)
+    now = 0.0
+
+    def ask(code: str) -> Reading:
+        nonlocal now
+        now += 0.03
+        return reading(code, signal[code].at(now, chance))
+
+    for _ in range(rounds):
+        for code in CODES:
+            before = {code: ask(code)}
+            now += 0.03
+            words = [signal[behind[slot]].at(now, chance) & 0xFFFF for slot in BLOCK.slots]
+            proof.note(words, before, {code: ask(code)})
+        proof.conclude({slot: RAWS[c] for slot, c in (chosen or behind).items()})
+    return proof
+
+
+APART = {code: Signal(1000 + 1000 * place) for place, code in enumerate(CODES)}
+CHOSEN = dict(zip(BLOCK.slots, CODES, strict=False))
+
+
+def test_what_fits_only_one_parameter_is_proved() -> None:
+    proof = compared(CHOSEN, APART, 3, random.Random(1))
+    assert all(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
+    assert proof.open_codes({slot: RAWS[code] for slot, code in CHOSEN.items()}) == []
+
+
+def test_two_comparisons_are_not_enough() -> None:
+    proof = compared(CHOSEN, APART, 2, random.Random(1))
+    assert not any(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
+
+
+def test_an_even_ramp_does_not_hide_what_a_place_brings() -> None:
+    signal = APART | {CODES[1]: Signal(2500, slope=300.0), CODES[3]: Signal(5200, slope=600.0)}
+    proof = compared(CHOSEN, signal, 6, random.Random(1))
+    assert all(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
+
+
+def test_values_that_are_alike_prove_nothing_but_hinder_no_other_place() -> None:
+    signal = APART | {CODES[1]: Signal(0), CODES[4]: Signal(0)}
+    proof = compared(CHOSEN, signal, 6, random.Random(1))
+    held = [slot for slot, code in CHOSEN.items() if proof.holds(slot, RAWS[code])]
+    assert held == [slot for slot in BLOCK.slots if slot not in ("F876", "F879")]
+
+
+def test_a_parameter_that_was_not_compared_leaves_all_open() -> None:
+    proof = Proof(PROFILE, BLOCK)
+    for _ in range(5):
+        for code in CODES[:-1]:
+            one = {code: reading(code, APART[code].base)}
+            proof.note([APART[c].base for c in CODES[:5]], one, one)
+    proof.conclude({"F875": RAWS["FD01"]})
+    assert not proof.holds("F875", RAWS["FD01"])
+    assert CODES[-1] in proof.open_codes({"F875": RAWS["FD01"]})
+
+
+def test_a_place_that_was_unlucky_may_begin_again() -> None:
+    chosen = {"F875": CODES[0]}
+    raws = {"F875": RAWS[CODES[0]]}
+    wrong = compared(dict.fromkeys(BLOCK.slots, CODES[2]), APART, 3, random.Random(1), chosen)
+    assert not wrong.holds("F875", RAWS[CODES[0]])
+    wrong.begin()
+    for _ in range(3):
+        for code in CODES:
+            one = {code: reading(code, APART[code].base)}
+            wrong.note([APART[CODES[0]].base] * 5, one, one)
+    wrong.conclude(raws)
+    assert wrong.holds("F875", RAWS[CODES[0]])
+
+
+@settings(deadline=None, max_examples=300)
+@given(
+    signal=st.lists(signals, min_size=len(CODES), max_size=len(CODES)),
+    behind=st.lists(st.sampled_from(CODES), min_size=5, max_size=5),
+    chosen=st.lists(st.sampled_from(CODES), min_size=5, max_size=5),
+    rounds=st.integers(3, 8),
+    seed=st.integers(0, 2**16),
+)
+def test_nothing_is_proved_that_is_not_so(
+    signal: list[Signal], behind: list[str], chosen: list[str], rounds: int, seed: int
+) -> None:
+    """Whatever the values do, a place is never taken for another parameter's."""
+    chance = random.Random(seed)
+    real = dict(zip(BLOCK.slots, behind, strict=True))
+    wanted = dict(zip(BLOCK.slots, chosen, strict=True))
+    given = {
+        # words of bits neither tremble nor go evenly
+        code: Signal(one.base) if PROFILE[code].bits else one
+        for code, one in zip(CODES, signal, strict=True)
+    }
+    proof = compared(real, given, rounds, chance, wanted)
+    for slot, code in real.items():
+        for other in CODES:
+            if other != code:
+                assert not proof.holds(slot, RAWS[other]), (slot, code, other)
+
+
+def test_every_choice_can_be_compared() -> None:
+    told: Callable[[str, int], bool] = Proof(PROFILE, BLOCK).holds
+    assert not any(told(slot, raw) for slot in BLOCK.slots for raw in (0, *RAWS.values(), 99))
