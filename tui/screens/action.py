@@ -9,6 +9,9 @@ SOURCES, FAULTS, PARAMETERS = "control source", "faults", "parameters"
 BLOCKS = "blocks"
 EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS)
 
+KEY_NAMES = {"escape": "Esc", "ctrl+p": "^p", "pageup": "PgUp", "pagedown": "PgDn"}
+"""Keys that a person reads otherwise than Textual writes them, capitals aside."""
+
 
 @dataclass(frozen=True, slots=True)
 class Action:
@@ -17,19 +20,30 @@ class Action:
     id: str
     """Name of the method, with its arguments as Textual writes them."""
     keys: str
-    """Keys as Textual names them, separated by commas; none where a widget takes the key."""
-    shown: str
-    """The key as a person reads it."""
+    """Keys as Textual names them, separated by commas."""
     label: str
-    """One or two words for the line of keys."""
+    """One or two words for the line of keys; none where it does not stand there."""
     help: str
     """A sentence for the help screen and the palette."""
     screens: tuple[str, ...] = EVERYWHERE
     app: bool = False
     """True for an action of the app, False for one of the screen."""
-    line: bool = True
-    """Whether it stands in the line of keys."""
-    both: str = ""
-    """What the line of keys shows where one entry stands for a pair of keys."""
     first: bool = False
     """Whether the key counts before any widget that has the focus."""
+    bound: bool = True
+    """False where the widget that has the focus takes the key."""
+
+    @property
+    def shown(self) -> str:
+        """The first of its keys, as a person reads it."""
+        key = self.keys.partition(",")[0]
+        return KEY_NAMES.get(key, key.capitalize() if len(key) > 1 else key)
+
+
+Row = tuple[str, str, str, str]
+"""An action as its table writes it: id, keys, label, help."""
+
+
+def on(screens: tuple[str, ...], *rows: Row) -> tuple[Action, ...]:
+    """The actions of some screens, in the order of their rows."""
+    return tuple(Action(*row, screens=screens) for row in rows)

@@ -5,6 +5,8 @@ Bindings, the line of keys, the help screen and the command palette are made fro
 
 from __future__ import annotations
 
+from functools import partial
+
 from textual.binding import Binding, BindingType
 
 from .action import (
@@ -17,254 +19,56 @@ from .action import (
     PARAMETERS,
     SOURCES,
     Action,
+    on,
 )
 from .block_actions import BLOCK_ACTIONS
+from .monitor_actions import ORDER_ACTIONS, WATCH_ACTIONS
 from .parameter_actions import PARAMETER_ACTIONS
 
+of_app = partial(Action, app=True)
+stops = partial(Action, app=True, first=True)
+STOP = "Stop the motor on its ramp, wherever no text is being typed."
+WRITE_SOURCE = "Write the chosen configuration, armed and with the motor at rest."
+
 ACTIONS: tuple[Action, ...] = (
-    Action(
-        "stop_by_space",
-        "space",
-        "Space",
-        "STOP",
-        "Stop the motor on its ramp, wherever no text is being typed.",
-        app=True,
-        first=True,
-    ),
-    Action(
-        "stop",
-        "f12",
-        "F12",
-        "",
-        "Stop the motor on its ramp, from any screen, dialog or text.",
-        app=True,
-        line=False,
-        first=True,
-    ),
-    Action(
-        "stop_all",
-        "f9",
-        "F9",
-        "",
-        "Stop every drive of the line on its ramp, from any screen.",
-        app=True,
-        line=False,
-        first=True,
-    ),
-    Action(
-        "open_chosen", "enter", "Enter", "open", "Open the chosen line or drive.", (CONNECTION,)
-    ),
-    Action("scan", "s", "s", "scan", "Look for drives at the addresses given.", (CONNECTION,)),
-    Action(
-        "type_line",
-        "n",
-        "n",
-        "type line",
-        "Type a line: serial, TCP, RTU over TCP, sim.",
+    stops("stop_by_space", "space", "STOP", STOP),
+    stops("stop", "f12", "", "Stop the motor on its ramp, from any screen, dialog or text."),
+    stops("stop_all", "f9", "", "Stop every drive of the line on its ramp, from any screen."),
+    *on(
         (CONNECTION,),
+        ("open_chosen", "enter", "open", "Open the chosen line or drive."),
+        ("scan", "s", "scan", "Look for drives at the addresses given."),
+        ("type_line", "n", "type line", "Type a line: serial, TCP, RTU over TCP, sim."),
+        ("refresh_lines", "r", "", "Look for serial ports again."),
+        ("disconnect", "x", "close", "Close the line."),
+        ("stop_scan", "escape", "", "Stop looking for drives."),
+        ("watch_chosen", "2", "", "Go to Monitor of the chosen drive."),
     ),
-    Action(
-        "refresh_lines", "r", "r", "", "Look for serial ports again.", (CONNECTION,), line=False
-    ),
-    Action("disconnect", "x", "x", "close", "Close the line.", (CONNECTION,)),
-    Action(
-        "stop_scan",
-        "escape",
-        "Esc",
-        "stop scan",
-        "Stop looking for drives.",
-        (CONNECTION,),
-        line=False,
-    ),
-    Action(
-        "watch_chosen",
-        "2",
-        "2",
-        "",
-        "Go to Monitor of the chosen drive.",
-        (CONNECTION,),
-        line=False,
-    ),
-    Action(
-        "arm",
-        "a",
-        "a",
-        "arm",
-        "Arm this drive, or end that.",
+    *on(
         (MONITOR, SOURCES, PARAMETERS, BLOCKS),
+        ("arm", "a", "arm", "Arm this drive, or end that."),
     ),
-    Action("order('forward')", "r", "r", "run", "Run forward.", (MONITOR,)),
-    Action("order('reverse')", "v", "v", "reverse", "Run reverse.", (MONITOR,)),
-    Action("reference", "f", "f", "ref", "Type a reference in Hz or rpm.", (MONITOR,)),
-    Action("order('reset')", "x", "x", "reset", "Reset a fault; runs nothing.", (MONITOR,)),
-    Action(
-        "step_reference(1)", "up", "Up", "", "Raise the reference by 1 Hz.", (MONITOR,), line=False
+    *ORDER_ACTIONS,
+    Action("write_chosen", "enter", "write", WRITE_SOURCE, (SOURCES,), bound=False),
+    *on(
+        (FAULTS,),
+        ("save", "s", "save", "Save the record of the trip to a file."),
+        ("move_record(1)", "[", "older", "Older values."),
+        ("move_record(-1)", "]", "newer", "Newer values."),
+        ("leave", "escape,h,2", "back", "Go back to Monitor."),
     ),
-    Action(
-        "step_reference(-1)",
-        "down",
-        "Down",
-        "",
-        "Lower the reference by 1 Hz.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "step_reference(5)",
-        "pageup",
-        "PgUp",
-        "",
-        "Raise the reference by 5 Hz.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "step_reference(-5)",
-        "pagedown",
-        "PgDn",
-        "",
-        "Lower the reference by 5 Hz.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "options",
-        "o",
-        "o",
-        "",
-        "Choose a ramp, preset speed, motor or output.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "stop_as('quick-stop')",
-        "k",
-        "k",
-        "",
-        "Quick stop, where the drive has one; needs no arming.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "stop_as('freewheel')",
-        "z",
-        "z",
-        "",
-        "Let the motor coast; needs no arming.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "stop_as('emergency-stop')",
-        "e",
-        "e",
-        "",
-        "Emergency stop with a fault (Altivar 21); needs no arming.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "order('dc-braking')",
-        "b",
-        "b",
-        "",
-        "Brake by direct current, where the drive has an order for it.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "order('take-control')",
-        "t",
-        "t",
-        "",
-        "Take the control from the terminals (Leroy-Somer 6.43), locked only.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "hand_back",
-        "g",
-        "g",
-        "",
-        "Give the control back to the terminals; a run order waiting there counts then.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "control_source",
-        "c",
-        "c",
-        "",
-        "See and set up who commands the drive.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action(
-        "write_chosen",
-        "",
-        "Enter",
-        "write",
-        "Write the chosen configuration, armed and with the motor at rest.",
-        (SOURCES,),
-    ),
-    Action(
-        "faults",
-        "h",
-        "h",
-        "",
-        "Faults: the last trip, the drive's history and what it stored.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action("save", "s", "s", "save", "Save the record of the trip to a file.", (FAULTS,)),
-    Action("move_record(1)", "left_square_bracket", "[", "older", "Older values.", (FAULTS,)),
-    Action("move_record(-1)", "right_square_bracket", "]", "newer", "Newer values.", (FAULTS,)),
-    Action("leave", "escape,h,2", "Esc", "back", "Go back to Monitor.", (FAULTS,)),
-    Action("leave", "escape,c,2", "Esc", "back", "Go back to Monitor.", (SOURCES,)),
-    Action("parameters", "3", "3", "", "Parameters of this drive.", (MONITOR,), line=False),
+    *on((SOURCES,), ("leave", "escape,c,2", "back", "Go back to Monitor.")),
     *PARAMETER_ACTIONS,
-    Action("blocks", "4", "4", "", "Indirect blocks or scanner.", (MONITOR,), line=False),
     *BLOCK_ACTIONS,
-    Action("leave", "escape,1", "Esc", "", "Go back to Connection.", (MONITOR,), line=False),
-    Action(
-        "step_drive(-1)",
-        "left_square_bracket",
-        "[",
-        "",
-        "The drive before on this line.",
-        (MONITOR,),
-        line=False,
+    *WATCH_ACTIONS,
+    *on(
+        (FRAMES,),
+        ("leave", "escape,l,2", "back", "Go back to Monitor."),
+        ("hold", "h", "hold", "Hold the list still, or let it run."),
     ),
-    Action(
-        "step_drive(1)",
-        "right_square_bracket",
-        "]",
-        "drive",
-        "The next drive on this line.",
-        (MONITOR,),
-        both="[ ]",
-        line=False,
-    ),
-    Action(
-        "change_rate(1)", "plus,equals_sign", "+", "", "Poll twice as fast.", (MONITOR,), line=False
-    ),
-    Action("change_rate(-1)", "minus", "-", "", "Poll half as fast.", (MONITOR,), line=False),
-    Action("next_word", "w", "w", "", "Show the next word of bits.", (MONITOR,), line=False),
-    Action(
-        "rating",
-        "i",
-        "i",
-        "",
-        "Tell the rated current of a drive that gives its current in %.",
-        (MONITOR,),
-        line=False,
-    ),
-    Action("frames", "l", "l", "", "Show the frames on the line.", (MONITOR,), line=False),
-    Action("leave", "escape,l,2", "Esc", "back", "Go back to Monitor.", (FRAMES,)),
-    Action("hold", "h", "h", "hold", "Hold the list still, or let it run.", (FRAMES,)),
-    Action("command_palette", "ctrl+p", "^p", "all", "Find any action by its name.", app=True),
-    Action("help", "question_mark,f1", "?", "help", "Show every key.", app=True),
-    Action("quit", "q,ctrl+q", "q", "leave", "Leave the panel.", app=True),
+    of_app("command_palette", "ctrl+p", "all", "Find any action by its name."),
+    of_app("help", "?,f1", "help", "Show every key."),
+    of_app("quit", "q,ctrl+q", "leave", "Leave the panel."),
 )
 
 
@@ -281,7 +85,7 @@ def bindings(screen: str | None) -> list[BindingType]:
             priority=action.first,
         )
         for action in ACTIONS
-        if action.keys
+        if action.bound
         and action.app == (screen is None)
         and (screen is None or screen in action.screens)
     ]
@@ -294,11 +98,7 @@ def of_screen(screen: str) -> list[Action]:
 
 def line_of(screen: str) -> list[tuple[str, str, str]]:
     """Action, key and label of everything in the line of keys of a screen."""
-    return [
-        (action.id, action.both or action.shown, action.label)
-        for action in of_screen(screen)
-        if action.line
-    ]
+    return [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
 
 
 def keys_of(screen: str) -> list[tuple[str, str]]:

@@ -10,19 +10,17 @@ from tui.drive.mapping import no_blocks
 from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, word_named
 from tui.session.mapping_desk import MappingDesk
 
-from .orders import OrderKeys
+from .arming import Arming
+from .files import fault_of_known, fault_of_new
 
 
-class BlockKeys(OrderKeys):
+class BlockKeys(Arming):
     """What these keys do; the desk does the work."""
 
     @property
     def desk(self) -> MappingDesk:
         """What is known and proposed."""
         return self.app.mapping_desk(self.session)
-
-    def _armed(self) -> bool:
-        return self.commander.armed_for is not None
 
     def _try(self, work: Callable[[], None]) -> None:
         try:
@@ -91,7 +89,7 @@ class BlockKeys(OrderKeys):
         proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
         about = "The assignment shown, proposals included; one slot a line (TOML)."
         text = str(Path.cwd() / proposed)
-        self.app.push_screen(Ask("Save to", _named, text=text, about=about), given)
+        self.app.push_screen(Ask("Save to", fault_of_new, text=text, about=about), given)
 
     def _save(self, path: Path) -> None:
         from tui.drive.mapping_file import dumps
@@ -116,7 +114,7 @@ class BlockKeys(OrderKeys):
                 self._try(lambda: self._load(Path(name).expanduser()))
 
         about = "A file saved here. It is proposed, not written."
-        self.app.push_screen(Ask("Load from", _there, about=about), given)
+        self.app.push_screen(Ask("Load from", fault_of_known, about=about), given)
 
     def _load(self, path: Path) -> None:
         from tui.drive.mapping import MappingError
@@ -170,15 +168,3 @@ class BlockKeys(OrderKeys):
                 )
             )
         return (*found, *(UserWord(),) * (COUNT - len(found)))
-
-
-def _named(name: str) -> str:
-    """What is wrong with a name for a new file."""
-    if not name.strip():
-        return "A name is needed."
-    return f"{name} is there already." if Path(name).expanduser().exists() else ""
-
-
-def _there(name: str) -> str:
-    """What is wrong with the name of a file to read."""
-    return "" if Path(name.strip()).expanduser().is_file() else f"There is no file {name}."

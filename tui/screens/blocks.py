@@ -7,10 +7,8 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
-from textual.events import Resize
 
 from tui.drive.mapping import describe, no_blocks, refusing
-from tui.drive.orders import OrderRefused
 from tui.drive.schema import Block
 from tui.session.drive_session import DriveSession
 from tui.widgets.block_view import (
@@ -21,17 +19,14 @@ from tui.widgets.block_view import (
     table_lines,
     word_lines,
 )
-from tui.widgets.drawing import key_line, rule, wrapped
+from tui.widgets.drawing import armed_text, rule, wrapped
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, ATTENTION, ATTENTION_BLOCK, FAINT, STRONG
+from tui.widgets.palette import ALARM, ATTENTION, FAINT
 
-from .actions import BLOCKS, bindings, keys_of
+from .actions import BLOCKS, bindings
 from .block_keys import BlockKeys
+from .said import news
 
-LOOK = 0.25
-SAID_FOR = {"working": 60.0, "done": 15.0, "refused": 60.0}
-"""Seconds for which it is shown what the last work has come to."""
-STYLES = {"working": ATTENTION, "done": STRONG, "refused": ALARM}
 BELOW = 16
 """Lines that are no slots: title, headings, details, cost, words, message, keys."""
 
@@ -42,6 +37,7 @@ class BlocksScreen(BlockKeys):
     CSS_PATH = "blocks.tcss"
     BINDINGS: ClassVar = bindings(BLOCKS)
     TITLE = "Blocks"
+    LOOK = 0.25
     AUTO_FOCUS = ""
 
     def __init__(self, session: DriveSession) -> None:
@@ -72,27 +68,18 @@ class BlocksScreen(BlockKeys):
         if not self.desk.blocks:
             for id in ("#second", "#detail", "#cost"):
                 self.query_one(id).display = False
-        self.query_one("#keys", Lines).show([key_line(keys_of(BLOCKS))])
         self.desk.start()
-        self.set_interval(LOOK, self.look)
-        self.call_after_refresh(self.look)
 
     def on_unmount(self) -> None:
         """Look no more; what is proposed stays."""
         self.desk.stop()
 
-    def on_resize(self, _: Resize) -> None:
-        """More room, more lines a slot."""
-        self.call_after_refresh(self.look)
-
-    def look(self) -> None:
-        """Show what there is now; lines that stay the same are not drawn."""
-        if not self.is_current or not self.size.width:
-            return
-        width = self.size.width
-        self.query_one("#title", Lines).show([self._title(width)])
-        self.query_one("#words", Lines).show(word_lines(self.desk, self.desk.words, width))
-        self.query_one("#message", Lines).show(self._message(width))
+    def draw(self, width: int) -> None:
+        """The desk's state, and what it has come to."""
+        super().draw(width)
+        self.put("title", [self._title(width)])
+        self.put("words", word_lines(self.desk, self.desk.words, width))
+        self.put("message", self._message(width))
         if self.desk.blocks:
             self._show_tables(width)
         else:
@@ -104,38 +91,31 @@ class BlocksScreen(BlockKeys):
         each = (width - 1) // 2
         most = max(len(b.slots) for b in desk.blocks)
         double = width >= WIDE and self.size.height - BELOW >= 2 * most
-        for id, one in zip(("#first", "#second"), desk.blocks, strict=False):
+        for place, one in zip(("first", "second"), desk.blocks, strict=False):
             at = self._at if one is block else None
-            lines = table_lines(desk, one, each, at, double=double)
-            self.query_one(id, Lines).show(lines)
+            self.put(place, table_lines(desk, one, each, at, double=double))
         detail = [rule("Slot", width), *detail_lines(desk, block, self._at, width)]
-        self.query_one("#detail", Lines).show(detail)
-        self.query_one("#cost", Lines).show(cost_lines(desk, desk.saving(), width))
+        self.put("detail", detail)
+        self.put("cost", cost_lines(desk, desk.saving(), width))
 
     def _show_neighbours(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
         head = rule("Neighbours of the monitoring set, one request each", width)
         room = max(3, self.size.height - len(why) - 8)
         found = stretch_lines(self.desk, self.desk.stretches(), width, room)
-        self.query_one("#first", Lines).show([*why, Text(""), head, *found])
+        self.put("first", [*why, Text(""), head, *found])
 
     def _title(self, width: int) -> Text:
         title = rule(
             f"Blocks · {self.session.profile.name} · device {self.session.device}", width - 12
         )
-        armed = self.commander.armed_for
-        if armed is not None:
-            title.append(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
-        else:
-            title.append(" NOT ARMED", STRONG)
-        return title
+        return title.append_text(armed_text(self.commander.armed_for))
 
     def _message(self, width: int) -> list[Text]:
         desk, now = self.desk, self.app.clock.monotonic()
-        said = desk.said
         text, style = "", FAINT
-        if said is not None and (desk.busy or now - said.time < SAID_FOR[said.kind]):
-            text, style = said.text, STYLES[said.kind]
+        if told := news(desk.said, now, busy=desk.busy):
+            text, style = told
         elif desk.trouble:
             text, style = desk.trouble, ALARM
         elif count := sum(len(desk.changes(block)) for block in desk.blocks):
@@ -158,10 +138,6 @@ class BlocksScreen(BlockKeys):
         if self.desk.blocks:
             self._side = (self._side + 1) % len(self.desk.blocks)
         self.action_move(0)
-
-    def action_leave(self) -> None:
-        """Back to Monitor; what is proposed stays."""
-        self.app.pop_screen()
 
     # Keys that propose
 
@@ -209,17 +185,6 @@ class BlocksScreen(BlockKeys):
 
     # Keys that write
 
-    def action_arm(self) -> None:
-        """Let writes to this drive through, or no longer."""
-        try:
-            if self.commander.armed_for is not None:
-                self.commander.disarm()
-            else:
-                self.commander.arm()
-        except OrderRefused as refused:
-            self.desk.refuse(str(refused))
-        self.look()
-
     def action_verify(self) -> None:
         """Compare every slot several times."""
         if self.desk.blocks:
@@ -239,8 +204,7 @@ class BlocksScreen(BlockKeys):
         if wrong:
             self._refuse(wrong[0].text)
             return
-        if not self._armed():
-            self._refuse("Not armed: a arms this drive.")
+        if not self._armed_or_told():
             return
 
         def told(sure: bool | None) -> None:

@@ -14,15 +14,13 @@ from tui.drive.control_source import changes, source_codes, source_in_force
 from tui.drive.schema import ControlSource
 from tui.session.drive_session import DriveSession
 from tui.widgets.control_source import change_lines, diagram, note_lines
-from tui.widgets.drawing import key_line, rule
+from tui.widgets.drawing import armed_text, rule
 from tui.widgets.lines import Lines
 from tui.widgets.monitor_orders import outcome_lines
-from tui.widgets.palette import ALARM, ATTENTION_BLOCK, FAINT, PLAIN, STRONG
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 
-from .actions import SOURCES, bindings, keys_of
+from .actions import SOURCES, bindings
 from .orders import OrderKeys
-
-LOOK = 0.5
 
 
 class ControlSourceScreen(OrderKeys):
@@ -31,6 +29,7 @@ class ControlSourceScreen(OrderKeys):
     CSS_PATH = "control_source.tcss"
     BINDINGS: ClassVar = bindings(SOURCES)
     TITLE = "Control source"
+    LOOK = 0.5
 
     def __init__(self, session: DriveSession) -> None:
         super().__init__()
@@ -50,11 +49,9 @@ class ControlSourceScreen(OrderKeys):
 
     def on_mount(self) -> None:
         """Show the list, and read what the drive holds."""
-        self.query_one("#keys", Lines).show([key_line(keys_of(SOURCES))])
         self._list()
         self.query_one(OptionList).focus()
         self.run_worker(self._read(), exclusive=True, group="sources")
-        self.set_interval(LOOK, self.look)
 
     async def _read(self) -> None:
         try:
@@ -92,18 +89,16 @@ class ControlSourceScreen(OrderKeys):
         """Another one is looked at."""
         self.look()
 
-    def look(self) -> None:
+    def draw(self, width: int) -> None:
         """Show the chosen configuration, and what became of the last order."""
-        if not self.is_current:
-            return
-        width = self.size.width
+        super().draw(width)
         found = changes(self.session.profile, self._chosen, self._raws)
         lines = [rule("So it works", width), *diagram(self._chosen)]
         lines.append(rule("It would write", width))
         if self._raws:
             lines += change_lines(self.session.profile, found, width)
         lines += [Text(""), *note_lines(self._chosen, found, width)]
-        self.query_one("#detail", Lines).show(lines)
+        self.put("detail", lines)
         self._head(width)
         outcome = self.commander.outcome
         if outcome is not None and outcome is not self._seen and outcome.kind != "working":
@@ -112,12 +107,8 @@ class ControlSourceScreen(OrderKeys):
 
     def _head(self, width: int) -> None:
         title = rule(f"Control source · {self.session.profile.name}", width - 12)
-        armed = self.commander.armed_for
-        if armed is not None:
-            title.append(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
-        else:
-            title.append(" NOT ARMED", STRONG)
-        self.query_one("#title", Lines).show([title])
+        title.append_text(armed_text(self.commander.armed_for))
+        self.put("title", [title])
         control = self.control(self.app.clock.monotonic())
         if control.outcome is not None:
             message = [Text(" ") + line for line in outcome_lines(control.outcome, width - 2)]
@@ -127,7 +118,7 @@ class ControlSourceScreen(OrderKeys):
             message = [Text(" Today's setting is none of these.", FAINT)]
         else:
             message = [Text("")]
-        self.query_one("#message", Lines).show(message)
+        self.put("message", message)
 
     def on_option_list_option_selected(self) -> None:
         """Enter in the list."""
@@ -138,9 +129,7 @@ class ControlSourceScreen(OrderKeys):
         from .confirm import Confirm
 
         found = changes(self.session.profile, self._chosen, self._raws)
-        if self.commander.armed_for is None:
-            self.commander.refuse("Not armed: a arms this drive.")
-        elif found and self._raws:
+        if self._armed_or_told() and found and self._raws:
             codes = ", ".join(change.parameter.code for change in found)
             follows = (
                 f"Writes {codes}, each read back. A run order that waits at the new source"
@@ -155,7 +144,3 @@ class ControlSourceScreen(OrderKeys):
             keys = "y or Enter writes   Esc leaves all as it is"
             self.app.push_screen(Confirm(f"{source.name}?", follows, keys), told)
         self.look()
-
-    def action_leave(self) -> None:
-        """Back to Monitor."""
-        self.app.pop_screen()

@@ -8,7 +8,6 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
-from textual.screen import Screen
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
@@ -17,28 +16,27 @@ from tui.session.drive_session import DriveSession
 from tui.session.fault_record import FaultRecord, Recorder, record_name, record_text
 from tui.session.readings import Reading
 from tui.session.state import state_folder
-from tui.widgets.drawing import key_line, rule
+from tui.widgets.drawing import rule
 from tui.widgets.fault_view import fault_lines, history_line, record_lines, stored_lines
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, STRONG
 
-from .actions import FAULTS, bindings, keys_of
-from .panel import Panel
+from .actions import FAULTS, bindings
+from .base import PanelScreen
+from .files import fault_of_new
 
-LOOK = 0.5
 LEFT = 36
 STEP = 5
 """Rows of the record that a key moves by."""
 
 
-class FaultsScreen(Screen[None]):
+class FaultsScreen(PanelScreen):
     """Reads the history when it opens, and again after a trip."""
 
     CSS_PATH = "faults.tcss"
     BINDINGS: ClassVar = bindings(FAULTS)
     TITLE = "Faults"
-
-    app: Panel
+    LOOK = 0.5
 
     def __init__(self, session: DriveSession) -> None:
         super().__init__()
@@ -67,11 +65,9 @@ class FaultsScreen(Screen[None]):
         """Read the history; who opens this screen has seen the trip."""
         self._recorder.acknowledge()
         self._shown = self._recorder.latest
-        self.query_one("#keys", Lines).show([key_line(keys_of(FAULTS))])
         self._list()
         self.query_one(OptionList).focus()
         self._read_again()
-        self.set_interval(LOOK, self.look)
 
     def _read_again(self) -> None:
         self.run_worker(self._read(), exclusive=True, group="faults")
@@ -106,28 +102,25 @@ class FaultsScreen(Screen[None]):
         """Another fault of the history is looked at."""
         self.look()
 
-    def look(self) -> None:
+    def draw(self, width: int) -> None:
         """Show what there is; a new trip counts as seen."""
-        if not self.is_current:
-            return
+        super().draw(width)
         record = self._recorder.latest
         if record is not self._shown:
             self._shown, self._offset = record, 0
             self._recorder.acknowledge()
             self._read_again()
-        width, height = self.size
         latest = self.session.monitor.latest
         present = latest is not None and latest.state.kind == "fault"
         fault = latest.state.fault if latest and present else record.fault if record else None
         who = f"Faults · {self.session.profile.name} · device {self.session.device}"
-        self.query_one("#title", Lines).show([rule(who, width, self.app.clock.time_of_day())])
-        self.query_one("#fault", Lines).show(fault_lines(fault, present, width))
-        self.query_one("#stored", Lines).show(
-            stored_lines(self.session.profile, self._stored(), self._readings, width - LEFT)
-        )
-        room = height - 1 - 4 - self.query_one("#middle").size.height - 2
-        self.query_one("#record", Lines).show(record_lines(record, width, room, self._offset))
-        self.query_one("#message", Lines).show([self._message])
+        self.put("title", [rule(who, width, self.app.clock.time_of_day())])
+        self.put("fault", fault_lines(fault, present, width))
+        stored = stored_lines(self.session.profile, self._stored(), self._readings, width - LEFT)
+        self.put("stored", stored)
+        room = self.size.height - 1 - 4 - self.query_one("#middle").size.height - 2
+        self.put("record", record_lines(record, width, room, self._offset))
+        self.put("message", [self._message])
 
     def _stored(self) -> list[str]:
         """Codes that the drive keeps of the chosen fault."""
@@ -157,7 +150,9 @@ class FaultsScreen(Screen[None]):
                 self._write(Path(name).expanduser(), record)
 
         about = "Markdown, with the values, what the drive stored, and what was written."
-        self.app.push_screen(Ask("Save the trip as", _taken, text=proposed, about=about), told)
+        self.app.push_screen(
+            Ask("Save the trip as", fault_of_new, text=proposed, about=about), told
+        )
 
     def _write(self, path: Path, record: FaultRecord) -> None:
         stored = self.session.profile.data.faults.stored
@@ -174,14 +169,3 @@ class FaultsScreen(Screen[None]):
         else:
             self._message = Text(f" Saved: {path}", STRONG)
         self.look()
-
-    def action_leave(self) -> None:
-        """Back to Monitor."""
-        self.app.pop_screen()
-
-
-def _taken(name: str) -> str:
-    """What is wrong with a file name."""
-    if not name.strip():
-        return "A name is needed."
-    return f"{name} is there already." if Path(name).expanduser().exists() else ""

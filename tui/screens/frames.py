@@ -6,27 +6,23 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.screen import Screen
 
 from tui.bus.line import Frame, Line
-from tui.widgets.drawing import key_line, rule
+from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN
 
-from .actions import FRAMES, bindings, keys_of
-from .panel import Panel
-
-REFRESH = 0.5
+from .actions import FRAMES, bindings
+from .base import PanelScreen
 
 
-class FramesScreen(Screen[None]):
+class FramesScreen(PanelScreen):
     """The frame log of the line; the newest at the bottom."""
 
     CSS_PATH = "frames.tcss"
     BINDINGS: ClassVar = bindings(FRAMES)
     TITLE = "Frames"
-
-    app: Panel
+    LOOK = 0.5
 
     def __init__(self, line: Line) -> None:
         super().__init__()
@@ -38,31 +34,21 @@ class FramesScreen(Screen[None]):
         yield Lines(id="frames")
         yield Lines(id="keys")
 
-    def on_mount(self) -> None:
-        """Look at the trace now and then."""
-        self.set_interval(REFRESH, self.look)
-        self.query_one("#keys", Lines).show([key_line(keys_of(FRAMES))])
-        self.call_after_refresh(self.look)
-
-    def look(self) -> None:
+    def draw(self, width: int) -> None:
         """Show the newest frames that fit."""
-        width, height = self.size
+        super().draw(width)
         frames = self._held if self._held is not None else tuple(self._line.trace)
-        room = max(1, height - 2)
+        room = max(1, self.size.height - 2)
         title = "Frames on the line" + (" (held)" if self._held is not None else "")
         lines = [rule(title, width, f"{len(frames)} kept")]
         now = self.app.clock.monotonic()
         lines += [frame_line(frame, now, width) for frame in frames[-room:]]
-        self.query_one("#frames", Lines).show(lines)
+        self.put("frames", lines)
 
     def action_hold(self) -> None:
         """Hold the list still, or let it run."""
         self._held = tuple(self._line.trace) if self._held is None else None
         self.look()
-
-    def action_leave(self) -> None:
-        """Back to Monitor."""
-        self.app.pop_screen()
 
 
 def frame_line(frame: Frame, now: float, width: int) -> Text:

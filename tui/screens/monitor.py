@@ -93,7 +93,6 @@ class MonitorScreen(OrderKeys):
         self._timer = self.set_interval(
             LOW_BANDWIDTH_REFRESH if self.app.low_bandwidth else REFRESH, self.look
         )
-        self.call_after_refresh(self.look)
 
     def on_unmount(self) -> None:
         """Stop watching; nobody looks any more, and nothing is commanded any more."""
@@ -103,7 +102,6 @@ class MonitorScreen(OrderKeys):
     def on_resize(self, event: Resize) -> None:
         """More room, more words."""
         self.set_class(event.size.width >= WIDE[0] and event.size.height >= WIDE[1], "wide")
-        self.call_after_refresh(self.look)
 
     def on_screen_suspend(self) -> None:
         """Stand still while another screen is on top.
@@ -119,7 +117,7 @@ class MonitorScreen(OrderKeys):
         """Nobody shall take what shines through under a dialog for the present."""
         if self.app.screen.styles.background.a < 1:
             view = replace(self._view(), clock=f"as of {since}")
-            self.query_one("#header", Lines).show(header(view, self.size.width))
+            self.put("header", header(view, self.size.width))
 
     def on_screen_resume(self) -> None:
         """Look again after another screen was on top."""
@@ -134,14 +132,13 @@ class MonitorScreen(OrderKeys):
         """Whether all words stand side by side."""
         return self.has_class("wide")
 
-    def look(self) -> None:
-        """Show the latest snapshot; lines that stay the same are not drawn."""
-        if self.is_current:
-            self._show(self._parts(self._view()))
+    def draw(self, width: int) -> None:
+        """Show the latest snapshot; which keys work now depends on it."""
+        self._put_all(self._parts(self._view(), width))
 
-    def _show(self, parts: dict[str, list[Text]]) -> None:
-        for id, lines in parts.items():
-            self.query_one(f"#{id}", Lines).show(lines)
+    def _put_all(self, parts: dict[str, list[Text]]) -> None:
+        for place, lines in parts.items():
+            self.put(place, lines)
 
     def _view(self) -> View:
         now = self.app.clock.monotonic()
@@ -192,8 +189,8 @@ class MonitorScreen(OrderKeys):
             self._load = min(1.0, max(0.0, (busy - before) / (now - since)))
             self._busy = (now, busy)
 
-    def _parts(self, view: View) -> dict[str, list[Text]]:
-        width, height = self.size
+    def _parts(self, view: View, width: int) -> dict[str, list[Text]]:
+        height = self.size.height
         left = WIDE_LEFT if self.wide else SMALL_LEFT
         right = max(20, width - left - 1)
         parts = {
@@ -258,10 +255,6 @@ class MonitorScreen(OrderKeys):
         codes += [parameter.code for parameter in self._words()]
         return list(dict.fromkeys(codes))
 
-    def action_leave(self) -> None:
-        """Back to Connection."""
-        self.app.pop_screen()
-
     def action_step_drive(self, step: int) -> None:
         """Another drive of this line."""
         self.app.step_drive(self.session.device, step)
@@ -278,10 +271,10 @@ class MonitorScreen(OrderKeys):
         self._word += 1
         view = self._view()
         if self.wide:
-            self._show(self._wide_words(view, WORDS_HEIGHT))
+            self._put_all(self._wide_words(view, WORDS_HEIGHT))
         else:
             height = self.query_one("#left").size.height
-            self._show(self._small_word(view, height - len(state_lines(view, SMALL_LEFT))))
+            self._put_all(self._small_word(view, height - len(state_lines(view, SMALL_LEFT))))
 
     def action_rating(self) -> None:
         """Tell the rated current of a drive that gives its current in %."""
@@ -325,11 +318,10 @@ class MonitorScreen(OrderKeys):
         from .control_source import ControlSourceScreen
 
         if not self.session.profile.data.control_sources:
-            self.commander.refuse(
+            self._refuse(
                 "The control source of this drive is set at its keypad; t takes the control,"
                 " g gives it back, where it has a word for that."
             )
-            self.look()
             return
         self.app.push_screen(ControlSourceScreen(self.session))
 

@@ -5,37 +5,21 @@ from __future__ import annotations
 from collections.abc import Callable
 from decimal import Decimal
 
-from textual.screen import Screen
-
 from tui.drive.errors import ValueRefused
 from tui.drive.orders import OrderRefused, chart_in_force, interlock
 from tui.drive.schema import CommandOption, OrderId
-from tui.session.command import Commander
-from tui.session.drive_session import DriveSession
 from tui.session.reference import parse_reference
 from tui.widgets.monitor_view import Control
 
-from .panel import Panel
+from .arming import Arming
 
 SHOWN = 8.0
 SHOWN_REFUSED = 20.0
 """Seconds for which it is shown what became of an order."""
 
 
-class OrderKeys(Screen[None]):
+class OrderKeys(Arming):
     """The actions of the keys; everything else is the commander's."""
-
-    app: Panel
-    session: DriveSession
-
-    @property
-    def commander(self) -> Commander:
-        """What commands this drive."""
-        return self.app.commander(self.session)
-
-    def look(self) -> None:
-        """Show what there is now."""
-        raise NotImplementedError
 
     def control(self, now: float) -> Control:
         """Whether and how the drive is commanded from here, for the screen."""
@@ -53,15 +37,8 @@ class OrderKeys(Screen[None]):
             lost=commander.lost_orders(),
         )
 
-    def action_arm(self) -> None:
-        """Let orders to this drive through, or no longer."""
-        try:
-            if self.commander.armed_for is not None:
-                self.commander.disarm()
-            else:
-                self.commander.arm()
-        except OrderRefused as refused:
-            self.commander.refuse(str(refused))
+    def _refuse(self, text: str) -> None:
+        self.commander.refuse(text)
         self.look()
 
     def action_order(self, id: OrderId) -> None:
@@ -110,11 +87,8 @@ class OrderKeys(Screen[None]):
                 return str(refused)
             return ""
 
-        if self.commander.armed_for is None:
-            self.commander.refuse("Not armed: a arms this drive.")
-            self.look()
-            return
-        self.app.push_screen(Ask("Reference", wrong, about=about), given)
+        if self._armed_or_told():
+            self.app.push_screen(Ask("Reference", wrong, about=about), given)
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""
@@ -123,8 +97,7 @@ class OrderKeys(Screen[None]):
         raws = self.session.monitor.known.raws()
         chart = chart_in_force(self.session.profile, raws)
         if chart is None or not chart.options:
-            self.commander.refuse("This drive has no options of its commands.")
-            self.look()
+            self._refuse("This drive has no options of its commands.")
             return
 
         def chosen(choice: tuple[CommandOption, int] | None) -> None:

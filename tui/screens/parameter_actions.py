@@ -1,54 +1,40 @@
-"""Actions of the Parameters screen."""
+"""Actions of the Parameters screen: action, keys, label in the line of keys, help."""
 
 from __future__ import annotations
 
-from .action import PARAMETERS, Action
+from .action import PARAMETERS, on
 
-HERE = (PARAMETERS,)
+KEEP = "Confirm an unverified parameter, or keep an edit over another's change."
+COMPARE = "Compare with a file, another drive of the line, or the factory settings."
 
-PARAMETER_ACTIONS: tuple[Action, ...] = (
-    Action("edit", "enter", "Enter", "edit", "Edit the parameter under the cursor.", HERE),
-    Action("search", "slash", "/", "find", "Search code, name, address and values.", HERE),
-    Action("filter(1)", "d", "d", "show", "Show another selection: staged, all, ...", HERE),
-    Action("filter(-1)", "D", "D", "", "The selection before.", HERE, line=False),
-    Action("undo", "u", "u", "", "Take the edit under the cursor back.", HERE, line=False),
-    Action("undo_all", "U", "U", "", "Take every edit back.", HERE, line=False),
-    Action("write", "w", "w", "write", "Write all that is staged, each read back.", HERE),
-    Action("write_one", "W", "W", "", "Write the edit under the cursor.", HERE, line=False),
-    Action("move(-1)", "up", "Up", "", "One up.", HERE, line=False),
-    Action("move(1)", "down", "Down", "", "One down.", HERE, line=False),
-    Action("page(-1)", "pageup", "PgUp", "", "A screen up.", HERE, line=False),
-    Action("page(1)", "pagedown", "PgDn", "", "A screen down.", HERE, line=False),
-    Action("end(-1)", "home", "Home", "", "The first parameter.", HERE, line=False),
-    Action("end(1)", "end", "End", "", "The last parameter.", HERE, line=False),
-    Action("group(-1)", "left_square_bracket", "[", "", "The group before.", HERE, line=False),
-    Action("group(1)", "right_square_bracket", "]", "", "The next group.", HERE, line=False),
-    Action("step_value(1)", "plus", "+", "", "Stage one step more.", HERE, line=False),
-    Action("step_value(-1)", "minus", "-", "", "Stage one step less.", HERE, line=False),
-    Action("favourite", "asterisk", "*", "", "Mark as a favourite, or no more.", HERE, line=False),
-    Action(
-        "confirm",
-        "y",
-        "y",
-        "",
-        "Confirm an unverified parameter, or keep an edit over another's change.",
-        HERE,
-        line=False,
-    ),
-    Action("save", "s", "s", "", "Save to EEPROM, where the drive needs it.", HERE, line=False),
-    Action("factory", "F", "F", "", "Recall the factory settings.", HERE, line=False),
-    Action("backup", "b", "b", "", "Back all parameters up to a file.", HERE, line=False),
-    Action("report", "p", "p", "", "Write a report on this drive.", HERE, line=False),
-    Action(
-        "compare",
-        "o",
-        "o",
-        "",
-        "Compare with a file, another drive of the line, or the factory settings.",
-        HERE,
-        line=False,
-    ),
-    Action("stage_set", "n", "n", "", "Stage what the set has otherwise.", HERE, line=False),
-    Action("leave", "escape", "Esc", "", "Out of search, selection, screen.", HERE, line=False),
-    Action("monitor", "2", "2", "", "Go to Monitor.", HERE, line=False),
+PARAMETER_ACTIONS = on(
+    (PARAMETERS,),
+    ("edit", "enter", "edit", "Edit the parameter under the cursor."),
+    ("search", "/", "find", "Search code, name, address and values."),
+    ("filter(1)", "d", "show", "Show another selection: staged, all, ..."),
+    ("filter(-1)", "D", "", "The selection before."),
+    ("undo", "u", "", "Take the edit under the cursor back."),
+    ("undo_all", "U", "", "Take every edit back."),
+    ("write", "w", "write", "Write all that is staged, each read back."),
+    ("write_one", "W", "", "Write the edit under the cursor."),
+    ("move(-1)", "up", "", "One up."),
+    ("move(1)", "down", "", "One down."),
+    ("page(-1)", "pageup", "", "A screen up."),
+    ("page(1)", "pagedown", "", "A screen down."),
+    ("end(-1)", "home", "", "The first parameter."),
+    ("end(1)", "end", "", "The last parameter."),
+    ("group(-1)", "[", "", "The group before."),
+    ("group(1)", "]", "", "The next group."),
+    ("step_value(1)", "+", "", "Stage one step more."),
+    ("step_value(-1)", "-", "", "Stage one step less."),
+    ("favourite", "*", "", "Mark as a favourite, or no more."),
+    ("confirm", "y", "", KEEP),
+    ("save", "s", "", "Save to EEPROM, where the drive needs it."),
+    ("factory", "F", "", "Recall the factory settings."),
+    ("backup", "b", "", "Back all parameters up to a file."),
+    ("report", "p", "", "Write a report on this drive."),
+    ("compare", "o", "", COMPARE),
+    ("stage_set", "n", "", "Stage what the set has otherwise."),
+    ("leave", "escape", "", "Out of search, selection, screen."),
+    ("monitor", "2", "", "Go to Monitor."),
 )

@@ -11,10 +11,9 @@ from textual.widgets import Input
 
 from tui.drive.errors import DriveError
 from tui.drive.rows import FILTERS, FilterId, rows
-from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
 from tui.session.editor import Editor
-from tui.widgets.drawing import key_line, rule
+from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, STRONG
 from tui.widgets.parameter_view import (
@@ -27,23 +26,23 @@ from tui.widgets.parameter_view import (
     status_line,
 )
 
-from .actions import PARAMETERS, bindings, keys_of
+from .actions import PARAMETERS, bindings
+from .arming import Arming
+from .said import news
 from .set_keys import SetKeys
 
-REFRESH = 0.25
-SAID_FOR = {"working": 60.0, "done": 12.0, "refused": 60.0}
-"""Seconds for which it is shown what the last writing has come to."""
 BELOW = 9
 """Lines below the table: four of detail, three of news, the status and the keys."""
 ABOVE = 2
 
 
-class ParametersScreen(SetKeys):
+class ParametersScreen(SetKeys, Arming):
     """A table with a cursor; the editor does the reading and the writing."""
 
     CSS_PATH = "parameters.tcss"
     BINDINGS: ClassVar = bindings(PARAMETERS)
     TITLE = "Parameters"
+    LOOK = 0.25
     AUTO_FOCUS = ""
 
     def __init__(self, session: DriveSession) -> None:
@@ -61,11 +60,6 @@ class ParametersScreen(SetKeys):
         """What is known and staged; stays with the drive while the panel runs."""
         return self.app.editor(self.session)
 
-    @property
-    def commander(self) -> Commander:
-        """What arms this drive."""
-        return self.app.commander(self.session)
-
     def compose(self) -> ComposeResult:
         """The search above, the table, the details below."""
         with Horizontal(id="top"):
@@ -80,19 +74,13 @@ class ParametersScreen(SetKeys):
 
     def on_mount(self) -> None:
         """Begin to read."""
-        self.query_one("#keys", Lines).show([key_line(keys_of(PARAMETERS))])
         self.editor.start()
-        self.set_interval(REFRESH, self.look)
         self.call_after_refresh(self._list_again)
 
     def on_unmount(self) -> None:
         """Read no more; what is staged stays."""
         self.editor.stop()
         self.editor.visible = ()
-
-    def on_resize(self) -> None:
-        """More room, more rows."""
-        self.call_after_refresh(self.look)
 
     # The list
 
@@ -131,11 +119,10 @@ class ParametersScreen(SetKeys):
     def _room(self) -> int:
         return max(3, self.size.height - ABOVE - BELOW)
 
-    def look(self) -> None:
-        """Show what there is now; lines that stay the same are not drawn."""
-        if not self.is_current or not self.size.width:
-            return
-        editor, width, room = self.editor, self.size.width, self._room
+    def draw(self, width: int) -> None:
+        """The lines around the cursor, what is known of the one under it, and the news."""
+        super().draw(width)
+        editor, room = self.editor, self._room
         self._offer_to_follow()
         first = self._at - 1 if self._at and self._items[self._at - 1].group else self._at
         self._top = min(max(self._top, self._at - room + 1), first) if self._items else 0
@@ -147,15 +134,13 @@ class ParametersScreen(SetKeys):
         ]
         if not table:
             table = [Text(self._empty(), FAINT)]
-        self.query_one("#title", Lines).show([self._title()])
-        self.query_one("#head", Lines).show([head_line(width, editor.other_label.capitalize())])
-        self.query_one("#table", Lines).show(table)
+        self.put("title", [self._title()])
+        self.put("head", [head_line(width, editor.other_label.capitalize())])
+        self.put("table", table)
         detail = detail_lines(editor, self._code, width) if self._code else []
-        self.query_one("#detail", Lines).show([rule("", width), *detail])
-        news = news_lines(editor, self._code, self._message(), width)
-        self.query_one("#message", Lines).show(news)
-        armed = self.commander.armed_for
-        self.query_one("#status", Lines).show([status_line(editor, armed, width)])
+        self.put("detail", [rule("", width), *detail])
+        self.put("message", news_lines(editor, self._code, self._message(), width))
+        self.put("status", [status_line(editor, self.commander.armed_for, width)])
 
     def _offer_to_follow(self) -> None:
         """Ask once whether to go where the drive answers now."""
@@ -193,17 +178,17 @@ class ParametersScreen(SetKeys):
         return f" No parameter is {self._filter}. d shows another selection."
 
     def _message(self) -> Text:
-        editor, now = self.editor, self.app.clock.monotonic()
-        said = editor.said
-        if said is not None and (editor.busy or now - said.time < SAID_FOR[said.kind]):
-            style = {"working": ATTENTION, "done": STRONG, "refused": ALARM}[said.kind]
-            return Text(said.text, style)
-        return Text(self._note or editor.trouble, ALARM)
+        editor = self.editor
+        told = news(editor.said, self.app.clock.monotonic(), busy=editor.busy)
+        return Text(*told) if told else Text(self._note or editor.trouble, ALARM)
 
     def show_differences(self) -> None:
         """Show what the drive has otherwise than the set."""
         self._filter = "differs"
         self._list_again()
+
+    def _refuse(self, text: str) -> None:
+        self.note(text)
 
     def note(self, text: str) -> None:
         """Say something in the line of messages."""
@@ -378,25 +363,6 @@ class ParametersScreen(SetKeys):
 
     # Keys that write
 
-    def action_arm(self) -> None:
-        """Let writes to this drive through, or no longer."""
-        from tui.drive.orders import OrderRefused
-
-        try:
-            if self.commander.armed_for is not None:
-                self.commander.disarm()
-            else:
-                self.commander.arm()
-        except OrderRefused as refused:
-            self.note(str(refused))
-        self.look()
-
-    def _is_armed(self) -> bool:
-        if self.commander.armed_for is None:
-            self.note("Not armed: a arms this drive.")
-            return False
-        return True
-
     def action_write(self, *, only: str = "") -> None:
         """Say what will be written, and write it."""
         from .confirm import Confirm
@@ -406,11 +372,11 @@ class ParametersScreen(SetKeys):
         if not edits:
             self.note("Nothing is staged: Enter edits the parameter under the cursor.")
             return
-        if not self._is_armed():
+        if not self._armed_or_told():
             return
 
         def told(sure: bool | None) -> None:
-            if sure and self._is_armed():
+            if sure and self._armed_or_told():
                 self._note = ""
                 self.editor.apply((only,) if only else ())
                 self.look()
@@ -448,11 +414,11 @@ class ParametersScreen(SetKeys):
         except DriveError as refused:
             self.note(str(refused))
             return
-        if not self._is_armed():
+        if not self._armed_or_told():
             return
 
         def told(sure: bool | None) -> None:
-            if sure and self._is_armed():
+            if sure and self._armed_or_told():
                 work()
                 self.look()
 

@@ -8,23 +8,21 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from textual.screen import Screen
-
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 from tui.session.drive_session import DriveSession
 from tui.session.editor import Editor
 
-from .panel import Panel
+from .base import PanelScreen
+from .files import fault_of_new
 
 if TYPE_CHECKING:
     from tui.drive.parameter_set import ParameterSet
 
 
-class SetKeys(Screen[None]):
+class SetKeys(PanelScreen):
     """Reads and writes files of parameter sets; what a set has otherwise is staged, not written."""
 
-    app: Panel
     session: DriveSession
 
     @property
@@ -78,7 +76,7 @@ class SetKeys(Screen[None]):
                 self.run_worker(work, exclusive=True, group="sets")
 
         proposed = str(Path.cwd() / name)
-        self.app.push_screen(Ask(question, _free, text=proposed, about=about), told)
+        self.app.push_screen(Ask(question, fault_of_new, text=proposed, about=about), told)
 
     async def _read_to_file(self, path: Path, text: Callable[[ParameterSet], str]) -> None:
         from tui.drive.set_file import write_file
@@ -209,10 +207,3 @@ def plan_values(plan: object) -> dict[str, int]:
 
     assert isinstance(plan, RestorePlan)
     return {edit.code: edit.new for edit in plan.edits}
-
-
-def _free(name: str) -> str:
-    """What is wrong with a name for a new file."""
-    if not name.strip():
-        return "A name is needed."
-    return f"{name} is there already." if Path(name).expanduser().exists() else ""

@@ -9,7 +9,7 @@ from decimal import Decimal
 from rich.style import Style
 from rich.text import Text
 
-from .palette import BAR, BAR_REST, FAINT, LINE, MARK, PLAIN, TITLE
+from .palette import ATTENTION_BLOCK, BAR, BAR_REST, FAINT, LINE, MARK, PLAIN, STRONG, TITLE
 
 EIGHTHS_HIGH = " ▁▂▃▄▅▆▇█"
 
@@ -127,6 +127,13 @@ def key_line(keys: Sequence[tuple[str, str]]) -> Text:
         text.append(key, KEY)
         text.append(f" {does}", FAINT)
     return text
+
+
+def armed_text(armed: float | None) -> Text:
+    """Whether a drive is armed, and for how many seconds more."""
+    if armed is None:
+        return Text(" NOT ARMED  ", STRONG)
+    return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
 
 
 def pair(label: str, value: str, style: Style = PLAIN, width: int = 12) -> Text:

@@ -17,11 +17,10 @@ from tui.drive.values import NOT_AVAILABLE, is_enumeration, raw_range, set_bits
 from tui.drive.writable import marks, waits_for_reset
 from tui.session.editor import Editor
 
-from .drawing import cut
+from .drawing import armed_text, cut
 from .palette import (
     ALARM,
     ATTENTION,
-    ATTENTION_BLOCK,
     CURSOR,
     FAINT,
     LINE,
@@ -303,11 +302,7 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
 
 def status_line(editor: Editor, armed: float | None, width: int) -> Text:
     """Armed or not, what the drive does, what waits to be written, saved or reset."""
-    text = Text(no_wrap=True)
-    if armed is not None:
-        text.append(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
-    else:
-        text.append(" NOT ARMED  ", STRONG)
+    text = Text(no_wrap=True).append_text(armed_text(armed))
     latest = editor.session.monitor.latest
     now = "state not known" if latest is None or latest.error else latest.state.headline
     text.append(f"  {now}", PLAIN if editor.state else ALARM)

@@ -1,0 +1,46 @@
+"""Arming on every screen that gives orders to a drive or writes to it."""
+
+from __future__ import annotations
+
+from tui.drive.orders import OrderRefused
+from tui.session.command import Commander
+from tui.session.drive_session import DriveSession
+
+from .base import PanelScreen
+
+NOT_ARMED = "Not armed: a arms this drive."
+
+
+class Arming(PanelScreen):
+    """Knows whether the drive is armed; where a refusal is told is up to the screen."""
+
+    session: DriveSession
+
+    @property
+    def commander(self) -> Commander:
+        """What arms and commands this drive."""
+        return self.app.commander(self.session)
+
+    def _refuse(self, text: str) -> None:
+        """Tell on this screen why something was not done."""
+        raise NotImplementedError
+
+    def _armed(self) -> bool:
+        return self.commander.armed_for is not None
+
+    def _armed_or_told(self) -> bool:
+        """Whether the drive is armed; where it is not, that is told."""
+        if not self._armed():
+            self._refuse(NOT_ARMED)
+        return self._armed()
+
+    def action_arm(self) -> None:
+        """Let orders and writes to this drive through, or no longer."""
+        try:
+            if self._armed():
+                self.commander.disarm()
+            else:
+                self.commander.arm()
+        except OrderRefused as refused:
+            self._refuse(str(refused))
+        self.look()

@@ -1,0 +1,53 @@
+"""What the screens of the panel share: a look now and then, lines in their places, the keys."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import ClassVar
+
+from rich.text import Text
+from textual.events import Resize
+from textual.screen import Screen
+
+from tui.widgets.drawing import key_line
+from tui.widgets.lines import Lines
+
+from .actions import keys_of
+from .panel import Panel
+
+
+class PanelScreen(Screen[None]):
+    """A screen made of lines, the last of which names its keys.
+
+    Textual calls the `on_...` methods of a class and then those of its bases.
+    """
+
+    app: Panel
+    LOOK: ClassVar[float | None] = None
+    """Seconds between two looks at what there is; None for a screen with a time of its own."""
+
+    def on_mount(self) -> None:
+        """Look now and then."""
+        if self.LOOK is not None:
+            self.set_interval(self.LOOK, self.look)
+
+    def on_resize(self, event: Resize) -> None:
+        """More room, more lines."""
+        self.call_after_refresh(self.look)
+
+    def put(self, place: str, lines: Sequence[Text]) -> None:
+        """Show lines in the place with that id."""
+        self.query_one(f"#{place}", Lines).show(lines)
+
+    def look(self) -> None:
+        """Show what there is now; lines that stay the same are not drawn."""
+        if self.is_current and self.size.width:
+            self.draw(self.size.width)
+
+    def draw(self, width: int) -> None:
+        """Put every line, here that of the keys; the screen is on top and has a size."""
+        self.put("keys", [key_line(keys_of((self.TITLE or "").lower()))])
+
+    def action_leave(self) -> None:
+        """Back to the screen below."""
+        self.app.pop_screen()

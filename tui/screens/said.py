@@ -1,0 +1,39 @@
+"""What work on a drive has come to, for as long as that is news."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from rich.style import Style
+
+from tui.session.command import Kind
+from tui.widgets.monitor_orders import OUTCOME_STYLES
+
+SAID_FOR = {Kind.WORKING: 60.0, Kind.DONE: 15.0, Kind.REFUSED: 60.0}
+"""Seconds for which it is shown what the last work has come to."""
+
+
+class Said(Protocol):
+    """A sentence on the last work; `kind` is working, done or refused."""
+
+    @property
+    def text(self) -> str:
+        """The sentence."""
+
+    @property
+    def kind(self) -> str:
+        """The value of a Kind."""
+
+    @property
+    def time(self) -> float:
+        """When it was said, on the monotonic clock in s."""
+
+
+def news(said: Said | None, now: float, *, busy: bool) -> tuple[str, Style] | None:
+    """The sentence and its style while the work goes on and for some time after it, else None."""
+    if said is None:
+        return None
+    kind = Kind(said.kind)
+    if not busy and now - said.time >= SAID_FOR[kind]:
+        return None
+    return said.text, OUTCOME_STYLES[kind]
