@@ -8,10 +8,9 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from click.testing import CliRunner, Result
 
-from tests.programs import port_of, simulated
-from tui.cli.main import main
+from . import commands
+from .commands import tcp_line
 
 LONELY = ["atv31", "atv312", "powerdrive", "proxidrive", "varmeca"]
 
@@ -19,29 +18,20 @@ LONELY = ["atv31", "atv312", "powerdrive", "proxidrive", "varmeca"]
 @pytest.fixture
 def line() -> Iterator[str]:
     """A simulated Altivar 71 at address 2 that several commands in turn can reach."""
-    with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
-        yield f"tcp:127.0.0.1:{port_of(simulation.ready)}"
-
-
-def invoked(*arguments: str | Path) -> Result:
-    return CliRunner().invoke(main, ["block", *(str(a) for a in arguments)], prog_name="drivepanel")
+    with tcp_line("atv71@2") as line:
+        yield line
 
 
 def run(status: int, *arguments: str | Path) -> str:
-    """Run to this exit status; what is printed on standard output."""
-    done = invoked(*arguments)
-    assert done.exit_code == status, done.output
-    assert "Traceback" not in done.stderr
-    return done.stdout
+    """Run `block` to this exit status; what it prints on standard output."""
+    return commands.run(status, "block", *arguments)
 
 
 def refused(status: int, *arguments: str | Path) -> str:
-    """What is said on standard error at this exit status."""
-    done = invoked(*arguments)
-    assert done.exit_code == status, done.output
-    assert "drivepanel: " in done.stderr
-    assert "Traceback" not in done.stderr
-    return done.stderr
+    """What `block` says on standard error; faults of an assignment stand before the refusal."""
+    said = commands.ended(status, "block", *arguments).stderr
+    assert "drivepanel: " in said
+    return said
 
 
 def slots(text: str) -> dict[str, Any]:
@@ -122,16 +112,14 @@ def test_a_drive_that_does_not_answer() -> None:
 
 
 def test_a_running_motor_keeps_its_assignment() -> None:
-    with simulated("atv71@2", "--tcp", "127.0.0.1:0", "--run", "30") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv71@2", "--run", "30") as line:
         said = refused(5, line, "set", "NMA3=LCR", "--arm", "-d", "2")
         assert "motor stopped only" in said
         assert "Nothing was written" in said
 
 
 def test_the_indirect_block_counts_after_a_reset() -> None:
-    with simulated("atv21@1", "--tcp", "127.0.0.1:0") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv21@1") as line:
         done = run(0, line, "set", "F875=FD01", "F876=FD00", "--arm", "-p", "atv21")
         assert "In force after the drive's next reset" in done
         found = slots(run(1, line, "verify", "--json", "-p", "atv21"))

@@ -20,6 +20,8 @@ from tui.drive.values import decode
 from tui.session.monitor import monitoring_codes
 from tui.session.readings import Quality, Reading
 
+from .commands import tcp_line
+
 WATCH = ("watch", "sim:atv71@2", "-d", "2", "ETA", "--every", "0.1", "--json")
 ENDINGS = [signal.SIGINT, signal.SIGTERM]
 
@@ -59,8 +61,7 @@ def test_simulate_does_not_take_the_place_of_a_file(tmp_path: Path) -> None:
 def test_simulated_line_faults_are_seen_and_repeatable() -> None:
     def statuses() -> list[int]:
         faults = ("--line-fault", "lost=0.5", "--seed", "7")
-        with simulated("atv71@2", "--tcp", "127.0.0.1:0", *faults) as simulation:
-            line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        with tcp_line("atv71@2", *faults) as line:
             read = ("read", line, "ETA", "-d", "2", "-p", "atv71")
             return [drivepanel(*read).returncode for _ in range(4)]
 

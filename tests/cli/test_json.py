@@ -8,9 +8,11 @@ from typing import Any
 
 import pytest
 
-from tests.programs import drivepanel, port_of, simulated
+from tests.programs import drivepanel
 from tui.drive import library
 from tui.session.monitor import monitoring_codes
+
+from .commands import tcp_line
 
 LINE = ("sim:atv71@2", "-d", "2")
 VALUE_KEYS = {"address", "raw", "value", "unit", "text", "quality"}
@@ -48,8 +50,7 @@ def test_read_takes_any_notation_in_any_case(typed: str) -> None:
 
 
 def test_a_parameter_that_the_drive_refuses_is_null_and_the_others_are_not_hurt() -> None:
-    with simulated("atv71@2", "--tcp", "127.0.0.1:0", "--protect", "ACC") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv71@2", "--protect", "ACC") as line:
         read = told("read", line, "-d", "2", "ETA", "ACC", status=4)
     refused = read["values"]["ACC"]
     assert (refused["raw"], refused["value"], refused["quality"]) == (None, None, "bad")

@@ -13,10 +13,10 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from click.testing import CliRunner, Result
 
-from tests.programs import DRIVEPANEL, PATIENCE, port_of, simulated
-from tui.cli.main import main
+from tests.programs import DRIVEPANEL, PATIENCE
+
+from .commands import invoked, refused, run, tcp_line
 
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 
@@ -24,30 +24,8 @@ FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "va
 @pytest.fixture
 def line() -> Iterator[str]:
     """A simulated Altivar 312 that several commands in turn can reach, at address 2."""
-    with simulated("atv312@2", "--tcp", "127.0.0.1:0") as simulation:
-        yield f"tcp:127.0.0.1:{port_of(simulation.ready)}"
-
-
-def invoked(*arguments: str | Path) -> Result:
-    """A command run in this process, as the program itself would run it."""
-    return CliRunner().invoke(main, [str(a) for a in arguments], prog_name="drivepanel")
-
-
-def run(status: int, *arguments: str | Path) -> str:
-    """Run a command to this exit status; what it prints on standard output."""
-    done = invoked(*arguments)
-    assert done.exit_code == status, done.output
-    assert "Traceback" not in done.stderr
-    return done.stdout
-
-
-def refused(status: int, *arguments: str | Path) -> str:
-    """What a command says on standard error when it ends with this status."""
-    done = invoked(*arguments)
-    assert done.exit_code == status, done.output
-    assert done.stderr.startswith("drivepanel: ")
-    assert "Traceback" not in done.stderr
-    return done.stderr
+    with tcp_line("atv312@2") as line:
+        yield line
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -81,8 +59,7 @@ def test_back_up_write_compare_restore(line: str, tmp_path: Path) -> None:
 
 
 def test_two_drives_of_a_line(tmp_path: Path) -> None:
-    with simulated("atv31@1", "atv31@2", "--tcp", "127.0.0.1:0", "--set", "2:ACC=99") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv31@1", "atv31@2", "--set", "2:ACC=99") as line:
         told = run(1, "compare", line, line, "-d", "1", "-d", "2")
         assert {row.split()[1] for row in told.splitlines()[1:]} == {"ACC", "Add"}
 
@@ -97,10 +74,9 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     sets = {f"SP{n}": 100 + n for n in range(2, 9)} | {"ACC": 77, "dEC": 66, "AC2": 55}
     settings = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
-    with simulated("atv312", "--tcp", "127.0.0.1:0", *settings) as simulation:
-        run(0, "backup", f"tcp:127.0.0.1:{port_of(simulation.ready)}", file)
-    with simulated("atv312", "--tcp", "127.0.0.1:0") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv312", *settings) as line:
+        run(0, "backup", line, file)
+    with tcp_line("atv312") as line:
         process = subprocess.Popen(
             [*DRIVEPANEL, "restore", line, str(file), "--arm"],
             stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True,
@@ -196,8 +172,7 @@ def test_5_nothing_is_restored_unarmed(tmp_path: Path) -> None:
 
 
 def test_5_a_motor_that_runs_is_not_set_up() -> None:
-    with simulated("atv312", "--tcp", "127.0.0.1:0", "--run", "30") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv312", "--run", "30") as line:
         said = refused(5, "write", line, "ACC=4", "FrS=60", "--arm")
         assert "motor stopped only" in said
         assert "1 to write" not in said
@@ -214,8 +189,7 @@ def test_a_dry_run_of_write_sends_nothing(line: str) -> None:
 
 
 def test_where_the_drive_is_found_after_its_address_was_written() -> None:
-    with simulated("atv21", "--tcp", "127.0.0.1:0") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv21") as line:
         told = run(0, "write", line, "F802=7", "--arm")
         assert "-d 7" in told
         end = time.monotonic() + PATIENCE
@@ -224,8 +198,8 @@ def test_where_the_drive_is_found_after_its_address_was_written() -> None:
 
 
 def test_a_set_of_another_family_is_carried_over_by_quantity(line: str, tmp_path: Path) -> None:
-    with simulated("atv71", "--tcp", "127.0.0.1:0", "--set", "ACC=88") as simulation:
-        run(0, "backup", f"tcp:127.0.0.1:{port_of(simulation.ready)}", tmp_path / "71.toml")
+    with tcp_line("atv71", "--set", "ACC=88") as other:
+        run(0, "backup", other, tmp_path / "71.toml")
     told = run(0, "restore", line, tmp_path / "71.toml", "-d", "2", "--dry-run")
     assert "write  ACC: 3.0 s -> 8.8 s" in told
     assert "of another family" in told
@@ -247,8 +221,7 @@ def test_a_report(line: str, tmp_path: Path) -> None:
 
 def test_one_set_goes_to_several_drives(tmp_path: Path) -> None:
     file = tmp_path / "model.toml"
-    with simulated("atv312@1,atv312@2,atv21@3", "--tcp", "127.0.0.1:0") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv312@1,atv312@2,atv21@3") as line:
         run(0, "write", line, "ACC=7", "HSP=40", "-d", "1", "--arm")
         run(0, "backup", line, file)
         told = run(0, "restore", line, file, "-d", "1", "-d", "2", "--arm")

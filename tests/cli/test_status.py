@@ -8,11 +8,13 @@ import click
 import pytest
 from click.testing import CliRunner
 
-from tests.programs import drivepanel, free_port, port_of, simulated
+from tests.programs import drivepanel, free_port
 from tui.bus.errors import RequestRefused
 from tui.cli.errors import told
 from tui.cli.logs import log_file, start_logging
 from tui.drive.errors import ValueRefused
+
+from .commands import tcp_line
 
 SIM = "sim:atv71@2"
 
@@ -89,8 +91,7 @@ def test_3_no_such_port() -> None:
 
 
 def test_4_the_drive_refused() -> None:
-    with simulated("atv71@2", "--tcp", "127.0.0.1:0", "--protect", "ACC") as simulation:
-        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    with tcp_line("atv71@2", "--protect", "ACC") as line:
         done = drivepanel("read", line, "ACC", "-d", "2")
         assert done.returncode == 4
         assert "ACC" in done.stderr
