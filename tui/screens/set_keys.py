@@ -10,33 +10,16 @@ from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
-from tui.session.drive_session import DriveSession
-from tui.session.editor import Editor
 
-from .base import PanelScreen
 from .files import fault_of_new
+from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.parameter_set import ParameterSet
 
 
-class SetKeys(PanelScreen):
+class SetKeys(ParameterKeys):
     """Reads and writes files of parameter sets; what a set has otherwise is staged, not written."""
-
-    session: DriveSession
-
-    @property
-    def editor(self) -> Editor:
-        """What is known and staged."""
-        raise NotImplementedError
-
-    def note(self, text: str) -> None:
-        """Say something in the line of messages."""
-        raise NotImplementedError
-
-    def show_differences(self) -> None:
-        """Show what the drive has otherwise than the set."""
-        raise NotImplementedError
 
     # Back up and report
 
@@ -176,7 +159,8 @@ class SetKeys(PanelScreen):
             f"{editor.other_label}: {writes} differ and can be staged (n), {plan.count('equal')}"
             f" are equal, {skips} left out."
         )
-        self.show_differences()
+        self.listed.chosen = "differs"
+        self.list_again()
 
     def action_stage_set(self) -> None:
         """Stage what the set has otherwise; nothing is written."""

@@ -1,0 +1,41 @@
+"""What the keys of the Parameters screen work on: the list, what is staged, the messages."""
+
+from __future__ import annotations
+
+from textual.widgets import Input
+
+from tui.session.drive_session import DriveSession
+from tui.session.editor import Editor
+
+from .arming import Arming
+from .parameter_list import ParameterList
+
+
+class ParameterKeys(Arming):
+    """The base of the keys that stage, write and handle parameter sets."""
+
+    def __init__(self, session: DriveSession) -> None:
+        super().__init__()
+        self.session = session
+        self.listed = ParameterList()
+        self.remark = ""
+        """What a key has come to, until the cursor moves."""
+
+    @property
+    def editor(self) -> Editor:
+        """What is known and staged; stays with the drive while the panel runs."""
+        return self.app.editor(self.session)
+
+    def list_again(self) -> None:
+        """Make the list anew, by what was chosen and what is searched."""
+        self.listed.fill(self.editor, self.query_one("#search", Input).value)
+        self.look()
+
+    def note(self, text: str) -> None:
+        """Say something in the line of messages."""
+        self.editor.said = None
+        self.remark = text
+        self.look()
+
+    def _refuse(self, text: str) -> None:
+        self.note(text)

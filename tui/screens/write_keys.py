@@ -1,0 +1,99 @@
+"""Keys of the Parameters screen that write: what is staged, EEPROM, factory settings."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from tui.drive.errors import DriveError
+
+from .parameter_keys import ParameterKeys
+
+if TYPE_CHECKING:
+    from tui.drive.memory_orders import MemoryOrder
+    from tui.drive.profile import Profile
+
+
+class WriteKeys(ParameterKeys):
+    """Says what follows, and writes it once it is confirmed; the drive must be armed."""
+
+    def action_write(self, *, only: str = "") -> None:
+        """Say what will be written, and write it."""
+        from .confirm import Confirm
+        from .write_text import write_text
+
+        edits = [e for e in self.editor.edits if not only or e.code == only]
+        if not edits:
+            self.note("Nothing is staged: Enter edits the parameter under the cursor.")
+            return
+        if not self._armed_or_told():
+            return
+
+        def told(sure: bool | None) -> None:
+            if sure and self._armed_or_told():
+                self.remark = ""
+                self.editor.apply((only,) if only else ())
+                self.look()
+
+        codes = f"Write {only}?" if only else f"Write {len(edits)} parameters?"
+        keys = "y or Enter writes, each read back   Esc writes nothing"
+        self.app.push_screen(Confirm(codes, write_text(self.editor, edits), keys), told)
+
+    def action_write_one(self) -> None:
+        """Write the edit under the cursor."""
+        if self.listed.code in self.editor.edits:
+            self.action_write(only=self.listed.code)
+        else:
+            self.note("This parameter is not staged.")
+
+    def action_save(self) -> None:
+        """Copy to EEPROM, after saying what happens."""
+        from tui.drive.memory_orders import save_order
+
+        self._memory("Save to EEPROM?", save_order, self.editor.save)
+
+    def action_factory(self) -> None:
+        """Recall the factory settings, after saying what happens."""
+        from tui.drive.memory_orders import factory_order
+
+        self._memory("Recall the factory settings?", factory_order, self.editor.factory)
+
+    def _memory(
+        self, question: str, order_of: Callable[[Profile], MemoryOrder], work: Callable[[], None]
+    ) -> None:
+        from .confirm import Confirm
+
+        try:
+            order = order_of(self.session.profile)
+        except DriveError as refused:
+            self.note(str(refused))
+            return
+        if not self._armed_or_told():
+            return
+
+        def told(sure: bool | None) -> None:
+            if sure and self._armed_or_told():
+                work()
+                self.look()
+
+        keys = "y or Enter does it   Esc leaves all as it is"
+        self.app.push_screen(Confirm(question, order.does, keys), told)
+
+    def offer_to_follow(self) -> None:
+        """Ask once whether to go where the drive answers now."""
+        from .confirm import Confirm
+
+        moved = self.editor.moved
+        if moved is None or self.editor.busy:
+            return
+        self.editor.moved = None
+        if not moved.device:
+            self.note(moved.text)
+            return
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                self.app.follow(moved.line, moved.device)
+
+        keys = "y or Enter follows it   Esc stays"
+        self.app.push_screen(Confirm("Follow the drive?", moved.text, keys), told)
