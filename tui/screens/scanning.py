@@ -1,0 +1,140 @@
+"""The search for drives on the open line, and the way from one of them to Monitor."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from textual import work
+
+from tui.bus.errors import LineError
+from tui.drive.errors import DriveError
+
+from .connection_view import ALARM_KIND, ConnectionView
+from .found import FoundDrive
+
+if TYPE_CHECKING:
+    from tui.session.identify import ScanResult
+
+
+class Scanning(ConnectionView):
+    """Asks each address; a drive that answers gets its profile and is looked after."""
+
+    def action_scan(self) -> None:
+        """Look for drives at the addresses given."""
+        opened = self.app.opened
+        if opened is None:
+            self.say("No line is open.", "Choose one and press Enter.", ALARM_KIND)
+            return
+        try:
+            wanted = list(opened.devices) or self.form.addresses()
+        except LineError as error:
+            self.fail(error)
+            return
+        self.scan(wanted)
+
+    @work(exclusive=True, group="scan", exit_on_error=False)
+    async def scan(self, devices: Sequence[int]) -> None:
+        """Ask each address; drives appear as they answer."""
+        from tui.session.identify import scan
+
+        opened = self.app.opened
+        if opened is None:
+            return
+        results: list[ScanResult] = []
+        for number, device in enumerate(devices, start=1):
+            self.say(f"Asking address {device}, {number} of {len(devices)}", "Esc stops.")
+            try:
+                await scan(opened.line, [device], results.append)
+            except LineError as error:
+                self.fail(error)
+                return
+            while results:
+                await self._take(results.pop())
+        self._sum_up(devices)
+
+    def _sum_up(self, devices: Sequence[int]) -> None:
+        if not self.found:
+            span = f"{devices[0]} to {devices[-1]}" if len(devices) > 1 else f"{devices[0]}"
+            self.say(
+                f"No drive answered at address {span}.",
+                "Check baud, format and wiring; try other addresses (Ask), then s.",
+                ALARM_KIND,
+            )
+            return
+        self.say(
+            f"{len(self.found)} of {len(devices)} addresses answered.",
+            "Choose a drive and press Enter to watch it.",
+        )
+        self.drives.focus()
+
+    async def _take(self, result: ScanResult) -> None:
+        """Keep a drive that answered, with its profile and state."""
+        if result.identity is None:
+            self.say(result.error, "The address is taken; scan again with s.", ALARM_KIND)
+            return
+        drive = FoundDrive(result.identity)
+        self.found[result.device] = drive
+        await self._equip(drive)
+        self.show_drives()
+        self.show_heads()
+
+    async def _equip(self, drive: FoundDrive) -> None:
+        """Give a drive its profile: the typed one, else the one that fits."""
+        from tui.drive import library
+        from tui.session.drive_session import DriveSession
+
+        typed = self.form.profile
+        identity = drive.identity
+        wanted = typed or identity.profile or next(iter(identity.candidates), None)
+        opened = self.app.opened
+        if wanted is None or opened is None:
+            return
+        try:
+            profile = await asyncio.to_thread(library.load, wanted)
+        except DriveError as error:
+            self.fail(error)
+            return
+        drive.session = DriveSession(opened.line, identity.device, profile, identity)
+        drive.guessed = not typed and identity.profile is None
+        drive.state = "asking"
+        if self.app.keeper is not None:
+            self.app.keeper.keep(drive.session)
+
+    @work(exclusive=True, group="open", exit_on_error=False)
+    async def open_drive(self, device: int) -> None:
+        """Open Monitor on a drive."""
+        drive = self.found.get(device)
+        if drive is None:
+            return
+        if drive.session is None:
+            await self._equip(drive)
+        if drive.session is None:
+            from tui.drive import library
+
+            known = ", ".join(listing.id for listing in library.listings())
+            self.say(
+                f"Device {device} does not say which drive it is.",
+                f"Type its profile beside Profile: {known}.",
+                ALARM_KIND,
+            )
+            self.form.ask_for_profile()
+            return
+        self.action_stop_scan()
+        self.app.show_monitor(drive.session)
+
+    def action_stop_scan(self) -> None:
+        """Stop looking for drives."""
+        stopped = [w for w in self.workers if w.group == "scan" and w.is_running]
+        self.workers.cancel_group(self, "scan")
+        if stopped:
+            self.say("Stopped looking for drives.", "s looks again.")
+
+    def forget_drives(self) -> None:
+        """Let go of what was found, and stop looking."""
+        self.workers.cancel_group(self, "scan")
+        self.workers.cancel_group(self, "open")
+        self.found.clear()
+        self.warned.clear()
+        self.show_drives()
