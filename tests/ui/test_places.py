@@ -10,11 +10,12 @@ from rich.text import Text
 from tui.drive import library
 from tui.drive.profile import Profile
 from tui.drive.values import type_range
-from tui.screens.actions import EVERYWHERE, keys_of
+from tui.screens.actions import EVERYWHERE, MONITOR, line_of, of_screen
 from tui.session.monitor import TrendPoint
 from tui.session.readings import Quality
 from tui.widgets.drawing import aligned, bar, key_line, trend
 from tui.widgets.monitor_motor import motor_lines
+from tui.widgets.monitor_orders import order_keys
 from tui.widgets.monitor_state import (
     header,
     history_lines,
@@ -26,6 +27,7 @@ from tui.widgets.monitor_state import (
 from tui.widgets.monitor_trends import stacked_trends, trend_lines
 from tui.widgets.monitor_view import View
 from tui.widgets.monitor_words import word_lines, word_pages
+from tui.widgets.palette import STOP_KEY
 
 from . import fakes
 
@@ -152,9 +154,31 @@ def test_a_trend_has_its_size_whatever_its_values(
     assert [row.cell_len for row in rows] == [width] * height
 
 
+def keys_shown(screen: str, width: int) -> Text:
+    """The line of keys of a screen, as it draws it."""
+    keys = line_of(screen, width)
+    profile = library.load("atv71")
+    return (
+        order_keys(view_of(profile, fakes.RUNNING), keys) if screen == MONITOR else key_line(keys)
+    )
+
+
 @pytest.mark.parametrize("screen", EVERYWHERE)
-def test_the_line_of_keys_fits_80_columns(screen: str) -> None:
-    assert key_line(keys_of(screen)).cell_len <= 80
+@given(width=st.integers(30, 200))
+def test_the_stop_comes_first_in_red_and_is_never_cut_off(screen: str, width: int) -> None:
+    line = keys_shown(screen, width)
+    assert line.cell_len <= width
+    assert line.plain.startswith(" Space STOP  ")
+    assert "? help" in line.plain
+    red = [line.plain[s.start : s.end] for s in line.spans if s.style == STOP_KEY]
+    assert red == ["Space", " STOP"]
+
+
+@pytest.mark.parametrize("screen", EVERYWHERE)
+def test_no_key_is_dropped_at_80_columns(screen: str) -> None:
+    line = keys_shown(screen, 80).plain
+    wanted = [f" {action.shown} {action.label}" for action in of_screen(screen) if action.label]
+    assert [words for words in wanted if words not in line] == []
 
 
 def test_a_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:

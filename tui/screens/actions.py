@@ -9,6 +9,8 @@ from functools import partial
 
 from textual.binding import Binding, BindingType
 
+from tui.widgets.drawing import Key, fitting
+
 from .action import (
     BLOCKS,
     CONNECTION,
@@ -28,6 +30,8 @@ from .parameter_actions import PARAMETER_ACTIONS
 of_app = partial(Action, app=True)
 stops = partial(Action, app=True, first=True)
 STOP = "Stop the motor on its ramp, wherever no text is being typed."
+NEVER_DROPPED = ("stop_by_space", "help")
+"""Actions that stand in the line of keys however narrow the terminal is."""
 WRITE_SOURCE = "Write the chosen configuration, armed and with the motor at rest."
 
 ACTIONS: tuple[Action, ...] = (
@@ -96,14 +100,10 @@ def of_screen(screen: str) -> list[Action]:
     return [action for action in ACTIONS if screen in action.screens]
 
 
-def line_of(screen: str) -> list[tuple[str, str, str]]:
-    """Action, key and label of everything in the line of keys of a screen."""
-    return [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
-
-
-def keys_of(screen: str) -> list[tuple[str, str]]:
-    """What the line of keys says on a screen."""
-    return [(key, label) for _, key, label in line_of(screen)]
+def line_of(screen: str, width: int) -> list[Key]:
+    """The line of keys of a screen, the stop first; where it is narrow, without the last ones."""
+    keys = [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
+    return fitting(keys, width, NEVER_DROPPED)
 
 
 __all__ = [
@@ -118,7 +118,6 @@ __all__ = [
     "SOURCES",
     "Action",
     "bindings",
-    "keys_of",
     "line_of",
     "of_screen",
 ]

@@ -12,7 +12,7 @@ from textual.screen import Screen
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
-from .actions import keys_of
+from .actions import line_of
 from .panel import Panel
 
 
@@ -46,7 +46,7 @@ class PanelScreen(Screen[None]):
 
     def draw(self, width: int) -> None:
         """Put every line, here that of the keys; the screen is on top and has a size."""
-        self.put("keys", [key_line(keys_of((self.TITLE or "").lower()))])
+        self.put("keys", [key_line(line_of((self.TITLE or "").lower(), width))])
 
     def action_leave(self) -> None:
         """Back to the screen below."""

@@ -198,7 +198,7 @@ class MonitorScreen(OrderKeys):
             "state": state_lines(view, left),
             "message": message_lines(view, width),
             "status": status_lines(view, width),
-            "keys": [order_keys(view, line_of(MONITOR))],
+            "keys": [order_keys(view, line_of(MONITOR, width))],
         }
         body = height - (WORDS_HEIGHT if self.wide else 0) - 5
         rest = body - len(parts["state"])

@@ -3,13 +3,25 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from decimal import Decimal
 
 from rich.style import Style
 from rich.text import Text
 
-from .palette import ATTENTION_BLOCK, BAR, BAR_REST, FAINT, LINE, MARK, PLAIN, STRONG, TITLE
+from .palette import (
+    ATTENTION_BLOCK,
+    BAR,
+    BAR_REST,
+    FAINT,
+    KEY,
+    LINE,
+    MARK,
+    PLAIN,
+    STOP_KEY,
+    STRONG,
+    TITLE,
+)
 
 EIGHTHS_HIGH = " ▁▂▃▄▅▆▇█"
 
@@ -117,15 +129,29 @@ def _column(level: int | None, row: int) -> str:
     return EIGHTHS_HIGH[max(0, min(8, level - row * 8))]
 
 
-def key_line(keys: Sequence[tuple[str, str]]) -> Text:
-    """Keys and what they do, on one line."""
-    from .palette import KEY
+Key = tuple[str, str, str]
+"""An action, its key and its label in the line of keys."""
 
+
+def fitting(keys: Sequence[Key], width: int, kept: Collection[str]) -> list[Key]:
+    """The keys for which there is room; the last go first, those of the actions kept never."""
+    left = list(keys)
+    for key in reversed(keys):
+        if key_line(left).cell_len <= width:
+            break
+        if key[0] not in kept:
+            left.remove(key)
+    return left
+
+
+def key_line(keys: Sequence[Key]) -> Text:
+    """Keys and what they do, on one line; a key that stops a motor is red."""
     text = Text(no_wrap=True)
-    for index, (key, does) in enumerate(keys):
+    for index, (action, key, does) in enumerate(keys):
+        stop = action.startswith("stop")
         text.append("  " if index else " ")
-        text.append(key, KEY)
-        text.append(f" {does}", FAINT)
+        text.append(key, STOP_KEY if stop else KEY)
+        text.append(f" {does}", STOP_KEY if stop else FAINT)
     return text
 
 
