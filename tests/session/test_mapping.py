@@ -5,7 +5,6 @@ from __future__ import annotations
 import asyncio
 import itertools
 import json
-from collections.abc import Mapping
 from pathlib import Path
 
 import pytest
@@ -14,7 +13,6 @@ from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.line import Reply
 from tui.drive import library
-from tui.drive.errors import ValueRefused
 from tui.drive.mapping import Assignment, block_of, empty, factory, pick
 from tui.drive.mapping_wire import frame, span
 from tui.drive.schema import Block
@@ -22,7 +20,7 @@ from tui.drive.user_words import NO_WORDS, UserWord
 from tui.session.drive_session import DriveSession
 from tui.session.lines import open_line
 from tui.session.mapping import Force, Mapper, wire_timing
-from tui.session.mapping_write import AssignmentRefused, exchange, write_assignment
+from tui.session.mapping_write import AssignmentRefused, write_assignment
 from tui.session.user_words import load_words, read_words, save_words
 from tui.session.verdict import Verdict
 from tui.simulator import DriveSpec, LineTiming, Simulation
@@ -314,79 +312,6 @@ async def test_what_cannot_be_is_refused_before_anything_is_asked() -> None:
         with pytest.raises(AssignmentRefused, match="no parameter"):
             await write(here, empty(outputs).with_raw(0, 3199))
         assert list(here.session.line.trace) == []
-
-
-# Function 23
-
-
-async def both(here: Bench) -> tuple[Assignment, Assignment]:
-    inputs, outputs = plan_of(here, "read", EXAMPLE_IN), plan_of(here, "write", EXAMPLE_OUT)
-    for slot, raw in {**inputs.slots, **outputs.slots}.items():
-        here.drive.set(slot, raw)
-    return inputs, outputs
-
-
-async def test_eight_inputs_and_six_outputs_in_one_exchange() -> None:
-    with bench("atv71", sets={"CHCF": 1}) as here:
-        inputs, outputs = await both(here)
-        wanted = {"ACC": 45, "DEC": 55}
-        done = await exchange(here.session, here.journal, outputs, wanted, inputs)
-        (request,) = sent(here, 23)
-        held = {code: here.drive.raw(code) for code in EXAMPLE_OUT}
-        words = tuple(held[code] & 0xFFFF for code in EXAMPLE_OUT)
-        assert request == frame(here.profile, 1, inputs, outputs, words)[:-2].hex()
-        assert request.startswith("011731c5000831d900060c")
-        assert (held["ACC"], held["DEC"]) == (45, 55)
-        assert set(done.inputs) == set(EXAMPLE_IN)
-        assert done.outputs == held
-        kept = {e.code: (e.new_raw, e.read_back) for e in here.journal.recent}
-        assert kept["ACC"] == (45, 45)
-        assert set(kept) == set(EXAMPLE_OUT)
-
-
-@pytest.mark.parametrize(
-    ("wanted", "error", "says"),
-    [
-        ({"LCR": 1}, AssignmentRefused, "No output slot stands for LCR"),
-        ({"ACC": 70000}, ValueRefused, "does not fit|out of range"),
-    ],
-)
-async def test_an_exchange_that_is_refused_here(
-    wanted: Mapping[str, int], error: type[Exception], says: str
-) -> None:
-    with bench("atv71", sets={"CHCF": 1}) as here:
-        inputs, outputs = await both(here)
-        with pytest.raises(error, match=says):
-            await exchange(here.session, here.journal, outputs, wanted, inputs)
-        assert sent(here, 23) == []
-
-
-async def test_an_exchange_needs_arming_and_the_interlocks_of_an_order() -> None:
-    with bench("atv71", sets={"CHCF": 1}) as here:
-        inputs, outputs = await both(here)
-        with pytest.raises(AssignmentRefused, match="not armed"):
-            await exchange(here.session, here.journal, outputs, {}, inputs, allowed=lambda: False)
-        here.drive.set("CCC", 1)
-        here.drive.set("CHCF", 1)
-        here.drive.set("NCA1", 3204)
-        with pytest.raises(AssignmentRefused, match="changed by somebody else"):
-            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
-        assert sent(here, 23) == []
-
-
-async def test_outputs_moved_during_an_exchange_are_told() -> None:
-    with bench("atv71", sets={"CHCF": 1}) as here:
-        inputs, outputs = await both(here)
-        honest = here.session.line.read_write
-
-        async def moved(*what: object, **how: object) -> Reply:
-            here.drive.set("NCA5", 9002)
-            here.drive.set("NCA6", 9001)
-            return await honest(*what, **how)  # type: ignore[arg-type]
-
-        here.session.line.read_write = moved  # type: ignore[method-assign]
-        with pytest.raises(AssignmentRefused, match=r"NCA5, NCA6.*look at"):
-            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
 
 
 # User words

@@ -20,6 +20,7 @@ from tui.session.keeper import Keeper, Watch
 from tui.session.known import Known
 from tui.session.lines import OpenLine
 from tui.session.monitor import Snapshot, TrendPoint
+from tui.session.order_queue import OrderQueue
 from tui.session.readings import Quality, Reading
 from tui.widgets.clock import Clock
 
@@ -212,7 +213,7 @@ def session_of(snapshot: Snapshot | None, line: LineState = CONNECTED) -> DriveS
     session = DriveSession.__new__(DriveSession)
     session.line = cast("Line", FakeLine(line))
     session.device, session.profile, session.identity = 2, profile, ATV71
-    session.busy, session.commanded_at = None, None
+    session.orders, session.commanded_at = OrderQueue(session.line, 2), None
     trend = tuple(
         TrendPoint(NOW - 60 + i / 2, (min(50.0, max(0.0, i - 20) * 0.8), 2.0 + (i % 30) * 0.1))
         for i in range(120)

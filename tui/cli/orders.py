@@ -118,18 +118,14 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     """
     commander.outcome = None
     give()
-    await _until(lambda: commander.outcome is not None or _idle(commander))
+    orders = commander.session.orders
+    await _until(lambda: commander.outcome is not None or not orders.busy)
     outcome = commander.outcome
     if outcome is None:
         raise Failure("The order was not sent: a newer one took its place.", REFUSED_HERE)
     if outcome.kind is Kind.REFUSED:
         raise Failure(outcome.text, _status(outcome.error))
     return outcome
-
-
-def _idle(commander: Commander) -> bool:
-    worker = commander.session.busy
-    return worker is None or worker.done()
 
 
 async def _until(holds: Callable[[], bool]) -> None:

@@ -10,7 +10,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from .frames import read_frame, read_write_frame, write_frame
-from .mapping import Assignment
+from .mapping import Assignment, target
 from .profile import Profile
 from .read_plan import ReadRequest, WireTiming, plan_reads, request_of, run_length
 from .schema import Parameter
@@ -94,21 +94,39 @@ def span(plan: Assignment) -> tuple[int, int] | None:
     return block.address, min(max(length, block.min_words), block.max_words)
 
 
+def reach(profile: Profile, plan: Assignment, codes: Collection[str]) -> range:
+    """The places that one write of these parameters takes, from the first to the last of them."""
+    block = plan.block
+    named = [
+        place
+        for place, raw in enumerate(plan.raws)
+        if (parameter := target(profile, block, raw)) is not None and parameter.code in codes
+    ]
+    if not named:
+        return range(0)
+    first = 0 if block.fixed_start else named[0]
+    end = max(named[-1] + 1, first + block.min_words)
+    return range(first, min(end, len(plan.raws)))
+
+
 def frame(
     profile: Profile,
     device: int,
     inputs: Assignment | None,
     outputs: Assignment | None,
     words: Sequence[int] = (),
+    places: range | None = None,
 ) -> bytes:
     """The request that uses an assignment; empty where no slot is in use.
 
     With inputs and outputs in use and function 23 in the drive, one exchange for both; else the
     read of the inputs, or the write of the outputs where there are none. `words` are written to
-    the outputs, zeros where there are fewer.
+    the outputs, zeros where there are fewer; to `places` of them only, where that is given.
     """
     read = span(inputs) if inputs else None
     write = span(outputs) if outputs else None
+    if write and outputs and places is not None:
+        write = (outputs.block.address + places.start, len(places))
     filled = (*words, *([0] * write[1]))[: write[1]] if write else ()
     if read and write and profile.function(23) is not None:
         return read_write_frame(device, *read, write[0], filled)

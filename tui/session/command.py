@@ -9,10 +9,11 @@ from __future__ import annotations
 import asyncio
 import threading
 import time
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Coroutine, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
 from enum import StrEnum
+from typing import Any
 
 from tui.bus.errors import LineError, Superseded
 from tui.bus.line import LineStatus, Priority
@@ -35,7 +36,8 @@ from tui.drive.values import from_words
 from .control_source import configure
 from .drive_session import DriveSession
 from .journal import Journal
-from .order_queue import OrderQueue, Work
+from .order_queue import BY_STOP
+from .order_queue import Order as Queued
 from .readings import Reading
 from .reference import Reference, parse_reference, reference_codes
 from .writing import NotTaken, Writer
@@ -49,6 +51,10 @@ LOOKS = 10
 """Looks within which the direction of a start must be the ordered one."""
 ENABLED = "enabled"
 """The state of the Drivecom charts in which the motor runs."""
+
+
+Work = Callable[[], Coroutine[Any, Any, str]]
+"""An order; it returns what was done."""
 
 
 class Kind(StrEnum):
@@ -81,7 +87,6 @@ class Commander:
         self._ended = ""
         self._wanted: Reference | None = None
         self._written: dict[str, int] = {}
-        self._queue = OrderQueue(session, self._one, self._ended_by_stop)
         self._lock = threading.Lock()
         self._steps = Decimal(0)
         self._stepping = False
@@ -180,7 +185,7 @@ class Commander:
         if self.armed_for is None:
             raise OrderRefused("Not armed: a arms this drive.")
         self.touch()
-        self._queue.put(work)
+        self.session.orders.put(Queued(lambda: self._one(work), self._dropped))
 
     async def _one(self, work: Work) -> None:
         """One order; where it fails, those behind it are not carried out."""
@@ -189,18 +194,19 @@ class Commander:
         except Superseded:
             return
         except (LineError, DriveError, NotTaken) as error:
-            rest = " The orders behind it were dropped." if self._queue.drop() else ""
+            dropped = self.session.orders.drop("an order before it was refused")
+            rest = " The orders behind it were dropped." if dropped else ""
             self._take_steps()
             self._say(Kind.REFUSED, f"{error}{rest}", error)
         except asyncio.CancelledError:
-            self._ended_by_stop()
+            self._dropped(BY_STOP)
             raise
         finally:
             self.session.monitor.refresh()
 
-    def _ended_by_stop(self) -> None:
+    def _dropped(self, why: str) -> None:
         self._take_steps()
-        self._say(Kind.REFUSED, "ended by a stop")
+        self._say(Kind.REFUSED, why)
 
     def refuse(self, text: str) -> None:
         """Tell why an order was not given."""

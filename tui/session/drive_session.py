@@ -5,12 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Sequence
 
-from tui.bus.line import Line, Priority, Worker
+from tui.bus.line import Line, Priority
 from tui.bus.link import label
 from tui.drive.profile import Profile
 
 from .identify import DriveIdentity
 from .monitor import Monitor
+from .order_queue import OrderQueue
 from .reader import Rating, Reader
 from .readings import Reading
 
@@ -28,8 +29,8 @@ class DriveSession:
         self.device = device
         self.profile = profile
         self.identity = identity
-        self.busy: Worker | None = None
-        """The order that is being carried out; a stop ends it."""
+        self.orders = OrderQueue(line, device)
+        """What is to be done to the drive; a stop ends it."""
         self.commanded_at: float | None = None
         """When a command or reference was last sent to the drive from here (monotonic)."""
         self.monitor = Monitor(line, device, profile)

@@ -22,25 +22,30 @@ from tui.drive.mapping import (
     MappingError,
     Problem,
     changes,
+    describe,
     factory,
     pick,
     problems,
     slots_of,
     target,
 )
-from tui.drive.mapping_wire import Saving, Stretch, saving, stretches
+from tui.drive.mapping_wire import Saving, Stretch, reach, saving, stretches
+from tui.drive.orders import OrderRefused
 from tui.drive.schema import Block
 from tui.drive.shown import number_of
 from tui.drive.user_words import UserWords
 from tui.drive.values import encode
 
 from .drive_session import DriveSession
+from .exchange import exchange
 from .journal import Journal
 from .mapping import BlockView, Force, Mapper, wire_timing
-from .mapping_write import exchange, write_assignment
+from .mapping_write import write_assignment
 from .monitor import monitoring_codes, rates_of
+from .order_queue import BY_STOP, Order
 from .user_words import load_words, read_words, save_words
 from .verdict import Verdict
+from .writing import NotTaken
 
 AGAIN = 1.0
 """Seconds between two looks at the blocks."""
@@ -77,7 +82,7 @@ class MappingDesk:
     _seen: dict[str, dict[str, int]] = field(default_factory=dict)
     """The slots as the person saw them when a proposal was begun, by the id of the block."""
     _reader: Worker | None = None
-    _work: Worker | None = None
+    _at_work: bool = False
     _verify: bool = False
     _silent: float | None = None
     _costs: dict[object, Saving] = field(default_factory=dict)
@@ -95,7 +100,7 @@ class MappingDesk:
     @property
     def busy(self) -> bool:
         """Whether something is being written."""
-        return self._work is not None and not self._work.done()
+        return self._at_work
 
     # Reading
 
@@ -253,7 +258,7 @@ class MappingDesk:
                     self.journal,
                     plan,
                     expected=self._seen.get(plan.block.id),
-                    allowed=lambda: allowed() and not self._ordered(),
+                    allowed=allowed,
                 )
                 if done.after_reset:
                     self.mapper.written |= {c.slot: c.new for c in done.changes}
@@ -265,7 +270,7 @@ class MappingDesk:
                 texts.append(done.text)
             return " ".join(dict.fromkeys(texts))
 
-        self._run(work)
+        self._run(work, "Writing, each slot read back")
 
     def outputs_typed(self, text: str) -> dict[str, int]:
         """Raw values by code from `LFRD=1500 ACC=5.0`, for the outputs of now.
@@ -287,21 +292,56 @@ class MappingDesk:
             raise ValueRefused(f"Write CODE=VALUE with one of {', '.join(stand)}.")
         return found
 
+    def exchange_follows(self, wanted: Mapping[str, int]) -> str:
+        """What an exchange with these would do, for a person to agree to. Raises MappingError."""
+        profile, outputs = self.session.profile, self._outputs()
+        block, places = outputs.block, reach(self.session.profile, outputs, wanted)
+        if waits := [slot for slot in block.slots if slot in self.mapper.written]:
+            raise MappingError(
+                f"{', '.join(waits)} count after the drive's next reset only: reset it first."
+            )
+        lines, beside = [], []
+        for place in places:
+            code = describe(profile, block, outputs.raws[place])
+            if code in wanted:
+                lines.append(f"{block.slots[place]}: {code} {self._number(code, wanted[code])}")
+            else:
+                beside.append(code)
+        if beside:
+            lines.append(f"Between them {', '.join(beside)} is written with what it holds now.")
+        if block.effective == "after-reset":
+            lines.append(
+                f"What {block.name.lower()} stands for since the last reset cannot be read. Go on"
+                f" only if {' and '.join(block.slots)} were set before the drive was last reset or"
+                " switched on."
+            )
+        lines.append("A command word or reference can move the motor.")
+        return "\n".join(lines)
+
     def exchange(self, wanted: Mapping[str, int], allowed: Callable[[], bool]) -> None:
-        """Write through the outputs, with the inputs in the same exchange; returns at once."""
+        """Write through the outputs, with the inputs in the same exchange; returns at once.
+
+        A person has agreed to what follows from it, `exchange_follows`.
+        """
         outputs = self._outputs()
         read = next((b for b in self.blocks if b.direction == "read"), None)
         inputs = self.today(read) if read else None
 
         async def work() -> str:
             done = await exchange(
-                self.session, self.journal, outputs, wanted, inputs, allowed=allowed
+                self.session,
+                self.journal,
+                outputs,
+                wanted,
+                inputs,
+                allowed=allowed,
+                in_force=True,
             )
             sent = ", ".join(f"{c} {self._number(c, done.outputs[c])}" for c in wanted)
             back = ", ".join(f"{c} {self._number(c, raw)}" for c, raw in done.inputs.items())
             return f"Written: {sent}." + (f" Came back: {back}." if back else "")
 
-        self._run(work)
+        self._run(work, "Writing through the outputs")
 
     def _outputs(self) -> Assignment:
         block = next((b for b in self.blocks if b.direction == "write"), None)
@@ -315,16 +355,9 @@ class MappingDesk:
         number = number_of(profile, profile[code], raw, self.session.monitor.known.raws())
         return str(raw) if number is None else f"{number:f}"
 
-    def _ordered(self) -> bool:
-        """Whether an order to the drive is being carried out."""
-        worker = self.session.busy
-        return worker is not None and not worker.done()
-
-    def _run(self, work: Callable[[], Coroutine[Any, Any, str]]) -> None:
+    def _run(self, work: Callable[[], Coroutine[Any, Any, str]], doing: str) -> None:
+        """Do it as an order to the drive: behind those before it, ended by a stop."""
         session = self.session
-        if self.busy or self._ordered():
-            self._say("Another order is still being carried out.", "refused")
-            return
         if session.line.state.status is not LineStatus.CONNECTED:
             self._say("The line is lost; nothing is written.", "refused")
             return
@@ -332,13 +365,29 @@ class MappingDesk:
         async def guarded() -> None:
             try:
                 self._say(await work(), "done")
-            except (LineError, DriveError) as error:
+            except (LineError, DriveError, NotTaken) as error:
                 self._say(str(error), "refused")
                 await self._see_again()
+            except asyncio.CancelledError:
+                self._say(f"Writing was {BY_STOP}; what was written stays.", "refused")
+                session.line.spawn(self._see_again, f"blocks {session.device} after a stop")
+                raise
+            finally:
+                self._at_work = False
 
-        self._say("Writing, each slot read back", "working")
-        # a stop goes out before each of these writes; with an order under way they end
-        self._work = session.line.spawn(guarded, f"blocks write {session.device}")
+        def dropped(why: str) -> None:
+            self._at_work = False
+            self._say(f"Nothing was written: {why}.", "refused")
+
+        if self.busy or session.orders.busy:
+            self._say("Another order is still being carried out.", "refused")
+            return
+        self._at_work = True
+        self._say(doing, "working")
+        try:
+            session.orders.put(Order(guarded, dropped))
+        except OrderRefused as refused:
+            dropped(str(refused))
 
     async def _see_again(self) -> None:
         """After a refusal the person looks at what the drive holds now, and may write again."""

@@ -4,63 +4,76 @@ from __future__ import annotations
 
 import threading
 from collections import deque
-from collections.abc import Awaitable, Callable, Coroutine
-from typing import Any
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass
 
+from tui.bus.line import Line, Worker
 from tui.drive.orders import OrderRefused
-
-from .drive_session import DriveSession
 
 MOST_WAITING = 4
 """Orders that may wait behind the one that is being carried out."""
+BY_STOP = "ended by a stop"
 
-Work = Callable[[], Coroutine[Any, Any, str]]
+
+@dataclass(frozen=True, slots=True)
+class Order:
+    """Something to be done to a drive, by whichever screen or command."""
+
+    carry_out: Callable[[], Awaitable[None]]
+    """Says itself what became of it, whatever that is."""
+    dropped: Callable[[str], None]
+    """Called with the reason, in any thread, where it is forgotten before it began."""
 
 
 class OrderQueue:
-    """Takes orders from any thread; `carry_out` says itself what became of each."""
+    """Takes the orders to one drive from any thread."""
 
-    def __init__(
-        self,
-        session: DriveSession,
-        carry_out: Callable[[Work], Awaitable[None]],
-        dropped: Callable[[], None],
-    ) -> None:
-        self._session = session
-        self._carry_out = carry_out
-        self._dropped = dropped
-        """Called in the line's thread when waiting orders were forgotten because of a stop."""
+    def __init__(self, line: Line, device: int) -> None:
+        self._line = line
+        self._device = device
         self._lock = threading.Lock()
-        self._waiting: deque[Work] = deque()
+        self._waiting: deque[Order] = deque()
+        self._worker: Worker | None = None
 
-    def put(self, work: Work) -> None:
+    @property
+    def busy(self) -> bool:
+        """Whether an order is being carried out."""
+        return self._worker is not None and not self._worker.done()
+
+    def put(self, order: Order) -> None:
         """Carry out an order behind those before it. Raises OrderRefused where too many wait."""
-        session = self._session
         with self._lock:
             if len(self._waiting) >= MOST_WAITING:
                 raise OrderRefused("Earlier orders are still being carried out.")
-            self._waiting.append(work)
-            if session.busy is None or session.busy.done():
-                session.busy = session.line.spawn(self._serve, f"order {session.device}")
+            self._waiting.append(order)
+            if not self.busy:
+                self._worker = self._line.spawn(self._serve, f"order {self._device}")
 
-    def drop(self) -> bool:
+    def cancel(self) -> None:
+        """End the order that is being carried out, and forget those behind it."""
+        if self._worker is not None:
+            self._worker.cancel()
+        # a worker that had no time to begin would leave them to the next order
+        self.drop(BY_STOP)
+
+    def drop(self, why: str) -> bool:
         """Forget the orders that wait; True if there were any."""
         with self._lock:
-            waiting = bool(self._waiting)
-            self._waiting.clear()
-        return waiting
+            waiting, self._waiting = self._waiting, deque()
+        for order in waiting:
+            order.dropped(why)
+        return bool(waiting)
 
     async def _serve(self) -> None:
         try:
-            while (work := self._next()) is not None:
-                await self._carry_out(work)
+            while (order := self._next()) is not None:
+                await order.carry_out()
         finally:
-            if self.drop():
-                self._dropped()
+            self.drop(BY_STOP)
 
-    def _next(self) -> Work | None:
+    def _next(self) -> Order | None:
         with self._lock:
             if self._waiting:
                 return self._waiting.popleft()
-            self._session.busy = None
+            self._worker = None
             return None

@@ -118,9 +118,9 @@ class Stopper:
         if len(wanted) > 1:
             self._line.spawn(lambda: self._broadcast(wanted, order), "stop all")
         for session in wanted:
-            for before in (self._workers.get(session.device), session.busy):
-                if before is not None:
-                    before.cancel()
+            if (before := self._workers.get(session.device)) is not None:
+                before.cancel()
+            session.orders.cancel()
             self._say(session, Phase.SENDING, "stop is being sent", ordered)
             work = partial(self._stop, session, order, ordered)
             self._workers[session.device] = self._line.spawn(work, f"stop {session.device}")

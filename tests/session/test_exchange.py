@@ -1,0 +1,262 @@
+"""Words written through the outputs of simulated drives: only what was named, and seen held."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Mapping
+
+import pytest
+
+from tests.session.sets_bench import Bench, bench
+from tui.bus.errors import RequestRefused
+from tui.bus.line import Reply
+from tui.drive.errors import ValueRefused
+from tui.drive.mapping import Assignment, block_of, empty, pick
+from tui.drive.mapping_wire import frame, reach
+from tui.session.command import Commander
+from tui.session.exchange import exchange
+from tui.session.mapping_desk import MappingDesk
+from tui.session.mapping_write import AssignmentRefused
+from tui.session.stop import Stopper
+from tui.session.writing import NotTaken
+
+EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]
+EXAMPLE_OUT = ["CMD", "LFRD", "HSP", "LSP", "ACC", "DEC"]
+
+
+def plan_of(here: Bench, direction: str, codes: list[str]) -> Assignment:
+    block = block_of(here.profile, direction)
+    assert block is not None
+    plan = empty(block)
+    for place, code in enumerate(codes):
+        plan = pick(here.profile, plan, place, code)
+    return plan
+
+
+def sent(here: Bench, function: int) -> list[str]:
+    """The bodies of all requests of a function so far, without checksum."""
+    frames = [f.data for f in here.session.line.trace if f.direction == "out"]
+    return [data[:-2].hex() for data in frames if data[1] == function]
+
+
+async def both(here: Bench) -> tuple[Assignment, Assignment]:
+    inputs, outputs = plan_of(here, "read", EXAMPLE_IN), plan_of(here, "write", EXAMPLE_OUT)
+    for slot, raw in {**inputs.slots, **outputs.slots}.items():
+        here.drive.set(slot, raw)
+    return inputs, outputs
+
+
+async def test_eight_inputs_and_six_outputs_in_one_exchange() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        first = {code: here.drive.raw(code) for code in EXAMPLE_OUT}
+        wanted = {EXAMPLE_OUT[0]: first[EXAMPLE_OUT[0]], "ACC": 45, "DEC": 55}
+        done = await exchange(here.session, here.journal, outputs, wanted, inputs)
+        (request,) = sent(here, 23)
+        held = {code: here.drive.raw(code) for code in EXAMPLE_OUT}
+        words = tuple(held[code] & 0xFFFF for code in EXAMPLE_OUT)
+        assert request == frame(here.profile, 1, inputs, outputs, words)[:-2].hex()
+        assert request.startswith("011731c5000831d900060c")
+        assert (held["ACC"], held["DEC"]) == (45, 55)
+        assert set(done.inputs) == set(EXAMPLE_IN)
+        assert done.outputs == held
+        kept = {e.code: (e.new_raw, e.read_back) for e in here.journal.recent}
+        assert kept["ACC"] == (45, 45)
+        assert set(kept) == set(EXAMPLE_OUT)
+
+
+@pytest.mark.parametrize(
+    ("wanted", "error", "says"),
+    [
+        ({"LCR": 1}, AssignmentRefused, "No output slot stands for LCR"),
+        ({"ACC": 70000}, ValueRefused, "does not fit|out of range"),
+    ],
+)
+async def test_an_exchange_that_is_refused_here(
+    wanted: Mapping[str, int], error: type[Exception], says: str
+) -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        with pytest.raises(error, match=says):
+            await exchange(here.session, here.journal, outputs, wanted, inputs)
+        assert sent(here, 23) == []
+
+
+async def test_an_exchange_needs_arming_and_the_interlocks_of_an_order() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        with pytest.raises(AssignmentRefused, match="not armed"):
+            await exchange(here.session, here.journal, outputs, {}, inputs, allowed=lambda: False)
+        here.drive.set("CCC", 1)
+        here.drive.set("CHCF", 1)
+        here.drive.set("NCA1", 3204)
+        with pytest.raises(AssignmentRefused, match="changed by somebody else"):
+            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
+        assert sent(here, 23) == []
+
+
+async def test_outputs_moved_during_an_exchange_are_told() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        honest = here.session.line.read_write
+
+        async def moved(*what: object, **how: object) -> Reply:
+            here.drive.set("NCA5", 9002)
+            here.drive.set("NCA6", 9001)
+            return await honest(*what, **how)  # type: ignore[arg-type]
+
+        here.session.line.read_write = moved  # type: ignore[method-assign]
+        with pytest.raises(AssignmentRefused, match=r"NCA5, NCA6.*look at"):
+            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
+
+
+async def test_only_what_was_named_is_written() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        inputs, outputs = await both(here)
+        done = await exchange(here.session, here.journal, outputs, {"ACC": 45, "DEC": 55}, inputs)
+        assert done.outputs == {"ACC": 45, "DEC": 55}
+        (request,) = sent(here, 23)
+        # two words from NC5 on: command word and references are not touched
+        assert request.endswith("31dd000204002d0037")
+        assert {entry.code for entry in here.journal.recent} == {"ACC", "DEC"}
+
+
+async def test_what_stands_between_two_named_ones_keeps_its_value() -> None:
+    with bench("atv71", sets={"CHCF": 1, "LSP": 41}) as here:
+        _, outputs = await both(here)
+        assert reach(here.profile, outputs, ["ACC", "HSP"]) == range(2, 5)
+        done = await exchange(here.session, here.journal, outputs, {"HSP": 450, "ACC": 45})
+        assert done.outputs == {"HSP": 450, "LSP": 41, "ACC": 45}
+        assert sent(here, 23) == []
+        assert sent(here, 16)[-1].endswith("31db00030601c20029002d")
+
+
+async def test_nothing_named_is_nothing_written() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        _, outputs = await both(here)
+        with pytest.raises(AssignmentRefused, match="No output was named"):
+            await exchange(here.session, here.journal, outputs, {})
+        assert sent(here, 16) == []
+
+
+async def test_a_value_that_the_drive_does_not_keep_is_told() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        _, outputs = await both(here)
+        honest = here.session.line.write
+
+        async def undone(*what: object, **how: object) -> Reply:
+            reply = await honest(*what, **how)  # type: ignore[arg-type]
+            here.drive.set("ACC", 99)
+            return reply
+
+        here.session.line.write = undone  # type: ignore[method-assign]
+        with pytest.raises(NotTaken, match=r"ACC: written 4\.5 s, the drive holds 9\.9 s"):
+            await exchange(here.session, here.journal, outputs, {"ACC": 45})
+        assert here.journal.recent[-1].answer == "holds another value"
+
+
+async def test_a_read_only_line_exchanges_nothing() -> None:
+    with bench("atv71", read_only=True) as here:
+        outputs = plan_of(here, "write", ["ACC"])
+        with pytest.raises(RequestRefused):
+            await exchange(here.session, here.journal, outputs, {"ACC": 45})
+
+
+# The write block of the Altivar 21
+
+EXAMPLE_21 = {"F870": 1, "F871": 3}
+"""Command word 1 and frequency reference, as in manual 7.8."""
+
+
+async def test_the_manuals_two_words_through_the_write_block() -> None:
+    with bench("atv21", sets=EXAMPLE_21) as here:
+        outputs = plan_of(here, "write", ["FA00", "FA01"])
+        wanted = {"FA00": 0xC400, "FA01": 6000}
+        with pytest.raises(AssignmentRefused, match="nobody has confirmed"):
+            await exchange(here.session, here.journal, outputs, wanted)
+        assert sent(here, 16) == []
+        done = await exchange(here.session, here.journal, outputs, wanted, in_force=True)
+        assert done.outputs == wanted
+        assert sent(here, 16) == ["01101870000204c4001770"]
+        assert here.drive.raw("FA01") == 6000
+
+
+async def test_one_named_word_of_the_write_block_brings_the_other_along() -> None:
+    with bench("atv21", sets=EXAMPLE_21) as here:
+        here.drive.set("FA00", 0x8000)
+        outputs = plan_of(here, "write", ["FA00", "FA01"])
+        await exchange(here.session, here.journal, outputs, {"FA01": 3000}, in_force=True)
+        assert sent(here, 16) == ["011018700002048000" + "0bb8"]
+
+
+async def test_a_write_block_that_stands_for_something_else_is_found_out() -> None:
+    with bench("atv21", sets={"F870": 4, "F871": 5}) as here:
+        for slot, raw in {"F870": 4, "F871": 3}.items():
+            address = here.profile[slot].address
+            await here.session.line.write(1, address, [raw])
+        outputs = plan_of(here, "write", ["FA50", "FA01"])
+        here.drive.set("FA51", 7)
+        with pytest.raises(NotTaken, match=r"something else.*FA51 went to"):
+            await exchange(here.session, here.journal, outputs, {"FA01": 500}, in_force=True)
+
+
+# A stop
+
+
+async def settled(desk: MappingDesk) -> str:
+    for _ in range(400):
+        if not desk.busy and desk.said is not None and desk.said.kind != "working":
+            return desk.said.text
+        await asyncio.sleep(0.02)
+    raise AssertionError("it does not end")
+
+
+async def test_a_stop_ends_an_exchange_before_its_words_go_out() -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        await both(here)
+        here.session.monitor.start(period=0.1)
+        desk = MappingDesk(here.session, here.journal)
+        desk.start()
+        for _ in range(400):
+            if len(desk.views) == 2:
+                break
+            await asyncio.sleep(0.02)
+        stopper = Stopper(here.session.line, here.journal)
+        desk.exchange({"CMD": 15, "LFRD": 900}, lambda: True)
+        stopper.stop([here.session])
+        assert "stop" in await settled(desk)
+        await asyncio.sleep(0.5)
+        assert sent(here, 23) == []
+        desk.stop()
+        here.session.close()
+
+
+async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None:
+    with bench("atv71") as here:
+        here.session.monitor.start(period=0.1)
+        desk = MappingDesk(here.session, here.journal)
+        desk.start()
+        for _ in range(400):
+            if len(desk.views) == 2 and here.session.monitor.latest is not None:
+                break
+            await asyncio.sleep(0.02)
+        commander = Commander(here.session, here.journal)
+        commander.arm()
+        desk.propose(plan_of(here, "read", EXAMPLE_IN))
+        desk.write(lambda: True)
+        commander.order("forward")
+        stopper = Stopper(here.session.line, here.journal)
+        stopper.stop([here.session])
+        assert "ended by a stop" in await settled(desk)
+        await asyncio.sleep(0.5)
+        assert commander.outcome is not None
+        assert commander.outcome.text == "ended by a stop"
+        assert here.drive.motor.frequency == 0
+        assert here.drive.raw("NMA8") != 7121
+        # what was proposed stays, against what the drive holds now
+        assert desk.changes(plan_of(here, "read", []).block)
+        desk.write(lambda: True)
+        assert "Written and read back" in await settled(desk)
+        assert here.drive.raw("NMA8") == here.profile["LFT"].address
+        desk.stop()
+        here.session.close()
