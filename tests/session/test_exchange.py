@@ -10,13 +10,14 @@ import pytest
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import RequestRefused
 from tui.bus.line import Reply
-from tui.drive.errors import ValueRefused
-from tui.drive.mapping import Assignment, block_of, empty, pick
+from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.mapping import Assignment, MappingError, block_of, empty, pick
 from tui.drive.mapping_wire import frame, reach
 from tui.session.command import Commander
 from tui.session.exchange import exchange
 from tui.session.mapping_desk import MappingDesk
 from tui.session.mapping_write import AssignmentRefused
+from tui.session.outputs import Meant, meant, refuse_pending
 from tui.session.stop import Stopper
 from tui.session.writing import NotTaken
 
@@ -144,7 +145,7 @@ async def test_a_value_that_the_drive_does_not_keep_is_told() -> None:
         _, outputs = await both(here)
         honest = here.session.line.write
 
-        async def undone(*what: object, **how: object) -> Reply:
+        async def undone(*what: object, **how: object) -> float:
             reply = await honest(*what, **how)  # type: ignore[arg-type]
             here.drive.set("ACC", 99)
             return reply
@@ -222,7 +223,7 @@ async def test_a_stop_ends_an_exchange_before_its_words_go_out() -> None:
                 break
             await asyncio.sleep(0.02)
         stopper = Stopper(here.session.line, here.journal)
-        desk.exchange({"CMD": 15, "LFRD": 900}, lambda: True)
+        desk.exchange(desk.meant("CMD=16#000F LFRD=900"), lambda: True)
         stopper.stop([here.session])
         assert "stop" in await settled(desk)
         await asyncio.sleep(0.5)
@@ -260,3 +261,52 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
         assert here.drive.raw("NMA8") == here.profile["LFT"].address
         desk.stop()
         here.session.close()
+
+
+# What a person agrees to
+
+
+def meant_of(
+    here: Bench, outputs: Assignment, text: str, inputs: Assignment | None = None
+) -> Meant:
+    return meant(here.profile, 1, outputs, inputs, {"INR": 1, "LFRD": 900}, text)
+
+
+def test_a_person_sees_each_value_and_the_frame_before_it_goes_out() -> None:
+    with bench("atv71") as here:
+        inputs, outputs = plan_of(here, "read", EXAMPLE_IN), plan_of(here, "write", EXAMPLE_OUT)
+        told = meant_of(here, outputs, "cmd=16#000F hsp=45", inputs)
+        assert told.wanted == {"CMD": 15, "HSP": 450}
+        first, second, third, *rest = told.follows.splitlines()
+        assert (first, second) == ("NCA1: CMD 16#000F", "NCA3: HSP 45.0 Hz")
+        assert "LFRD is written, with what it holds now" in third
+        # three words from NC1 on: the command, the reference of now, the high speed
+        assert (
+            rest[-1].replace(" ", "").lower().startswith("frame:011731c5000831d9000306000f038401c2")
+        )
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("", "CODE=VALUE"),
+        ("ACC", "CODE=VALUE"),
+        ("LCR=3", "one of CMD, LFRD"),
+        ("NOPE=3", "NOPE"),
+        ("ACC=abc", "ACC"),
+        ("ACC=99999", "out of range"),
+    ],
+)
+def test_what_cannot_be_meant_is_told(text: str, says: str) -> None:
+    with bench("atv71") as here, pytest.raises(DriveError, match=says):
+        meant_of(here, plan_of(here, "write", EXAMPLE_OUT), text)
+
+
+def test_slots_that_wait_for_a_reset_are_not_written_through() -> None:
+    with bench("atv21") as here:
+        outputs = plan_of(here, "write", ["FA00", "FA01"])
+        with pytest.raises(MappingError, match="F871 count after the drive's next reset"):
+            refuse_pending(outputs, {"F871": 3, "F875": 1})
+        refuse_pending(outputs, {"F875": 1})
+        told = meant_of(here, outputs, "FA01=60")
+        assert "F870 and F871 were set before" in told.follows

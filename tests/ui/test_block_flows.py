@@ -174,6 +174,36 @@ async def test_an_indirect_block_waits_for_a_reset() -> None:
         await until(made.pilot, lambda: "F875 FD01" in shown(made.app, "first"))
 
 
+async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word() -> None:
+    async with bench("atv21") as made:
+        await to_blocks(made, "F875")
+        await made.pilot.press("tab", "a")
+        await pick(made, "fa50")
+        await made.pilot.press("down")
+        await pick(made, "fa51")
+        await write(made)
+        await message(made, "after the drive's next reset")
+        await made.pilot.press("x")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+        made.app.screen.query_one(Input).value = "FA51=500"
+        await made.pilot.press("enter")
+        fault = made.app.screen.query_one("#fault")
+        await until(made.pilot, lambda: "reset it first" in str(fault.render()))
+        await made.pilot.press("escape")
+        made.drive().power_off()
+        desk = made.app.mapping_desk(made.app.screen.session)  # type: ignore[attr-defined]
+        await until(made.pilot, lambda: not desk.mapper.written)
+        made.drive().power_on()
+        await until(made.pilot, lambda: not desk.trouble)
+        await until(made.pilot, lambda: "pending" not in shown(made.app, "second"))
+        await answer(made, "x", "FA51=500")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        assert "cannot be read" in str(made.app.screen.query_one("#follows").render())
+        await made.pilot.press("y")
+        await message(made, "Written: FA51 500")
+        assert made.drive().raw("FA51") == 500
+
+
 @pytest.mark.parametrize("family", ["atv312", "powerdrive"])
 async def test_a_family_without_blocks(family: str) -> None:
     async with bench(family) as made:

@@ -44,31 +44,37 @@ class BlockKeys(Arming):
             self._refuse("Not armed: a arms this drive.")
             return
 
+        try:
+            about = f"CODE=VALUE for one or more output slots in use, as now {desk.example()}"
+        except DriveError as refused:
+            self._refuse(str(refused))
+            return
+
         def wrong(text: str) -> str:
             try:
-                desk.outputs_typed(text)
+                desk.meant(text)
             except DriveError as refused:
                 return str(refused)
             return ""
 
-        def sure(text: str) -> None:
+        def given(text: str | None) -> None:
+            if not text:
+                return
+            try:
+                agreed = desk.meant(text)
+            except DriveError as refused:
+                self._refuse(str(refused))
+                return
+
             def told(sure: bool | None) -> None:
                 if sure:
-                    desk.exchange(desk.outputs_typed(text), self._armed)
+                    desk.exchange(agreed, self._armed)
                 self.look()
 
-            follows = (
-                f"{text}. The other outputs in use are written with what they hold now."
-                " A command word or reference can move the motor."
-            )
             keys = "y or Enter writes, read back   Esc writes nothing"
-            self.app.push_screen(Confirm("Write through the outputs?", follows, keys), told)
+            question = "Write through the outputs?"
+            self.app.push_screen(Confirm(question, agreed.follows, keys), told)
 
-        def given(text: str | None) -> None:
-            if text:
-                sure(text)
-
-        about = "CODE=VALUE for one or more output slots in use, like LFRD=1500 ACC=5.0"
         self.app.push_screen(Ask("Write through the outputs", wrong, about=about), given)
 
     # Files and user words

@@ -115,7 +115,7 @@ class Mapper:
         return frozenset(self._asker.lacking)
 
     def note_reset(self) -> None:
-        """The drive was reset or switched off: what was written before may count now."""
+        """The drive may have been reset or switched off: what was written before may count now."""
         self.written = {}
 
     async def slots(self, block: Block) -> dict[str, int]:

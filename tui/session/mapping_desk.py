@@ -8,41 +8,38 @@ from __future__ import annotations
 
 import asyncio
 import time
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from tui.bus.errors import LineError
 from tui.bus.line import LineStatus, Worker
-from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.errors import DriveError
 from tui.drive.mapping import (
     Assignment,
     Change,
     MappingError,
     Problem,
     changes,
-    describe,
     factory,
     pick,
     problems,
     slots_of,
-    target,
 )
-from tui.drive.mapping_wire import Saving, Stretch, reach, saving, stretches
+from tui.drive.mapping_wire import Saving, Stretch, saving, stretches
 from tui.drive.orders import OrderRefused
 from tui.drive.schema import Block
-from tui.drive.shown import number_of
 from tui.drive.user_words import UserWords
-from tui.drive.values import encode
 
 from .drive_session import DriveSession
 from .exchange import exchange
 from .journal import Journal
 from .mapping import BlockView, Force, Mapper, wire_timing
 from .mapping_write import write_assignment
-from .monitor import monitoring_codes, rates_of
+from .monitor import Snapshot, monitoring_codes, rates_of
 from .order_queue import BY_STOP, Order
+from .outputs import Meant, example, meant, refuse_pending, values_text
 from .user_words import load_words, read_words, save_words
 from .verdict import Verdict
 from .writing import NotTaken
@@ -50,8 +47,6 @@ from .writing import NotTaken
 AGAIN = 1.0
 """Seconds between two looks at the blocks."""
 AFTER_ERROR = 1.0
-WAS_OFF = 3.0
-"""Seconds of silence after which a drive that answers again was switched off, not disturbed."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +79,6 @@ class MappingDesk:
     _reader: Worker | None = None
     _at_work: bool = False
     _verify: bool = False
-    _silent: float | None = None
     _costs: dict[object, Saving] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -125,12 +119,10 @@ class MappingDesk:
             try:
                 await self._look()
             except (LineError, DriveError) as error:
-                self._silent = self._silent or time.monotonic()
                 self.trouble = str(error)
                 await asyncio.sleep(AFTER_ERROR)
             else:
                 self.trouble = ""
-                self._look_for_a_reset()
                 await asyncio.sleep(0.0 if self._verify else AGAIN)
 
     async def _look(self) -> None:
@@ -144,12 +136,15 @@ class MappingDesk:
             text, good = _verdict(list(self.views.values()))
             self._say(text, "done" if good else "refused")
 
-    def _look_for_a_reset(self) -> None:
-        since, self._silent = self._silent, None
-        latest = self.session.monitor.latest
-        off = since is not None and time.monotonic() - since > WAS_OFF
-        if off or (latest is not None and latest.state.kind == "starting"):
-            self.mapper.note_reset()
+    def _wait_for_a_reset(self) -> None:
+        """Note when the drive was silent or starts anew: what waits for a reset may count then."""
+
+        def seen(snapshot: Snapshot) -> None:
+            if snapshot.error or snapshot.state.kind == "starting":
+                self.mapper.note_reset()
+                leave()
+
+        leave = self.session.monitor.listen(seen)
 
     # Proposing
 
@@ -262,6 +257,7 @@ class MappingDesk:
                 )
                 if done.after_reset:
                     self.mapper.written |= {c.slot: c.new for c in done.changes}
+                    self._wait_for_a_reset()
                 self.views = {
                     **self.views,
                     plan.block.id: await self.mapper.look(plan.block),
@@ -272,73 +268,39 @@ class MappingDesk:
 
         self._run(work, "Writing, each slot read back")
 
-    def outputs_typed(self, text: str) -> dict[str, int]:
-        """Raw values by code from `LFRD=1500 ACC=5.0`, for the outputs of now.
+    def example(self) -> str:
+        """What may be typed to write through the outputs. Raises MappingError."""
+        return example(self.session.profile, self._outputs(), self.session.monitor.known.raws())
 
-        Raises ValueRefused and MappingError with what is wrong.
+    def meant(self, text: str) -> Meant:
+        """What `LFRD=1500 ACC=5.0` would write through the outputs of now, and what follows.
+
+        Raises ValueRefused, UnknownParameter and MappingError with what is wrong.
         """
-        profile, block = self.session.profile, self._outputs().block
-        stand = {p.code: p for raw in self._outputs().raws if (p := target(profile, block, raw))}
-        raws = self.session.monitor.known.raws()
-        found: dict[str, int] = {}
-        for part in text.replace(",", ".").split():
-            code, sign, value = part.partition("=")
-            parameter = profile.find(code)
-            if not sign or parameter.code not in stand:
-                raise ValueRefused(f"{part!r}: write CODE=VALUE with one of {', '.join(stand)}.")
-            scale = profile.scale(parameter, raws)
-            found[parameter.code] = encode(parameter, value, profile.names(parameter), scale).raw
-        if not found:
-            raise ValueRefused(f"Write CODE=VALUE with one of {', '.join(stand)}.")
-        return found
-
-    def exchange_follows(self, wanted: Mapping[str, int]) -> str:
-        """What an exchange with these would do, for a person to agree to. Raises MappingError."""
-        profile, outputs = self.session.profile, self._outputs()
-        block, places = outputs.block, reach(self.session.profile, outputs, wanted)
-        if waits := [slot for slot in block.slots if slot in self.mapper.written]:
-            raise MappingError(
-                f"{', '.join(waits)} count after the drive's next reset only: reset it first."
-            )
-        lines, beside = [], []
-        for place in places:
-            code = describe(profile, block, outputs.raws[place])
-            if code in wanted:
-                lines.append(f"{block.slots[place]}: {code} {self._number(code, wanted[code])}")
-            else:
-                beside.append(code)
-        if beside:
-            lines.append(f"Between them {', '.join(beside)} is written with what it holds now.")
-        if block.effective == "after-reset":
-            lines.append(
-                f"What {block.name.lower()} stands for since the last reset cannot be read. Go on"
-                f" only if {' and '.join(block.slots)} were set before the drive was last reset or"
-                " switched on."
-            )
-        lines.append("A command word or reference can move the motor.")
-        return "\n".join(lines)
-
-    def exchange(self, wanted: Mapping[str, int], allowed: Callable[[], bool]) -> None:
-        """Write through the outputs, with the inputs in the same exchange; returns at once.
-
-        A person has agreed to what follows from it, `exchange_follows`.
-        """
-        outputs = self._outputs()
+        session, outputs = self.session, self._outputs()
+        refuse_pending(outputs, self.mapper.written)
         read = next((b for b in self.blocks if b.direction == "read"), None)
         inputs = self.today(read) if read else None
+        raws = session.monitor.known.raws()
+        return meant(session.profile, session.device, outputs, inputs, raws, text)
+
+    def exchange(self, agreed: Meant, allowed: Callable[[], bool]) -> None:
+        """Write through the outputs what a person has agreed to; returns at once."""
+        session = self.session
 
         async def work() -> str:
             done = await exchange(
-                self.session,
+                session,
                 self.journal,
-                outputs,
-                wanted,
-                inputs,
+                agreed.outputs,
+                agreed.wanted,
+                agreed.inputs,
                 allowed=allowed,
                 in_force=True,
             )
-            sent = ", ".join(f"{c} {self._number(c, done.outputs[c])}" for c in wanted)
-            back = ", ".join(f"{c} {self._number(c, raw)}" for c, raw in done.inputs.items())
+            raws = session.monitor.known.raws()
+            sent = values_text(session.profile, agreed.wanted, raws)
+            back = values_text(session.profile, done.inputs, raws)
             return f"Written: {sent}." + (f" Came back: {back}." if back else "")
 
         self._run(work, "Writing through the outputs")
@@ -349,11 +311,6 @@ class MappingDesk:
         if plan is None or not plan.length:
             raise MappingError("No output slot is in use.")
         return plan
-
-    def _number(self, code: str, raw: int) -> str:
-        profile = self.session.profile
-        number = number_of(profile, profile[code], raw, self.session.monitor.known.raws())
-        return str(raw) if number is None else f"{number:f}"
 
     def _run(self, work: Callable[[], Coroutine[Any, Any, str]], doing: str) -> None:
         """Do it as an order to the drive: behind those before it, ended by a stop."""

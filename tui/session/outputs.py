@@ -1,0 +1,137 @@
+"""What a person means to write through the outputs of a block or scanner, and what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from tui.drive.errors import ValueRefused
+from tui.drive.frames import hex_text
+from tui.drive.mapping import Assignment, MappingError, describe, target
+from tui.drive.mapping_wire import frame, reach
+from tui.drive.profile import Profile
+from tui.drive.schema import Parameter
+from tui.drive.shown import number_of
+from tui.drive.values import encode, to_words
+
+
+@dataclass(frozen=True, slots=True)
+class Meant:
+    """Values for outputs as a person agrees to them, with the slots as they were seen then."""
+
+    outputs: Assignment
+    inputs: Assignment | None
+    wanted: Mapping[str, int]
+    """Raw values by code."""
+    follows: str
+    """What goes out, and what that means, a sentence a line."""
+
+
+def output_codes(profile: Profile, outputs: Assignment) -> dict[str, Parameter]:
+    """What the output slots stand for, by code."""
+    found = (target(profile, outputs.block, raw) for raw in outputs.raws)
+    return {parameter.code: parameter for parameter in found if parameter is not None}
+
+
+def example(profile: Profile, outputs: Assignment, raws: Mapping[str, int]) -> str:
+    """What may be typed for the first two of these outputs: what they hold now."""
+    codes = list(output_codes(profile, outputs))[:2]
+    return " ".join(
+        f"{code}={number_text(profile, code, raws.get(code, 0), raws)}" for code in codes
+    )
+
+
+def meant(
+    profile: Profile,
+    device: int,
+    outputs: Assignment,
+    inputs: Assignment | None,
+    raws: Mapping[str, int],
+    text: str,
+) -> Meant:
+    """What a text like `LFRD=1500 ACC=5.0` means. `raws` are known raw values, for scales.
+
+    Raises ValueRefused and UnknownParameter with what is wrong.
+    """
+    stand = output_codes(profile, outputs)
+    wanted: dict[str, int] = {}
+    for part in text.replace(",", ".").split():
+        code, sign, value = part.partition("=")
+        parameter = profile.find(code)
+        if not sign or parameter.code not in stand:
+            raise ValueRefused(f"{part!r}: write CODE=VALUE with one of {', '.join(stand)}.")
+        scale = profile.scale(parameter, raws)
+        wanted[parameter.code] = encode(parameter, value, profile.names(parameter), scale).raw
+    if not wanted:
+        raise ValueRefused(f"Write CODE=VALUE with one of {', '.join(stand)}.")
+    places = reach(profile, outputs, wanted)
+    lines = [*_lines(profile, outputs, places, wanted, raws)]
+    words = [_word(profile, outputs, place, wanted, raws) for place in places]
+    lines.append(f"Frame: {hex_text(frame(profile, device, inputs, outputs, words, places))}")
+    return Meant(outputs, inputs, wanted, "\n".join(lines))
+
+
+def refuse_pending(outputs: Assignment, waits: Collection[str]) -> None:
+    """Raise MappingError where slots count only after a reset that was not seen yet."""
+    if found := [slot for slot in outputs.block.slots if slot in waits]:
+        raise MappingError(
+            f"{', '.join(found)} count after the drive's next reset only: reset it first."
+        )
+
+
+def number_text(profile: Profile, code: str, raw: int, raws: Mapping[str, int]) -> str:
+    """A raw value as a person types it: a word of bits in hexadecimal, else a number."""
+    parameter = profile[code]
+    if parameter.bits:
+        return f"16#{raw & 0xFFFF:04X}"
+    number = number_of(profile, parameter, raw, raws)
+    return str(raw) if number is None else f"{number:f}"
+
+
+def values_text(profile: Profile, values: Mapping[str, int], raws: Mapping[str, int]) -> str:
+    """Codes and their values in one line."""
+    return ", ".join(f"{c} {number_text(profile, c, raw, raws)}" for c, raw in values.items())
+
+
+def _lines(
+    profile: Profile,
+    outputs: Assignment,
+    places: range,
+    wanted: Mapping[str, int],
+    raws: Mapping[str, int],
+) -> list[str]:
+    block = outputs.block
+    lines, beside = [], []
+    for place in places:
+        code = describe(profile, block, outputs.raws[place])
+        if code in wanted:
+            value = number_text(profile, code, wanted[code], raws)
+            unit = "" if profile[code].bits else profile[code].unit
+            lines.append(f"{block.slots[place]}: {code} {value} {unit}".rstrip())
+        else:
+            beside.append(code)
+    if beside:
+        lines.append(f"With them {', '.join(beside)} is written, with what it holds now.")
+    if block.effective == "after-reset":
+        lines.append(
+            f"What the {block.name.lower()} stands for since the last reset cannot be read. Go on"
+            f" only if {' and '.join(block.slots)} were set before the drive was last reset or"
+            " switched on."
+        )
+    lines.append("A command word or reference can move the motor.")
+    return lines
+
+
+def _word(
+    profile: Profile,
+    outputs: Assignment,
+    place: int,
+    wanted: Mapping[str, int],
+    raws: Mapping[str, int],
+) -> int:
+    """The word for a place, as far as it is known before the exchange."""
+    parameter = target(profile, outputs.block, outputs.raws[place])
+    if parameter is None:
+        return 0
+    raw = wanted.get(parameter.code, raws.get(parameter.code, 0))
+    return to_words(parameter, raw)[0]
