@@ -15,6 +15,25 @@ DRIVES = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdri
 WATCHED = 4
 TREND_SECONDS = 62.0
 FAULT_CODE = "ObF"
+NO_SEARCH = ["backspace"] * 4
+STEPS: tuple[tuple[list[str], float, str], ...] = (
+    (["question_mark"], 0.5, "help"),
+    (["escape", "a"], 1.0, "armed"),
+    (["c"], 1.5, ""),
+    (["down"], 0.5, "control-source"),
+    (["escape", "3"], 6.0, ""),
+    (["slash", *"ramp", "enter"], 1.5, "parameters-found"),
+    (["slash", *NO_SEARCH, *"acc", "enter", "enter"], 0.5, ""),
+    ([*"5.03"], 0.5, "parameters-edit"),
+    (["enter", "slash", *NO_SEARCH, *"speed", "enter", "minus"], 1.0, "parameters"),
+    (["a", "a", "w"], 0.5, "parameters-write"),
+    (["escape", "4"], 3.0, ""),
+    (["down", "down", "enter", *"lcr"], 0.5, "blocks-pick"),
+    (["enter", "down", "enter", *"uln", "enter"], 1.0, "blocks"),
+    (["w"], 0.5, "blocks-write"),
+    (["escape", "u", "escape"], 0.5, ""),
+)
+"""Keys pressed on Monitor, the seconds to wait, and the name of the picture taken then."""
 
 
 async def main() -> None:
@@ -57,34 +76,11 @@ async def _run(size: tuple[int, int]) -> None:
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         await pilot.pause(TREND_SECONDS)
         save("monitor")
-        await pilot.press("question_mark")
-        await pilot.pause(0.5)
-        save("help")
-        await pilot.press("escape", "a")
-        await pilot.pause(1.0)
-        save("armed")
-        await pilot.press("c")
-        await pilot.pause(1.5)
-        await pilot.press("down")
-        await pilot.pause(0.5)
-        save("control-source")
-        await pilot.press("escape", "3")
-        await pilot.pause(6.0)
-        await pilot.press("slash", *"ramp", "enter")
-        await pilot.pause(1.5)
-        save("parameters-found")
-        await pilot.press("slash", *[*["backspace"] * 4], *"acc", "enter", "enter")
-        await pilot.pause(0.5)
-        await pilot.press(*"5.03")
-        await pilot.pause(0.5)
-        save("parameters-edit")
-        await pilot.press("enter", "slash", *[*["backspace"] * 3], *"speed", "enter", "minus")
-        await pilot.pause(1.0)
-        save("parameters")
-        await pilot.press("a", "a", "w")
-        await pilot.pause(0.5)
-        save("parameters-write")
-        await pilot.press("escape", "2")
+        for keys, seconds, name in STEPS:
+            await pilot.press(*keys)
+            await pilot.pause(seconds)
+            if name:
+                save(name)
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         simulation = app.opened.simulation if app.opened else None
         if simulation is None:

@@ -83,6 +83,7 @@ def test_json_is_one_document_after_writing_too(line: str) -> None:
         (("set", "NMA9=LCR", "--arm"), 5, "no slot"),
         (("set", "NCA3=ETA", "--arm"), 5, "can only be read"),
         (("set", "NCA3=CMD", "--arm"), 5, "NCA1 already"),
+        (("set", "NCA3=CMD", "--dry-run"), 5, "NCA1 already"),
         (("set", "NMA3=LCR", "--arm", "--read-only"), 5, "read-only"),
         (("set", "NMA3=NOPE", "--arm"), 2, "no parameter"),
         (("set", "NMA3", "--arm"), 2, "SLOT=CODE"),

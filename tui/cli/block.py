@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .block_output import show_blocks, show_neighbours
-from .errors import DONE, DRIVE_REFUSED, USAGE, Failure, told
+from .errors import DONE, DRIVE_REFUSED, REFUSED_HERE, USAGE, Failure, told
 from .options import (
     Target,
     connect,
@@ -165,20 +165,26 @@ def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
 
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.bus.errors import DeviceException
-    from tui.drive.mapping import changes, describe, problems
+    from tui.drive.mapping import changes, describe, problems, refusing
     from tui.session.journal import Journal
     from tui.session.mapping_write import AssignmentRefused, write_assignment
     from tui.session.writing import NotTaken
 
     held, plans = await _plans(session, wanted)
+    refused: list[str] = []
     for plan in plans:
-        for problem in problems(session.profile, plan):
-            click.echo(problem.text, err=problem.refuses or wanted.as_json)
+        found = problems(session.profile, plan)
+        refused += [problem.text for problem in refusing(found)]
+        for problem in found:
+            if not problem.refuses:
+                click.echo(problem.text, err=wanted.as_json)
         if not wanted.dry_run:
             continue
         for change in changes(held, plan):
             was, will = (describe(session.profile, plan.block, r) for r in (change.old, change.new))
             click.echo(f"write  {change.slot}: {was} -> {will}")
+    if refused:
+        raise Failure(" ".join(refused), REFUSED_HERE)
     if wanted.dry_run:
         return DONE
     journal = Journal()
