@@ -10,6 +10,7 @@ import contextlib
 import os
 import select
 import socket
+import tempfile
 import threading
 import time
 from abc import ABC, abstractmethod
@@ -93,11 +94,13 @@ class PtyEndpoint(Endpoint):
 
     def __init__(self, converse: Callable[[], Conversation], link: str | None) -> None:
         super().__init__("simulated line, pseudo-terminal", converse)
-        self._link = Path(link) if link else None
+        # a number of a pseudo-terminal is given away again as soon as it is unplugged
+        self._folder = None if link else Path(tempfile.mkdtemp(prefix="drivepanel-"))
+        self._link = Path(link) if link else Path(f"{self._folder}/line")
         self._master = self._slave = -1
         self._pipe = (-1, -1)
         self.path = ""
-        """Path of the slave side, or of the link to it."""
+        """Path of the link to the slave side; it stays the same however often it is plugged in."""
 
     def _open(self) -> None:
         try:
@@ -111,13 +114,12 @@ class PtyEndpoint(Endpoint):
         tty.setraw(self._slave)
         os.set_blocking(self._master, False)
         self._pipe = os.pipe()
-        device = os.ttyname(self._slave)
-        self.path = device
-        if self._link is not None:
-            self._make_link(self._link, device)
-            self.path = str(self._link)
+        self._make_link(self._link, os.ttyname(self._slave))
+        self.path = str(self._link)
 
     def _make_link(self, link: Path, device: str) -> None:
+        if self._folder is not None:
+            self._folder.mkdir(mode=0o700, exist_ok=True)
         if link.exists() and not link.is_symlink():
             self._shut()
             raise SimulatorError(f"{link} exists and is no link; choose another path.")
@@ -142,8 +144,11 @@ class PtyEndpoint(Endpoint):
         os.write(self._pipe[1], b"x")
 
     def _shut(self) -> None:
-        if self._link is not None and self._link.is_symlink():
+        if self._link.is_symlink():
             self._link.unlink()
+        if self._folder is not None:
+            with contextlib.suppress(OSError):
+                self._folder.rmdir()
         for handle in (self._master, self._slave, *self._pipe):
             if handle >= 0:
                 os.close(handle)

@@ -99,7 +99,7 @@ class Simulation:
     def serve_pty(self, link: str | None = None) -> str:
         """Serve the line on a pseudo-terminal; returns the path to open.
 
-        With `link` that path is a symbolic link made there, taken away at the end. Raises
+        That path is a symbolic link, made at `link` if given, taken away at the end. Raises
         SimulatorError where the system has no pseudo-terminals or the path is taken.
         """
         endpoint = PtyEndpoint(self._rtu, link)
