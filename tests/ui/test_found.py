@@ -9,10 +9,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.drive import library
+from tui.screens.drive_list import DriveList
 from tui.screens.found import FoundDrive, about_drive, drive_line, next_step
 from tui.session.identify import DriveIdentity
 
 from . import fakes
+from .test_flows import shown
 
 NAMELESS = DriveIdentity(7, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
 
@@ -51,3 +53,28 @@ def test_a_drive_that_named_itself_has_no_sign(width: int) -> None:
 
 def test_a_drive_without_profile_says_so() -> None:
     assert "no profile" in about_drive(found(NAMELESS, None, guessed=False))
+
+
+async def test_a_new_state_moves_nothing_in_a_long_list_of_drives() -> None:
+    app = fakes.app_of()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        screen, drives = app.connection, app.connection.query_one(DriveList)
+        for device in range(1, 33):
+            identity = replace(fakes.ATV71, device=device)
+            screen.found[device] = FoundDrive(identity, None, "ready")
+        screen.show_drives()
+        drives.focus()
+        drives.highlighted = 31
+        await pilot.pause()
+        drives.highlighted = 25
+        await pilot.pause()
+        screen.say("What was said last.", "")
+        before = drives.scroll_offset
+        assert before.y > 0
+        screen.found[5].state = screen.found[26].state = "fault OHF"
+        screen.show_drives()
+        await pilot.pause()
+        assert (drives.scroll_offset, drives.highlighted) == (before, 25)
+        assert "What was said last." in shown(app, "message")
+        assert str(drives.get_option("26").prompt).endswith("fault OHF")

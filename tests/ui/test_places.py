@@ -7,10 +7,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.text import Text
 
+from tui.bus.line import Frame
 from tui.drive import library
 from tui.drive.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.actions import EVERYWHERE, MONITOR, line_of, of_screen
+from tui.screens.frames import frame_line
 from tui.session.monitor import TrendPoint
 from tui.session.readings import Quality
 from tui.widgets.drawing import aligned, bar, key_line, trend
@@ -179,6 +181,18 @@ def test_no_key_is_dropped_at_80_columns(screen: str) -> None:
     line = keys_shown(screen, 80).plain
     wanted = [f" {action.shown} {action.label}" for action in of_screen(screen) if action.label]
     assert [words for words in wanted if words not in line] == []
+
+
+@given(
+    data=st.binary(max_size=300),
+    note=st.sampled_from(["", "exception 2", "checksum wrong"]),
+    width=st.integers(60, 200),
+)
+def test_a_frame_fits_its_line_and_keeps_its_note(data: bytes, note: str, width: int) -> None:
+    line = frame_line(Frame(0.0, "in", data, note), 3.0, width)
+    assert line.cell_len <= width
+    assert line.plain.endswith(note)
+    assert ("…" in line.plain) == (data.hex(" ").upper() not in line.plain)
 
 
 def test_a_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:

@@ -36,8 +36,9 @@ class PanelScreen(Screen[None]):
         self.call_after_refresh(self.look)
 
     def put(self, place: str, lines: Sequence[Text]) -> None:
-        """Show lines in the place with that id."""
-        self.query_one(f"#{place}", Lines).show(lines)
+        """Show lines in the place with that id; what does not fit ends with an ellipsis."""
+        found = self.query_one(f"#{place}", Lines)
+        found.show([_fitted(line, found.size.width) for line in lines])
 
     def look(self) -> None:
         """Show what there is now; lines that stay the same are not drawn."""
@@ -51,3 +52,12 @@ class PanelScreen(Screen[None]):
     def action_leave(self) -> None:
         """Back to the screen below."""
         self.app.pop_screen()
+
+
+def _fitted(line: Text, width: int) -> Text:
+    """The line itself, or its beginning where the place is narrower; 0 is not laid out yet."""
+    if not 0 < width < line.cell_len:
+        return line
+    line = line.copy()
+    line.truncate(width, overflow="ellipsis")
+    return line

@@ -83,7 +83,7 @@ class BlocksScreen(BlockKeys):
         if self.desk.blocks:
             self._show_tables(width)
         else:
-            self._show_neighbours(width)
+            self._show_neighbours(width - 1)  # the table's margin
 
     def _show_tables(self, width: int) -> None:
         desk, block = self.desk, self._block

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from rich.text import Text
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
@@ -11,19 +12,23 @@ from .found import FoundDrive, drive_line
 
 
 class DriveList(OptionList):
-    """The drives that answered, one a line, by address."""
+    """The drives that answered, one a line, by address; a new state moves nothing."""
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True)
+        self._drawn: dict[str, Text] = {}
 
     def fill(self, found: Mapping[int, FoundDrive]) -> None:
-        """Show these drives; the cursor stays at its place."""
+        """Show these drives; the cursor stays at its place, and the list where it was scrolled."""
         width = max(20, self.size.width - 1)
+        lines = {str(device): drive_line(drive, width) for device, drive in sorted(found.items())}
+        before, self._drawn = self._drawn, lines
+        if lines.keys() == before.keys():
+            for id in [id for id in lines if lines[id] != before[id]]:
+                self.replace_option_prompt(id, lines[id])
+            return
         chosen = self.highlighted
         self.clear_options()
-        self.add_options(
-            Option(drive_line(drive, width), id=str(device))
-            for device, drive in sorted(found.items())
-        )
-        if found:
-            self.highlighted = min(chosen or 0, len(found) - 1)
+        self.add_options(Option(line, id=id) for id, line in lines.items())
+        if lines:
+            self.highlighted = min(chosen or 0, len(lines) - 1)

@@ -26,6 +26,8 @@ from .base import PanelScreen
 from .files import fault_of_new
 
 LEFT = 36
+STORED = 52
+"""Columns of what the drive stored, where there is room: values stay beside their names."""
 STEP = 5
 """Rows of the record that a key moves by."""
 
@@ -116,7 +118,8 @@ class FaultsScreen(PanelScreen):
         who = f"Faults · {self.session.profile.name} · device {self.session.device}"
         self.put("title", [rule(who, width, self.app.clock.time_of_day())])
         self.put("fault", fault_lines(fault, present, width))
-        stored = stored_lines(self.session.profile, self._stored(), self._readings, width - LEFT)
+        room = min(STORED, width - LEFT)
+        stored = stored_lines(self.session.profile, self._stored(), self._readings, room)
         self.put("stored", stored)
         room = self.size.height - 1 - 4 - self.query_one("#middle").size.height - 2
         self.put("record", record_lines(record, width, room, self._offset))

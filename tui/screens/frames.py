@@ -8,12 +8,15 @@ from rich.text import Text
 from textual.app import ComposeResult
 
 from tui.bus.line import Frame, Line
-from tui.widgets.drawing import rule
+from tui.widgets.drawing import rule, short
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN
 
 from .actions import FRAMES, bindings
 from .base import PanelScreen
+
+FEWEST = 12
+"""Columns of bytes that are shown, however long the note on the frame is."""
 
 
 class FramesScreen(PanelScreen):
@@ -52,12 +55,12 @@ class FramesScreen(PanelScreen):
 
 
 def frame_line(frame: Frame, now: float, width: int) -> Text:
-    """One frame: how long ago, direction, bytes, and what was said of it."""
+    """One frame: how long ago, direction, as many bytes as fit, and what was said of it."""
     text = Text(no_wrap=True)
     text.append(f" {now - frame.time:7.2f} s ago  ", FAINT)
     text.append(f"{frame.direction:<4}", FAINT)
-    text.append(frame.data.hex(" ").upper(), PLAIN)
-    if frame.note:
-        text.append(f"  {frame.note}", ALARM)
-    text.truncate(width)
+    note = f"  {frame.note}" if frame.note else ""
+    room = max(FEWEST, width - text.cell_len - len(note))
+    text.append(short(frame.data.hex(" ").upper(), room), PLAIN)
+    text.append(note, ALARM)
     return text

@@ -80,7 +80,8 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         ]
         self.put("table", table or [Text(self._empty(), FAINT)])
         self.put("title", [self._title()])
-        self.put("head", [head_line(width, editor.other_label.capitalize())])
+        other = editor.other_label  # a file keeps its name as it is
+        self.put("head", [head_line(width, "Factory" if other == "factory" else other)])
         code = self.listed.code
         detail = detail_lines(editor, code, width) if code else []
         self.put("detail", [rule("", width), *detail])

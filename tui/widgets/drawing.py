@@ -38,9 +38,14 @@ def rule(title: str, width: int, right: str = "") -> Text:
     return text
 
 
+def short(text: str, width: int) -> str:
+    """The text in at most so many cells, with an ellipsis where it is too long."""
+    return f"{text[: width - 1]}…" if len(text) > width else text
+
+
 def cut(text: str, width: int) -> str:
     """The text in exactly so many cells, with an ellipsis where it is too long."""
-    return f"{text[: width - 1]}…" if len(text) > width else f"{text:<{width}}"
+    return f"{short(text, width):<{width}}"
 
 
 def wrapped(text: str, width: int, most: int) -> list[str]:

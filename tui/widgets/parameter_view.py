@@ -17,7 +17,7 @@ from tui.drive.values import NOT_AVAILABLE, is_enumeration, raw_range, set_bits
 from tui.drive.writable import marks, waits_for_reset
 from tui.session.editor import Editor
 
-from .drawing import armed_text, cut
+from .drawing import armed_text, cut, short
 from .palette import (
     ALARM,
     ATTENTION,
@@ -32,7 +32,7 @@ from .palette import (
 
 CODE_WIDTH = 7
 VALUE_WIDTH = 13
-OTHER_WIDTH = 11
+OTHER_WIDTH, OTHER_WIDE = 11, 13
 NUMBER_WIDTH = 9
 RANGE_WIDTH = 22
 NEWS = 3
@@ -70,7 +70,7 @@ def head_line(width: int, other: str) -> Text:
         text.append(f"{'Number':<{NUMBER_WIDTH}}", TITLE)
     text.append(cut("Name", name_width(width)), TITLE)
     text.append(f"{'Value':>{VALUE_WIDTH}}   {'Staged':<{VALUE_WIDTH}}", TITLE)
-    text.append(f"{other[: OTHER_WIDTH - 1]:>{OTHER_WIDTH}}", TITLE)
+    text.append(_other(other, width), TITLE)
     if width >= WIDE:
         text.append(f"  {'Range':<{RANGE_WIDTH}}", TITLE)
     return text
@@ -79,7 +79,14 @@ def head_line(width: int, other: str) -> Text:
 def name_width(width: int) -> int:
     """The room for a name."""
     more = NUMBER_WIDTH + RANGE_WIDTH + 2 if width >= WIDE else 0
-    return max(8, width - (3 + CODE_WIDTH + 2 * VALUE_WIDTH + 3 + OTHER_WIDTH + 3 + more))
+    other = len(_other("", width))
+    return max(8, width - (3 + CODE_WIDTH + 2 * VALUE_WIDTH + 3 + other + 3 + more))
+
+
+def _other(text: str, width: int) -> str:
+    """The column of the factory value, or of what the drive is compared with."""
+    columns = OTHER_WIDE if width >= WIDE else OTHER_WIDTH
+    return f"{short(text, columns - 1):>{columns}}"
 
 
 def row_line(editor: Editor, item: Item, width: int, *, chosen: bool) -> Text:
@@ -109,9 +116,11 @@ def _row(editor: Editor, parameter: Parameter, width: int) -> Text:
     text.append(cut(parameter.name, name_width(width) - 1) + " ", FAINT)
     held = value_text(editor, code)
     changed = not_factory(editor.session.profile, parameter, editor.raws.get(code))
-    text.append(f"{held[:VALUE_WIDTH]:>{VALUE_WIDTH}}", _value_style(editor, parameter, changed))
+    text.append(
+        f"{short(held, VALUE_WIDTH):>{VALUE_WIDTH}}", _value_style(editor, parameter, changed)
+    )
     text.append_text(_staged(editor, code))
-    text.append(f"{other_text(editor, parameter)[: OTHER_WIDTH - 1]:>{OTHER_WIDTH}}", FAINT)
+    text.append(_other(other_text(editor, parameter), width), FAINT)
     text.append(_flags(editor, parameter), ALARM)
     if width >= WIDE:
         text.append(cut(range_text(editor, parameter), RANGE_WIDTH - 1), FAINT)
@@ -142,7 +151,7 @@ def _staged(editor: Editor, code: str) -> Text:
     text.append(" → ", ATTENTION)
     failed = result is not None and not result.done
     style = ALARM if failed or code in editor.changed_elsewhere else ATTENTION
-    text.append(f"{edit.text[: VALUE_WIDTH - 1]:<{VALUE_WIDTH}}", style)
+    text.append(f"{short(edit.text, VALUE_WIDTH - 1):<{VALUE_WIDTH}}", style)
     return text
 
 
@@ -237,9 +246,10 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
         scale = editor.session.profile.scale(parameter, editor.raws, editor.lacking)
         step = f" by {scale:f}" if scale is not None else ""
         text.append(f"   {limits}{step}", PLAIN)
-    if factory := factory_text(editor, parameter):
-        text.append(f"   factory {factory}", FAINT)
-    text.truncate(width)
+    factory = f"   factory {factory_text(editor, parameter)}"
+    if factory.strip() != "factory" and text.cell_len + len(factory) <= width:
+        text.append(factory, FAINT)  # stands in the table too
+    text.truncate(width, overflow="ellipsis")
     return text
 
 
