@@ -50,6 +50,7 @@ def status_of(error: Exception) -> int | None:
     """The exit status of a known error, or None for one that nobody foresaw."""
     from tui.bus.errors import DeviceException, LineError, LinkSyntaxError, RequestRefused
     from tui.drive.errors import DriveError, ProfileError, UnknownParameter, UnknownProfile
+    from tui.session.writing import NotTaken
     from tui.simulator.errors import SimulatorError
 
     table: tuple[tuple[type[Exception], int], ...] = (
@@ -59,6 +60,7 @@ def status_of(error: Exception) -> int | None:
         (ProfileError, USAGE),
         (SimulatorError, USAGE),
         (RequestRefused, REFUSED_HERE),
+        (NotTaken, DRIVE_REFUSED),
         (DriveError, REFUSED_HERE),
         (DeviceException, DRIVE_REFUSED),
         (LineError, LINE_TROUBLE),

@@ -137,10 +137,6 @@ async def _until(holds: Callable[[], bool]) -> None:
 
 
 def _status(error: Exception | None) -> int:
-    from tui.session.writing import NotTaken
-
-    if isinstance(error, NotTaken):
-        return DRIVE_REFUSED
     return REFUSED_HERE if error is None else status_of(error) or REFUSED_HERE
 
 

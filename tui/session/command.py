@@ -40,7 +40,7 @@ from .order_queue import BY_STOP
 from .order_queue import Order as Queued
 from .readings import Reading
 from .reference import Reference, parse_reference, reference_codes
-from .writing import NotTaken, Writer
+from .writing import Writer
 
 ARMED_FOR = 60.0
 """Seconds without a key after which a drive is no longer armed."""
@@ -193,7 +193,7 @@ class Commander:
             self._say(Kind.DONE, await work())
         except Superseded:
             return
-        except (LineError, DriveError, NotTaken) as error:
+        except (LineError, DriveError) as error:
             dropped = self.session.orders.drop("an order before it was refused")
             rest = " The orders behind it were dropped." if dropped else ""
             self._take_steps()

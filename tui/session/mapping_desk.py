@@ -42,7 +42,6 @@ from .order_queue import BY_STOP, Order
 from .outputs import Meant, example, meant, refuse_pending, values_text
 from .user_words import load_words, read_words, save_words
 from .verdict import Verdict
-from .writing import NotTaken
 
 AGAIN = 1.0
 """Seconds between two looks at the blocks."""
@@ -322,7 +321,7 @@ class MappingDesk:
         async def guarded() -> None:
             try:
                 self._say(await work(), "done")
-            except (LineError, DriveError, NotTaken) as error:
+            except (LineError, DriveError) as error:
                 self._say(str(error), "refused")
                 await self._see_again()
             except asyncio.CancelledError:

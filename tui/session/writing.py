@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from tui.bus.errors import DeviceException, LineError
 from tui.bus.line import Priority
+from tui.drive.errors import DriveError
 from tui.drive.schema import Parameter
 from tui.drive.values import decode, from_words, to_words
 
@@ -13,7 +14,7 @@ from .drive_session import DriveSession
 from .journal import Entry, Journal, now_text
 
 
-class NotTaken(Exception):
+class NotTaken(DriveError):
     """A write that the drive answered well and did not take: it holds something else."""
 
 
