@@ -17,8 +17,8 @@ from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
 from tui.session.journal import Journal
 from tui.session.mapping import BlockView, Force, Slot
-from tui.session.verdict import Verdict
 from tui.session.mapping_desk import MappingDesk, Said
+from tui.session.verdict import Verdict
 
 from . import fakes
 from .test_command_pictures import FakeCommander
