@@ -310,3 +310,6 @@ def test_slots_that_wait_for_a_reset_are_not_written_through() -> None:
         refuse_pending(outputs, {"F875": 1})
         told = meant_of(here, outputs, "FA01=60")
         assert "F870 and F871 were set before" in told.follows
+        # this drive has no function 23: a write of two words, and nothing comes back
+        assert "Frame: 01 10 18 70 00 02 04" in told.follows
+        assert told.inputs is None

@@ -78,6 +78,14 @@ class Bench(NamedTuple):
         await until(self.pilot, lambda: stopper.reports[device].phase is Phase.STOPPED)
 
 
+def knows_the_state(app: DrivePanelApp) -> bool:
+    """Whether Monitor shows a state that was read: until then nothing can be armed."""
+    screen = app.screen
+    latest = screen.session.monitor.latest if isinstance(screen, MonitorScreen) else None
+    known = latest is not None and not latest.error and latest.state.kind != "unknown"
+    return known and bool(shown(app, "state"))
+
+
 @asynccontextmanager
 async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]:
     """The panel on simulated drives of these families, at the addresses 1, 2, ...
@@ -106,7 +114,7 @@ async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]
             drives.highlighted = 0
             await pilot.press("enter")
             await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
-            await until(pilot, lambda: "waiting" not in shown(app, "state") and shown(app, "state"))  # type: ignore[arg-type, return-value]
+            await until(pilot, lambda: knows_the_state(app))
             yield Bench(app, pilot, simulation)
             if isinstance(app.screen, Leave):
                 await pilot.press("escape")

@@ -109,6 +109,15 @@ def reach(profile: Profile, plan: Assignment, codes: Collection[str]) -> range:
     return range(first, min(end, len(plan.raws)))
 
 
+def together(
+    profile: Profile, inputs: Assignment | None, outputs: Assignment | None, direction: str
+) -> tuple[Assignment | None, Assignment | None]:
+    """Which of the two one request moves: both by function 23, else those of the direction."""
+    if profile.function(23) is not None:
+        return inputs, outputs
+    return (inputs, None) if direction == "read" else (None, outputs)
+
+
 def frame(
     profile: Profile,
     device: int,

@@ -96,7 +96,7 @@ class BlocksScreen(BlockKeys):
             self.put(place, table_lines(desk, one, each, at, double=double))
         detail = [rule("Slot", width), *detail_lines(desk, block, self._at, width)]
         self.put("detail", detail)
-        self.put("cost", cost_lines(desk, desk.saving(), width))
+        self.put("cost", cost_lines(desk, block, desk.saving(), width))
 
     def _show_neighbours(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]

@@ -131,7 +131,8 @@ class Mapper:
         held = await self.slots(block)
         view = await self._round(block, held)
         for number in range(1, ROUNDS):
-            doubtful = any(slot.verdict is Verdict.DIFFERS for slot in view.slots)
+            reads = block.direction == "read"
+            doubtful = reads and any(slot.verdict is Verdict.DIFFERS for slot in view.slots)
             if number >= rounds and not doubtful:
                 break
             again = await self._round(block, await self.slots(block))

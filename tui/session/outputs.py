@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from tui.drive.errors import ValueRefused
 from tui.drive.frames import hex_text
 from tui.drive.mapping import Assignment, MappingError, describe, target
-from tui.drive.mapping_wire import frame, reach
+from tui.drive.mapping_wire import frame, reach, together
 from tui.drive.profile import Profile
 from tui.drive.schema import Parameter
 from tui.drive.shown import number_of
 from tui.drive.values import encode, to_words
+
+REFERENCES = frozenset({"command_frequency", "command_speed"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,6 +69,7 @@ def meant(
     places = reach(profile, outputs, wanted)
     lines = [*_lines(profile, outputs, places, wanted, raws)]
     words = [_word(profile, outputs, place, wanted, raws) for place in places]
+    inputs, _ = together(profile, inputs, outputs, "write")
     lines.append(f"Frame: {hex_text(frame(profile, device, inputs, outputs, words, places))}")
     return Meant(outputs, inputs, wanted, "\n".join(lines))
 
@@ -118,8 +121,15 @@ def _lines(
             f" only if {' and '.join(block.slots)} were set before the drive was last reset or"
             " switched on."
         )
-    lines.append("A command word or reference can move the motor.")
+    if any(_moves(profile, describe(profile, block, outputs.raws[place])) for place in places):
+        lines.append("A command word or reference can move the motor.")
     return lines
+
+
+def _moves(profile: Profile, code: str) -> bool:
+    """Whether a word is a command or a reference of the line."""
+    commands = {chart.command for chart in profile.data.charts}
+    return code in commands or profile[code].quantity in REFERENCES
 
 
 def _word(

@@ -9,7 +9,7 @@ from rich.text import Text
 
 from tui.drive.frames import hex_text
 from tui.drive.mapping import Assignment, describe, target
-from tui.drive.mapping_wire import Saving, Stretch, frame, microseconds
+from tui.drive.mapping_wire import Saving, Stretch, frame, microseconds, together
 from tui.drive.profile import is_verified
 from tui.drive.schema import Block, Parameter
 from tui.drive.user_words import UserWords
@@ -49,7 +49,8 @@ def table_lines(
     """The slots of one block under its heading; `at` is the place of the cursor, if it is here."""
     view = desk.views.get(block.id)
     plan = desk.plans.get(block.id)
-    right = "proposed" if plan else "through the block · direct" if width >= BOTH else ""
+    through = "through the block" if block.direction == "read" else "last written"
+    right = "proposed" if plan else f"{through} · direct" if width >= BOTH else ""
     lines = [rule(block.name, width, right)]
     for place, code in enumerate(block.slots):
         slot = view.slots[place] if view else Slot(code, None)
@@ -79,20 +80,26 @@ def _slot_line(
         text.append(f"{slot.text if used else '':>{max(0, min(14, room - 1))}}", FAINT)
         return _filled(text, width)
     room = width - text.cell_len
-    verdict = SHORT.get(slot.verdict, str(slot.verdict))
-    if slot.force is Force.PENDING:
-        verdict = "pending"
-    shown = slot.text if used else ""
     both = width >= BOTH
+    verdict, style = _verdict(block, slot)
     value_room = max(4, (room - 9) // 2 if both else room - 9)
-    text.append(f"{cut(shown, value_room).rstrip():>{value_room}}", PLAIN)
-    if both:
-        text.append(
-            f"{cut(slot.direct_text, value_room).rstrip() if used else '':>{value_room}}", FAINT
-        )
-    style = ALARM if slot.force is Force.PENDING else VERDICT_STYLES[slot.verdict]
-    text.append(f" {verdict:<8}", style)
+    values = [slot.text, slot.direct_text] if both else [slot.text]
+    if block.direction == "write" and not both:
+        values, verdict = [slot.direct_text], verdict or "direct"
+    for place, value in enumerate(values):
+        shown = cut(value, value_room).rstrip() if used else ""
+        text.append(f"{shown:>{value_room}}", FAINT if place else PLAIN)
+    text.append(f" {verdict if used else '':<8}", style)
     return _filled(text, width)
+
+
+def _verdict(block: Block, slot: Slot) -> tuple[str, Style]:
+    """The verdict in few characters; what was last written through an output is none."""
+    if slot.force is Force.PENDING:
+        return "pending", ALARM
+    if block.direction == "write" and slot.verdict not in (Verdict.CHANGED, Verdict.NONE):
+        return "", FAINT
+    return SHORT.get(slot.verdict, str(slot.verdict)), VERDICT_STYLES[slot.verdict]
 
 
 def _filled(text: Text, width: int) -> Text:
@@ -142,7 +149,8 @@ def detail_lines(desk: MappingDesk, block: Block, place: int, width: int) -> lis
     second = Text(f" {notation_text(parameter)}", PLAIN)
     second.append(f"   unit {parameter.unit or '-'}", FAINT)
     if raw == slot.raw:
-        second.append("   through the block ", FAINT)
+        through = "through the block" if block.direction == "read" else "last written"
+        second.append(f"   {through} ", FAINT)
         second.append(slot.text, STRONG)
         second.append("   direct ", FAINT)
         second.append(slot.direct_text, PLAIN)
@@ -157,7 +165,7 @@ def _remarks(desk: MappingDesk, view: BlockView, slot: Slot, code: str, width: i
     found = [(p.text, ALARM) for p in desk.problems(view.block) if p.slot == code]
     if view.block.effective == "after-reset" and slot.raw:
         found.append((_force_text(slot), ALARM if slot.force is Force.PENDING else FAINT))
-    elif slot.verdict not in (Verdict.UNUSED, Verdict.UNREAD):
+    elif view.block.direction == "read" and slot.verdict not in (Verdict.UNUSED, Verdict.UNREAD):
         found.append((f"Compared with direct reads: {slot.verdict}.", VERDICT_STYLES[slot.verdict]))
     if view.trouble:
         found.append((view.trouble, ALARM if view.block.direction == "read" else FAINT))
@@ -175,9 +183,13 @@ def _force_text(slot: Slot) -> str:
     return "Configured; whether it counts already cannot be read nor told by values of now."
 
 
-def cost_lines(desk: MappingDesk, saving: Saving | None, width: int) -> list[Text]:
-    """What a monitoring cycle costs before and after, and the frame; always four lines."""
-    inputs, outputs = _plans(desk)
+def cost_lines(desk: MappingDesk, block: Block, saving: Saving | None, width: int) -> list[Text]:
+    """What a monitoring cycle costs before and after, and the frame of the block looked at.
+
+    Always four lines.
+    """
+    profile = desk.session.profile
+    inputs, outputs = together(profile, *_plans(desk), block.direction)
     lines = [rule("On the wire", width)]
     text = Text(" ", no_wrap=True)
     if saving is None:
@@ -190,11 +202,12 @@ def cost_lines(desk: MappingDesk, saving: Saving | None, width: int) -> list[Tex
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
             text.append(f" in {saving.after.requests}", FAINT)
             text.append(f"  ({_ms(-saving.microseconds, sign=True)})", ATTENTION)
-        whole = microseconds(desk.session.profile, wire_timing(desk.session), inputs, outputs)
-        if whole:
-            text.append(f"   one exchange {_ms(whole)}", FAINT)
+        whole = microseconds(profile, wire_timing(desk.session), inputs, outputs)
+        told = f"   one exchange {_ms(whole)}"
+        if whole and text.cell_len + len(told) <= width:
+            text.append(told, FAINT)
     text.truncate(width)
-    sent = frame(desk.session.profile, desk.session.device, inputs, outputs, _output_words(desk))
+    sent = frame(profile, desk.session.device, inputs, outputs, _output_words(desk))
     hexes = wrapped(hex_text(sent) or "none: no slot is in use", width - 8, 2)
     frames = [
         Text(f" {'frame' if not line else '':<6}{hexes[line] if line < len(hexes) else ''}", PLAIN)
@@ -229,7 +242,7 @@ def word_lines(desk: MappingDesk, words: UserWords, width: int) -> list[Text]:
     room = max(10, (width - 2) // max(1, len(words)))
     for word, raw in zip(words, desk.word_raws, strict=False):
         parameter = desk.session.profile.at(word.address) if word.address else None
-        name = parameter.code if parameter else f"W{word.address}"
+        name = parameter.code if parameter else f"W{word.address}" if word.address else "none"
         shown = word.text(raw)
         text.append(f"{name} ", FAINT)
         style = FAINT if shown == NOT_AVAILABLE else PLAIN

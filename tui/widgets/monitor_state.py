@@ -250,9 +250,11 @@ def status_lines(view: View, width: int) -> list[Text]:
         text.append(f"  watch {view.watch.timeout:g} s", FAINT)
         if _is_hungry(view):
             text.append(f", {max(0.0, view.time_left or 0.0):.0f} s left", ALARM)
-    text.append(f"  {counts.requests} requests, {bad} failed", FAINT)
     if view.read_only:
         text.append("  read-only", FAINT)
+    told = f"  {counts.requests} requests, {bad} failed"
+    short = f"  {bad} failed"
+    text.append(told if text.cell_len + len(told) <= width else short, FAINT)
     text.truncate(width)
     return [text]
 
