@@ -252,9 +252,8 @@ def status_lines(view: View, width: int) -> list[Text]:
             text.append(f", {max(0.0, view.time_left or 0.0):.0f} s left", ALARM)
     if view.read_only:
         text.append("  read-only", FAINT)
-    told = f"  {counts.requests} requests, {bad} failed"
-    short = f"  {bad} failed"
-    text.append(told if text.cell_len + len(told) <= width else short, FAINT)
+    said = (f"  {counts.requests} requests, {bad} failed", f"  {bad} failed", "")
+    text.append(next(one for one in said if not one or text.cell_len + len(one) <= width), FAINT)
     text.truncate(width)
     return [text]
 
