@@ -12,6 +12,7 @@ import pytest
 from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
+from tui.bus.errors import PortBusy
 from tui.screens.confirm import Confirm
 from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
@@ -63,6 +64,50 @@ async def test_an_unforeseen_error_is_one_line_and_the_panel_goes_on() -> None:
         assert "The panel failed at this" in message(app)
         await pilot.press("question_mark", "escape")
         assert app.screen is app.connection
+
+
+async def test_enter_tries_the_line_again_that_could_not_be_opened(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    tried: list[str] = []
+
+    def busy(text: str, **_: Any) -> OpenLine:
+        tried.append(text)
+        raise PortBusy("The port is in use by another program.")
+
+    ports = [("/dev/ttyUSB0", "")]
+    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: list(ports))
+    app = DrivePanelApp(open_line=busy, start="tcp:elsewhere")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: "in use" in message(app))
+        await pilot.press("enter")
+        await until(pilot, lambda: len(tried) == 2)
+        # a port that comes and goes moves the list, and not the cursor from its line
+        ports.insert(0, ("/dev/ttyUSB9", ""))
+        await pilot.press("r")
+        await pilot.press("enter")
+        await until(pilot, lambda: len(tried) == 3)
+        ports.clear()
+        await pilot.press("r")
+        await pilot.press("enter")
+        await until(pilot, lambda: len(tried) == 4)
+    assert set(tried) == {"tcp:elsewhere"}
+
+
+async def test_enter_on_a_port_tries_that_port_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    tried: list[str] = []
+
+    def busy(text: str, **_: Any) -> OpenLine:
+        tried.append(text)
+        raise PortBusy("The port is in use by another program.")
+
+    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: [("/dev/ttyUSB0", "")])
+    app = DrivePanelApp(open_line=busy)
+    async with app.run_test(size=(80, 24)) as pilot:
+        for count in (1, 2, 3):
+            await pilot.press("enter")
+            await until(pilot, lambda count=count: len(tried) == count)  # type: ignore[misc]
+    assert set(tried) == {"serial:/dev/ttyUSB0,19200,8E1"}
 
 
 async def test_a_line_that_opens_after_another_was_chosen_is_closed() -> None:

@@ -25,7 +25,7 @@ class ConnectionScreen(LineKeys):
         if event.option_list is self.drives:
             self.open_drive(int(event.option.id or 0))
         elif choice := self.lines.choice(event.option.id):
-            self.open_line(self.form.line_at(choice.path) if choice.path else choice.text)
+            self.open_line(self.line_of(choice))
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
         """Say all that the chosen drive says of itself; a line that is no port has no settings."""

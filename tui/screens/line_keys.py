@@ -7,7 +7,7 @@ from textual import work
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
-from .choices import LINE_FORMS, fault_of_line
+from .choices import LINE_FORMS, LineChoice, fault_of_line
 from .scanning import Scanning
 
 CLOSE_KEYS = "y or Enter closes it   Esc keeps it"
@@ -20,6 +20,10 @@ class LineKeys(Scanning):
         """Look for serial ports and recent lines."""
         self.lines.look_for_lines()
         self.lines.fill()
+
+    def line_of(self, choice: LineChoice) -> str:
+        """The line of a choice, with the settings of the form where it is a port."""
+        return self.form.line_at(choice.path) if choice.path else choice.text
 
     def action_type_line(self) -> None:
         """Type a line."""
@@ -61,6 +65,9 @@ class LineKeys(Scanning):
             await self.app.connect(text)
         except (LineError, DriveError) as error:
             self.fail(error)
+            chosen = self.lines.chosen
+            if chosen is None or self.line_of(chosen) != text:
+                self.lines.offer_again(text)
             return False
         self.action_refresh_lines()
         self.show_heads()

@@ -20,30 +20,51 @@ class LineList(OptionList):
         self._groups: list[Group] = []
         self._choices: dict[str, LineChoice] = {}
         self._shown: tuple[int, list[Group]] | None = None
+        self._tried = ""
+        """A line that could not be opened: it may be none of those used lately."""
 
     def look_for_lines(self) -> None:
         """Find the serial ports there are now, and the lines used lately."""
         from tui.session.lines import serial_ports
 
-        self._groups = groups(serial_ports(), recent_lines())
+        lately = recent_lines()
+        tried = [self._tried] if self._tried and self._tried not in lately else []
+        self._groups = groups(serial_ports(), [*tried, *lately])
 
     def choice(self, id: str | None) -> LineChoice | None:
         """The line of an option; None for a heading."""
         return self._choices.get(id or "")
 
+    @property
+    def chosen(self) -> LineChoice | None:
+        """The line under the cursor."""
+        at = self.highlighted
+        return None if at is None else self.choice(self.get_option_at_index(at).id)
+
+    def offer_again(self, text: str) -> None:
+        """Put the cursor on a line that could not be opened, so that Enter tries it again."""
+        self._tried = text
+        self.look_for_lines()
+        self.fill()
+        fits = [id for id, choice in self._choices.items() if choice.text == text]
+        if fits:
+            self.highlighted = self.get_option_index(fits[0])
+
     def fill(self) -> None:
-        """Show what was found; the cursor stays at its place."""
+        """Show what was found; the cursor stays on its line."""
         width = max(20, self.size.width - 1)
         if self._shown == (width, self._groups):
             return
         self._shown = (width, self._groups)
-        chosen = self.highlighted
+        at = self.highlighted
+        chosen = None if at is None else self.get_option_at_index(at).id
         self._choices.clear()
         options = [option for group in self._groups for option in self._rows(group, width)]
         self.clear_options()
         self.add_options(options)
         first = next((at for at, option in enumerate(options) if not option.disabled), None)
-        self.highlighted = chosen if chosen is not None else first
+        still = chosen is not None and chosen in self._choices
+        self.highlighted = self.get_option_index(chosen) if still and chosen else first
 
     def _rows(self, group: Group, width: int) -> list[Option]:
         """A heading with its lines, or with what is said of none."""
