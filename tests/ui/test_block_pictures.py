@@ -17,7 +17,8 @@ from tui.session.command import Commander
 from tui.session.drive_session import DriveSession
 from tui.session.journal import Journal
 from tui.session.mapping import BlockView, Force, Slot
-from tui.session.mapping_desk import MappingDesk, Said
+from tui.session.mapping_desk import MappingDesk
+from tui.session.said import Said
 from tui.session.verdict import Verdict
 
 from . import fakes

@@ -11,9 +11,10 @@ from tui.drive import library
 from tui.screens.parameters import ParametersScreen
 from tui.session.applying import Outcome, Result
 from tui.session.command import Commander
-from tui.session.editor import Editor, Say
+from tui.session.editor import Editor
 from tui.session.favourites import Marks
 from tui.session.journal import Journal
+from tui.session.said import Said
 
 from . import fakes
 from .test_command_pictures import FakeCommander
@@ -68,7 +69,7 @@ def refused(editor: Editor) -> None:
         " Stop the motor and write again."
     )
     editor.results = {"HSP": Result(edit, Outcome.DRIVE_REFUSED, text, 500)}
-    editor.said = Say("2 written and read back; 1 still staged: HSP", "refused", fakes.NOW)
+    editor.said = Said("2 written and read back; 1 still staged: HSP", "refused", fakes.NOW)
 
 
 def elsewhere(editor: Editor) -> None:
@@ -80,7 +81,7 @@ def elsewhere(editor: Editor) -> None:
 def done(editor: Editor) -> None:
     editor.unsaved = {"ACC", "DEC"}
     editor.waits_for_reset = {"ADD"}
-    editor.said = Say("3 written and read back", "done", fakes.NOW)
+    editor.said = Said("3 written and read back", "done", fakes.NOW)
 
 
 def compared(editor: Editor) -> None:

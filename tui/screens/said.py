@@ -2,31 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from rich.style import Style
 
 from tui.session.command import Kind
+from tui.session.said import Said
 from tui.widgets.monitor_orders import OUTCOME_STYLES
 
 SAID_FOR = {Kind.WORKING: 60.0, Kind.DONE: 15.0, Kind.REFUSED: 60.0}
 """Seconds for which it is shown what the last work has come to."""
-
-
-class Said(Protocol):
-    """A sentence on the last work; `kind` is working, done or refused."""
-
-    @property
-    def text(self) -> str:
-        """The sentence."""
-
-    @property
-    def kind(self) -> str:
-        """The value of a Kind."""
-
-    @property
-    def time(self) -> float:
-        """When it was said, on the monotonic clock in s."""
 
 
 def news(said: Said | None, now: float, *, busy: bool) -> tuple[str, Style] | None:

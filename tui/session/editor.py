@@ -32,6 +32,7 @@ from .favourites import Marks, load_marks, save_marks
 from .journal import Journal
 from .link_change import LinkChange
 from .memory import factory_reset, save_to_eeprom
+from .said import Said
 from .upload import readable_codes
 
 LOOK = 0.1
@@ -41,16 +42,6 @@ AGAIN = 1.0
 AFTER_ERROR = 1.0
 WAS_OFF = 3.0
 """Seconds of silence after which a drive that answers again was switched off, not disturbed."""
-
-
-@dataclass(frozen=True, slots=True)
-class Say:
-    """What the last work has come to."""
-
-    text: str
-    kind: str
-    """working, done or refused."""
-    time: float
 
 
 @dataclass(slots=True)
@@ -70,7 +61,7 @@ class Editor:
     """Codes that somebody else changed while they were looked at, with the value before."""
     unsaved: set[str] = field(default_factory=set)
     waits_for_reset: set[str] = field(default_factory=set)
-    said: Say | None = None
+    said: Said | None = None
     moved: LinkChange | None = None
     """Where the drive answers now, after a setting of the line itself was written."""
     trouble: str = ""
@@ -379,7 +370,7 @@ class Editor:
         self._work = self.session.line.spawn(guarded, f"write {self.session.device}")
 
     def _say(self, text: str, kind: str) -> None:
-        self.said = Say(text, kind, time.monotonic())
+        self.said = Said(text, kind, time.monotonic())
         self.version += 1
 
 

@@ -40,21 +40,13 @@ from .mapping_write import write_assignment
 from .monitor import Snapshot, monitoring_codes, rates_of
 from .order_queue import BY_STOP, Order
 from .outputs import Meant, example, meant, refuse_pending, values_text
+from .said import Said
 from .user_words import load_words, read_words, save_words
 from .verdict import Verdict
 
 AGAIN = 1.0
 """Seconds between two looks at the blocks."""
 AFTER_ERROR = 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class Said:
-    """What the last work has come to; `kind` is working, done or refused."""
-
-    text: str
-    kind: str
-    time: float
 
 
 @dataclass(slots=True)
