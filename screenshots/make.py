@@ -30,8 +30,7 @@ STEPS: tuple[tuple[list[str], float, str], ...] = (
     (["escape", "4"], 3.0, ""),
     (["down", "down", "enter", *"lcr"], 0.5, "blocks-pick"),
     (["enter", "down", "enter", *"uln", "enter"], 1.0, "blocks"),
-    (["w"], 0.5, "blocks-write"),
-    (["escape", "u", "escape"], 0.5, ""),
+    (["u", "escape"], 0.5, ""),
 )
 """Keys pressed on Monitor, the seconds to wait, and the name of the picture taken then."""
 

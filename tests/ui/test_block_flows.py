@@ -10,7 +10,9 @@ from textual.widgets import Input
 from tui.screens.ask import Ask
 from tui.screens.blocks import BlocksScreen
 from tui.screens.confirm import Confirm
+from tui.screens.connection import ConnectionScreen
 from tui.screens.monitor import MonitorScreen
+from tui.screens.parameters import ParametersScreen
 from tui.screens.pick_parameter import PickParameter
 
 from .test_command_flows import Bench, bench
@@ -86,8 +88,9 @@ async def test_nothing_is_written_while_the_motor_turns_and_stop_works_here() ->
         await to_blocks(made)
         await made.pilot.press("down", "down", "down")
         await pick(made, "otr")
-        await write(made)
-        await message(made, "motor stopped only", "Nothing was written")
+        await made.pilot.press("w")
+        await message(made, "motor stopped only", "Stop it first")
+        assert isinstance(made.app.screen, BlocksScreen)
         assert made.drive().raw("NMA4") == 0
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, PickParameter))
@@ -213,3 +216,22 @@ async def test_a_family_without_blocks(family: str) -> None:
         assert isinstance(made.app.screen, BlocksScreen)
         await made.pilot.press("2")
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
+
+
+async def test_every_screen_of_a_drive_is_one_key_away_from_every_other() -> None:
+    async with bench("atv71") as made:
+        places = {
+            "1": ConnectionScreen,
+            "2": MonitorScreen,
+            "3": ParametersScreen,
+            "4": BlocksScreen,
+        }
+        for key in "4343214":
+            screen = made.app.screen
+            await made.pilot.press(key)
+            await until(made.pilot, lambda key=key: isinstance(made.app.screen, places[key]))  # type: ignore[misc]
+            assert made.app.screen is not screen
+            if key == "1":
+                await made.pilot.press("enter")
+                await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
+        assert len(made.app.screen_stack) == 4

@@ -30,6 +30,7 @@ from .parameter_actions import PARAMETER_ACTIONS
 of_app = partial(Action, app=True)
 stops = partial(Action, app=True, first=True)
 STOP = "Stop the motor on its ramp, wherever no text is being typed."
+ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, FRAMES, SOURCES)
 NEVER_DROPPED = ("stop_by_space", "help")
 """Actions that stand in the line of keys however narrow the terminal is."""
 WRITE_SOURCE = "Write the chosen configuration, armed and with the motor at rest."
@@ -62,6 +63,15 @@ ACTIONS: tuple[Action, ...] = (
         ("leave", "escape,h,2", "back", "Go back to Monitor."),
     ),
     *on((SOURCES,), ("leave", "escape,c,2", "back", "Go back to Monitor.")),
+    *on(ABOVE_MONITOR, ("go('leave')", "1", "", "Go to Connection.")),
+    *on(
+        tuple(screen for screen in ABOVE_MONITOR if screen != PARAMETERS),
+        ("go('parameters')", "3", "", "Go to Parameters."),
+    ),
+    *on(
+        tuple(screen for screen in ABOVE_MONITOR if screen != BLOCKS),
+        ("go('blocks')", "4", "", "Go to Blocks."),
+    ),
     *PARAMETER_ACTIONS,
     *BLOCK_ACTIONS,
     *WATCH_ACTIONS,

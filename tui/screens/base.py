@@ -53,6 +53,11 @@ class PanelScreen(Screen[None]):
         """Back to the screen below."""
         self.app.pop_screen()
 
+    def action_go(self, place: str) -> None:
+        """From a screen above Monitor straight to where an action of Monitor leads."""
+        self.app.pop_screen()
+        getattr(self.app.screen, f"action_{place}")()
+
 
 def _fitted(line: Text, width: int) -> Text:
     """The line itself, or its beginning where the place is narrower; 0 is not laid out yet."""

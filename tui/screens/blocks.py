@@ -196,13 +196,14 @@ class BlocksScreen(BlockKeys):
         from .confirm import Confirm
 
         desk = self.desk
-        todo = [(block, desk.changes(block)) for block in desk.blocks]
-        if not any(found for _, found in todo):
+        todo = {block.id: block for block in desk.blocks if desk.changes(block)}
+        if not todo:
             self._refuse("Nothing is proposed: Enter picks what the slot stands for.")
             return
-        wrong = [p for block, found in todo if found for p in refusing(desk.problems(block))]
+        wrong = [p.text for block in todo.values() for p in refusing(desk.problems(block))]
+        wrong += [text for block in todo.values() if (text := desk.not_now(block))]
         if wrong:
-            self._refuse(wrong[0].text)
+            self._refuse(wrong[0])
             return
         if not self._armed_or_told():
             return
@@ -213,7 +214,7 @@ class BlocksScreen(BlockKeys):
             self.look()
 
         keys = "y or Enter writes, each slot read back   Esc writes nothing"
-        count = sum(len(found) for _, found in todo)
+        count = sum(len(desk.changes(block)) for block in todo.values())
         self.app.push_screen(Confirm(f"Write {count} slots?", self._follows(), keys), told)
 
     def _follows(self) -> str:

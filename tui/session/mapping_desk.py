@@ -31,12 +31,13 @@ from tui.drive.mapping_wire import Saving, Stretch, saving, stretches
 from tui.drive.orders import OrderRefused
 from tui.drive.schema import Block
 from tui.drive.user_words import UserWords
+from tui.drive.writable import AT_REST
 
 from .drive_session import DriveSession
 from .exchange import exchange
 from .journal import Journal
 from .mapping import BlockView, Force, Mapper, wire_timing
-from .mapping_write import write_assignment
+from .mapping_write import at_rest_only, write_assignment
 from .monitor import Snapshot, monitoring_codes, rates_of
 from .order_queue import BY_STOP, Order
 from .outputs import Meant, example, meant, refuse_pending, values_text
@@ -231,6 +232,13 @@ class MappingDesk:
             self._say(wrong, "refused")
 
     # Writing
+
+    def not_now(self, block: Block) -> str:
+        """Why the slots of a block cannot be written in the state of now, as Monitor knows it."""
+        latest = self.session.monitor.latest
+        if latest is None or latest.error or latest.state.kind in AT_REST:
+            return ""
+        return at_rest_only(block, latest.state.headline or latest.state.kind)
 
     def write(self, allowed: Callable[[], bool]) -> None:
         """Write what is proposed; returns at once."""

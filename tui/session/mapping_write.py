@@ -19,6 +19,7 @@ from tui.drive.mapping import (
     refusing,
     steps,
 )
+from tui.drive.schema import Block
 from tui.drive.writable import AT_REST
 
 from .asking import Asker
@@ -85,6 +86,14 @@ async def write_assignment(
         session.monitor.refresh()
 
 
+def at_rest_only(block: Block, headline: str) -> str:
+    """Why slots are not written while the drive is in a state of that name."""
+    return (
+        f"{block.name}: slots are changed with the motor stopped only; the drive is {headline}."
+        " Stop it first."
+    )
+
+
 @dataclass(slots=True)
 class _Writing:
     session: DriveSession
@@ -129,10 +138,7 @@ class _Writing:
         if not self.allowed():
             raise AssignmentRefused(self._so_far("The drive is no longer armed."))
         if await self.asker.ask_state() not in AT_REST:
-            text = (
-                f"{self.plan.block.name} are changed with the motor stopped only; the drive is"
-                f" {self.asker.headline}. Stop it first."
-            )
+            text = at_rest_only(self.plan.block, self.asker.headline)
             raise AssignmentRefused(self._so_far(text))
 
     async def _write(self, step: Change) -> None:
