@@ -365,7 +365,11 @@ def test_stop_all_stops_each() -> None:
 
 
 def test_stop_all_tells_which_it_could_not_stop_and_stops_the_others() -> None:
-    specs = [DriveSpec("powerdrive", 1), DriveSpec("atv71", 2, run_hz=20.0)]
+    # a drive that refuses to say who it is may be any family
+    specs = [
+        DriveSpec("atv21", 1, identity={1: "UNHEARD OF"}),
+        DriveSpec("atv71", 2, run_hz=20.0),
+    ]
     with bench(*specs) as (simulation, line):
         wait_until(lambda: turns(simulation, 2), "the motor turns")
         done = drivepanel("stop", line, "--all", "--addresses", "1,2")
@@ -374,6 +378,33 @@ def test_stop_all_tells_which_it_could_not_stop_and_stops_the_others() -> None:
         assert "with -p" in done.stderr
         assert "Device 2, Altivar 71: stopped." in done.stdout
         assert stands(simulation, 2)
+
+
+@pytest.mark.parametrize("which", [("--all", "--addresses", "1,2"), ()])
+def test_a_drive_without_a_name_is_stopped_where_all_it_can_be_stop_alike(
+    which: tuple[str, ...],
+) -> None:
+    with bench(DriveSpec("proxidrive", 1, sets={"6.43": 1})) as (simulation, line):
+        until = ("--for", "2", "--leave-running")
+        started = drivepanel("run", line, "-p", "proxidrive", "--arm", *until)
+        assert turns(simulation), started.stderr
+        done = drivepanel("stop", line, *which)
+        assert "Device 1, Powerdrive or Proxidrive or Varmeca 33/34: stopped." in done.stdout
+        assert stands(simulation)
+
+
+def test_drives_that_answer_are_stopped_before_silent_addresses_are_waited_for() -> None:
+    with bench(DriveSpec("atv71", 10, run_hz=20.0)) as (simulation, line):
+        wait_until(lambda: turns(simulation, 10), "the motor turns")
+        command = [*DRIVEPANEL, "stop", line, "--all"]
+        pipe = subprocess.PIPE
+        with subprocess.Popen(command, stdout=pipe, stderr=pipe, text=True) as program:
+            assert program.stdout is not None
+            assert "Device 10, Altivar 71: stopped." in program.stdout.readline()
+            # the silent nine are still asked with patience
+            assert program.poll() is None
+            assert stands(simulation, 10)
+            program.kill()
 
 
 def test_3_stop_all_where_nobody_answers() -> None:

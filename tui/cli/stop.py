@@ -3,19 +3,30 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Iterable
+from collections.abc import Iterable
 from contextlib import suppress
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
 
 from .errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
-from .options import Target, connect, drive_options, line_argument, on_line, read_only_option
+from .options import (
+    Target,
+    connect,
+    drive_options,
+    line_argument,
+    on_line,
+    read_only_option,
+    unidentified,
+)
 from .orders import complain
 
 if TYPE_CHECKING:
+    from tui.bus.line import Priority
     from tui.drive.schema import OrderId
     from tui.session.drive_session import DriveSession
+    from tui.session.identify import DriveIdentity
     from tui.session.lines import OpenLine
     from tui.session.stop import Stopper, StopReport
 
@@ -57,8 +68,7 @@ def stop(
 
     async def work(opened: OpenLine) -> int:
         if not every:
-            session = await connect(opened, target)
-            return await _stop_one(opened, session, order)
+            return await _stop_one(opened, await _wanted(opened, target), order)
         wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
         return await _stop_all(opened, wanted, order, target.profile_id)
 
@@ -89,30 +99,54 @@ async def ended(stopper: Stopper, device: int) -> StopReport:
         await asyncio.sleep(LOOK)
 
 
-async def _stop_one(opened: OpenLine, session: DriveSession, order: OrderId) -> int:
+@dataclass(frozen=True, slots=True)
+class Found:
+    """A drive that can be stopped, and what it is called."""
+
+    session: DriveSession
+    name: str
+
+
+async def _wanted(opened: OpenLine, target: Target) -> Found:
+    """The wanted drive; raises UsageError where it is not known what stops it."""
+    from tui.drive import library
+    from tui.session.identify import identify
+
+    if target.profile_id is None:
+        identity = await identify(opened.line, target.device)
+        found = await asyncio.to_thread(_session, opened, identity, None)
+        if found is None:
+            raise unidentified(identity)
+        return found
+    session = await connect(opened, target)
+    return Found(session, library.load(target.profile_id).name)
+
+
+async def _stop_one(opened: OpenLine, found: Found, order: OrderId) -> int:
     from tui.session.journal import Journal
     from tui.session.stop import Stopper
 
-    if not has_order(session, order):
+    if not has_order(found.session, order):
         raise Failure(
-            f"Device {session.device}, {session.profile.name}, has no {order.replace('-', ' ')};"
+            f"Device {found.session.device}, {found.name}, has no {order.replace('-', ' ')};"
             " stop it without that option.",
             REFUSED_HERE,
         )
     journal = Journal()
     try:
-        return await _seen_through(Stopper(opened.line, journal), session, order)
+        return await _seen_through(Stopper(opened.line, journal), found, order)
     finally:
         journal.close()
 
 
-async def _seen_through(stopper: Stopper, session: DriveSession, order: OrderId) -> int:
+async def _seen_through(stopper: Stopper, found: Found, order: OrderId) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
     from tui.session.stop import Phase
 
+    session = found.session
     stopper.stop([session], order)
     report = await ended(stopper, session.device)
-    who = f"Device {session.device}, {session.profile.name}"
+    who = f"Device {session.device}, {found.name}"
     if report.phase is Phase.STOPPED:
         with suppress(OSError):  # a reader that went away must not end the other stops
             click.echo(f"{who}: {report.text}.")
@@ -140,77 +174,85 @@ async def _stop_all(
 ) -> int:
     """Stop each drive as soon as it is found; what one does holds up no other.
 
-    Drives that say at once who they are come first: a silent address takes seconds to rule out.
+    Every address is asked once in haste before any is asked with patience: a silent one takes
+    seconds to rule out, and meanwhile motors turn.
     """
+    from tui.bus.line import Priority
     from tui.session.journal import Journal
     from tui.session.stop import Stopper
 
     journal = Journal()
     stopper = Stopper(opened.line, journal)
     stops: list[asyncio.Task[int]] = []
-    silent: list[int] = []
+    left = list(devices)
     worst = 0
     try:
-        async for device in _soonest_first(opened, devices):
-            found = await _found(opened, device, profile_id)
-            if isinstance(found, int):
-                worst = max(worst, found)
-            elif found is None:
-                silent.append(device)
-            else:
+        for priority in (Priority.BACKGROUND, Priority.OPERATOR_READ):
+            asked, left = left, []
+            for device in asked:
+                try:
+                    found = await _found(opened, device, profile_id, priority)
+                except Failure as failure:
+                    complain(failure.format_message())
+                    worst = max(worst, failure.exit_code)
+                    continue
+                if found is None:
+                    left.append(device)
+                    continue
                 # a drive without the wished way is stopped all the same
-                way: OrderId = order if has_order(found, order) else "stop"
+                way: OrderId = order if has_order(found.session, order) else "stop"
                 stops.append(asyncio.create_task(_seen_through(stopper, found, way)))
     finally:
         # whatever went wrong with the search: stops that were begun are seen through
         worst = max([worst, *await asyncio.gather(*stops)])
         journal.close()
-    if silent:
-        complain(f"No answer at {', '.join(map(str, silent))}.")
+    if left:
+        complain(f"No answer at {', '.join(map(str, left))}.")
     return worst or (0 if stops else LINE_TROUBLE)
 
 
-async def _soonest_first(opened: OpenLine, devices: Iterable[int]) -> AsyncIterator[int]:
-    """Addresses, those where somebody answers one short question before all others."""
-    from tui.bus.errors import LineError, NoAnswer
-    from tui.bus.line import Priority
-
-    later: list[int] = []
-    for device in devices:
-        try:
-            await opened.line.identify(device, priority=Priority.OPERATOR_READ)
-        except NoAnswer:
-            later.append(device)
-            continue
-        except LineError:
-            pass  # who it is, or what is wrong, is found out next
-        yield device
-    for device in later:
-        yield device
-
-
 async def _found(
-    opened: OpenLine, device: int, profile_id: str | None
-) -> DriveSession | int | None:
-    """The drive at an address; None where nobody answers, a status where it cannot be stopped."""
+    opened: OpenLine, device: int, profile_id: str | None, priority: Priority
+) -> Found | None:
+    """The drive at an address; None where nobody answers yet.
+
+    Raises Failure where it cannot be stopped, and why.
+    """
     from tui.bus.errors import LineError, NoAnswer
-    from tui.drive import library
-    from tui.session.drive_session import DriveSession
+    from tui.bus.line import Priority as Priorities
     from tui.session.identify import identify
 
     try:
-        identity = await identify(opened.line, device)
+        identity = await identify(opened.line, device, priority=priority)
     except NoAnswer:
         return None
     except LineError as error:
-        complain(f"Device {device}: NOT STOPPED: {error}")
-        return LINE_TROUBLE
-    profile = identity.profile or profile_id
-    if profile is None:
-        fits = ", ".join(identity.candidates) or "drivepanel profiles"
-        complain(
-            f"Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
-            f" with -p ({fits}), or stop it at the machine."
-        )
-        return DRIVE_REFUSED
-    return DriveSession(opened.line, device, library.load(profile), identity)
+        if priority is Priorities.BACKGROUND:
+            return None  # asked again, with patience
+        raise Failure(f"Device {device}: NOT STOPPED: {error}", LINE_TROUBLE) from error
+    if (found := await asyncio.to_thread(_session, opened, identity, profile_id)) is not None:
+        return found
+    fits = ", ".join(identity.candidates) or "drivepanel profiles"
+    raise Failure(
+        f"Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
+        f" with -p ({fits}), or stop it at the machine.",
+        DRIVE_REFUSED,
+    )
+
+
+def _session(opened: OpenLine, identity: DriveIdentity, profile_id: str | None) -> Found | None:
+    """A session with the drive; None where it is not known what stops it.
+
+    A drive that does not say who it is may belong to several families: where the same words stop
+    them all, which one it is does not matter.
+    """
+    from tui.drive import library
+    from tui.drive.orders import stop_alike
+    from tui.session.drive_session import DriveSession
+
+    named = identity.profile or profile_id
+    profiles = [library.load(one) for one in ([named] if named else identity.candidates)]
+    if not stop_alike(profiles):
+        return None
+    session = DriveSession(opened.line, identity.device, profiles[0], identity)
+    return Found(session, " or ".join(profile.name for profile in profiles))

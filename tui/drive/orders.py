@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from .chart import state_of
 from .errors import DriveError
 from .profile import Profile
 from .schema import Chart, Order, OrderId, Parameter
+
+WAYS_TO_STOP = frozenset[OrderId]({"stop", "quick-stop", "freewheel", "emergency-stop"})
 
 
 class OrderRefused(DriveError):
@@ -47,6 +49,30 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Order:
     allowed = ", ".join(dict.fromkeys(names[s] for order in same for s in order.states))
     now = state.name if state else "not known"
     raise OrderRefused(f"{same[0].name} is possible in the states: {allowed}. It is now: {now}.")
+
+
+def stop_alike(profiles: Sequence[Profile]) -> bool:
+    """Whether the same words stop the drives of all these families, told by the same states."""
+    ways = [_ways_to_stop(profile) for profile in profiles]
+    return bool(ways) and all(one == ways[0] for one in ways)
+
+
+def _ways_to_stop(profile: Profile) -> tuple[object, ...]:
+    return tuple(
+        (
+            chart.kind,
+            chart.when,
+            profile[chart.status].address,
+            profile[chart.command].address if chart.command else None,
+            tuple((state.id, state.kind, state.mask, state.value) for state in chart.states),
+            tuple(
+                (order.id, order.parameter, order.words, order.states, order.when)
+                for order in chart.orders
+                if order.id in WAYS_TO_STOP
+            ),
+        )
+        for chart in profile.data.charts
+    )
 
 
 def _conditions(order: Order) -> str:

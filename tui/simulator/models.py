@@ -35,4 +35,9 @@ def _model(models: list[Model], reference: str) -> Model | None:
         return named
     power = rating_of(reference).power
     unnamed = (m for m in models if not m.reference and m.power_kw)
-    return next((m for m in unnamed if math.isclose(float(m.power_kw), power)), None)
+    return next((m for m in unnamed if _has_power(m, power)), None)
+
+
+def _has_power(model: Model, power: float) -> bool:
+    """Whether it is one of a model's powers: 0.37/0.4 by 50 Hz and 60 Hz motors."""
+    return any(math.isclose(float(one), power) for one in model.power_kw.split("/"))
