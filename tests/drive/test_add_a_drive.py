@@ -12,6 +12,7 @@ import pytest
 
 from tui.drive import library
 from tui.drive.errors import ProfileError
+from tui.drive.memory_orders import MemoryRefused, factory_order, save_order
 from tui.drive.schema import Confidence, Parameter, ProfileData
 from tui.drive.values import decode, encode
 
@@ -39,7 +40,7 @@ def test_the_example_is_found_loaded_and_decodes(folder: Path) -> None:
     assert (listing.id, listing.name, listing.parameters) == (
         "example-pump",
         "Example pump drive",
-        6,
+        7,
     )
     profile = library.load_file(listing.path)
     frequency = profile["FREQ"]
@@ -48,6 +49,9 @@ def test_the_example_is_found_loaded_and_decodes(folder: Path) -> None:
     assert decode(mode, 2, profile.names(mode), Decimal(1)).text == "Level"
     ramp = profile.find("40201")
     assert encode(ramp, "3 s", {}, Decimal(ramp.scale)).raw == ramp.factory == 300
+    assert save_order(profile).parameter == "KEEP"
+    with pytest.raises(MemoryRefused, match="Example pump drive recalls"):
+        factory_order(profile)
     assert library.identify("EXPUMP-22") == ["example-pump"]
 
 
@@ -71,6 +75,7 @@ BROKEN = [
     ("address = 101", "address = 100", "already that of STAT"),
     ('source = "guide 5.2"', 'source = "a book"', "does not begin with the id of a source"),
     ('parameter = "TRIP", rate', 'parameter = "TRIPP", rate', "no parameter 'TRIPP'"),
+    ('parameter = "KEEP"', 'parameter = "KEPT"', "no parameter 'KEPT'"),
     ('quantity = "acceleration"', 'quantity = "accelerate"', "RAMP"),
     ("max_read = 16", "max_read = 16\nmax_reed = 1", "max_reed"),
 ]

@@ -10,7 +10,6 @@ from tests.session.sets_bench import FAMILIES, Bench, bench
 from tui.bus.errors import RequestRefused
 from tui.drive import library
 from tui.drive.compare import Side, compare, side_of
-from tui.drive.memory_orders import FACTORY
 from tui.drive.parameter_set import Head, ParameterSet, dumps
 from tui.drive.profile import is_verified
 from tui.drive.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
@@ -60,7 +59,7 @@ async def backed_up(made: Bench) -> ParameterSet:
 
 async def to_factory(made: Bench) -> None:
     """Factory settings, by the line where the family's order is known, else at the keypad."""
-    if made.profile.id in FACTORY:
+    if made.profile.data.memory.factory is not None:
         await factory_reset(made.session, made.journal, confirmed={"CMI"})
         return
     line = {s.parameter for s in made.profile.data.link.settings}

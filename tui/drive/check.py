@@ -160,6 +160,12 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
         ],
         "link": [setting.parameter for setting in data.link.settings],
         "communication_fault": [watch.timeout, watch.reaction] if watch else [],
+        "memory": [
+            code
+            for order in (data.memory.save, data.memory.factory)
+            if order is not None
+            for code in (order.parameter, order.groups)
+        ],
         "control_sources": [s.parameter for c in data.control_sources for s in c.settings],
         "identification": [
             data.identification.model_parameter,

@@ -10,8 +10,8 @@ from tui.drive.errors import DriveError
 from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
-    from tui.drive.memory_orders import MemoryOrder
     from tui.drive.profile import Profile
+    from tui.drive.schema import MemoryOrder
 
 
 class WriteKeys(ParameterKeys):

@@ -7,8 +7,9 @@ import time
 from collections.abc import Collection
 
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
-from tui.drive.memory_orders import MemoryOrder, MemoryRefused, factory_order, save_order
+from tui.drive.memory_orders import MemoryRefused, factory_order, save_order
 from tui.drive.profile import is_verified
+from tui.drive.schema import MemoryOrder
 from tui.drive.values import from_words
 from tui.drive.writable import AT_REST, is_setting, line_setting
 
@@ -21,8 +22,6 @@ from .writing import Writer
 LONGEST = 10.0
 """Seconds that a drive may take to save or to recall."""
 LOOK = 0.1
-BUSY = 1 << 0
-"""Bit of the extended status word that is 1 while the drive writes its EEPROM."""
 NAMED = 8
 """How many settings are named in a text."""
 
@@ -124,8 +123,9 @@ async def _until_done(asker: Asker, order: MemoryOrder) -> None:
         held = raws.get(order.parameter, order.raw)
         pending = held & order.raw if order.bit else held == order.raw
         known = status is not None and status.code not in asker.absent
-        word = raws.get(status.code, BUSY) if status is not None and known else 0
-        if raws and not pending and not word & BUSY:
+        busy = profile.data.memory.busy_mask
+        word = raws.get(status.code, busy) if status is not None and known else 0
+        if raws and not pending and not word & busy:
             return
         await asyncio.sleep(LOOK)
     raise MemoryRefused(

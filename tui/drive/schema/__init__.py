@@ -52,6 +52,7 @@ from .link import (
     Reading,
     Server,
 )
+from .memory import Memory, MemoryOrder
 from .monitoring import (
     CommunicationFault,
     FaultCode,
@@ -108,6 +109,8 @@ __all__ = [
     "Link",
     "LinkChoice",
     "LinkSetting",
+    "Memory",
+    "MemoryOrder",
     "Model",
     "Monitoring",
     "MonitoringValue",

@@ -8,6 +8,7 @@ from .chart import Chart, CommandExample, Reference
 from .control_source import ControlSource
 from .identification import Erratum, Head, Identification, Source
 from .link import Addresses, Connector, ExceptionCode, Function, LineRule, Link, Reading
+from .memory import Memory
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter
 
@@ -32,6 +33,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     monitoring: Monitoring
     control_sources: list[ControlSource] = []
     communication_fault: CommunicationFault | None = None
+    memory: Memory = Memory()
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
     enumerations: list[Enumeration] = []
