@@ -117,7 +117,7 @@ def _second_line(
     text = Text("      ", no_wrap=True)
     if parameter is not None:
         text.append(f"{notation_text(parameter)}  {parameter.name}", FAINT)
-    text.truncate(width)
+    text.truncate(width, overflow="ellipsis")
     return text
 
 
@@ -155,7 +155,7 @@ def detail_lines(desk: MappingDesk, block: Block, place: int, width: int) -> lis
         second.append("   direct ", FAINT)
         second.append(slot.direct_text, PLAIN)
     for line in (first, second):
-        line.truncate(width)
+        line.truncate(width, overflow="ellipsis")
     rest = _remarks(desk, view, slot, code, width)
     return [first, second, *rest, Text(""), Text("")][:4]
 
@@ -206,7 +206,7 @@ def cost_lines(desk: MappingDesk, block: Block, saving: Saving | None, width: in
         told = f"   one exchange {_ms(whole)}"
         if whole and text.cell_len + len(told) <= width:
             text.append(told, FAINT)
-    text.truncate(width)
+    text.truncate(width, overflow="ellipsis")
     sent = frame(profile, desk.session.device, inputs, outputs, _output_words(desk))
     hexes = wrapped(hex_text(sent) or "none: no slot is in use", width - 8, 2)
     frames = [
@@ -247,7 +247,7 @@ def word_lines(desk: MappingDesk, words: UserWords, width: int) -> list[Text]:
         text.append(f"{name} ", FAINT)
         style = FAINT if shown == NOT_AVAILABLE else PLAIN
         text.append(f"{shown:<{max(0, room - len(name) - 1)}}", style)
-    text.truncate(width)
+    text.truncate(width, overflow="ellipsis")
     return [rule("User words", width, "m"), text]
 
 

@@ -54,7 +54,7 @@ def _change(profile: Profile, change: Change, width: int) -> Text:
     text.append(cut(parameter.name, 26) + " ", FAINT)
     text.append(f"{_named(profile, change, change.old)} → ", FAINT)
     text.append(_named(profile, change, change.new), STRONG)
-    text.truncate(width)
+    text.truncate(width, overflow="ellipsis")
     return text
 
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from decimal import Decimal
 
 from rich.style import Style
 from rich.text import Text
 
 from .palette import (
+    ALARM,
     ATTENTION_BLOCK,
     BAR,
     BAR_REST,
@@ -149,21 +150,28 @@ def fitting(keys: Sequence[Key], width: int, kept: Collection[str]) -> list[Key]
     return left
 
 
-def key_line(keys: Sequence[Key]) -> Text:
-    """Keys and what they do, on one line; a key that stops a motor is red."""
+def key_styles(action: str) -> tuple[Style, Style]:
+    """How a key and its words are drawn; a key that stops a motor is red."""
+    return (STOP_KEY, STOP_KEY) if action.startswith("stop") else (KEY, FAINT)
+
+
+def key_line(
+    keys: Sequence[Key], styles: Callable[[str], tuple[Style, Style]] = key_styles
+) -> Text:
+    """Keys and what they do, on one line; `styles` of a key and its words, by the action."""
     text = Text(no_wrap=True)
     for index, (action, key, does) in enumerate(keys):
-        stop = action.startswith("stop")
+        drawn, words = styles(action)
         text.append("  " if index else " ")
-        text.append(key, STOP_KEY if stop else KEY)
-        text.append(f" {does}", STOP_KEY if stop else FAINT)
+        text.append(key, drawn)
+        text.append(f" {does}", words)
     return text
 
 
-def armed_text(armed: float | None) -> Text:
+def armed_text(armed: float | None, *, lost: bool = False) -> Text:
     """Whether a drive is armed, and for how many seconds more."""
     if armed is None:
-        return Text(" NOT ARMED  ", STRONG)
+        return Text(" NOT ARMED  ", ALARM if lost else STRONG)
     return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
 
 

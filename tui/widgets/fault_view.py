@@ -122,5 +122,5 @@ def _write(entry: Entry, after: float, width: int) -> Text:
     text = Text(f" {after:>{TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
     text.append(f"  wrote {entry.code} {entry.new}", ATTENTION)
     text.append(f"  {entry.why}" + ("" if entry.answer == "ok" else f": {entry.answer}"), FAINT)
-    text.truncate(width)
+    text.truncate(width, overflow="ellipsis")
     return text

@@ -9,9 +9,9 @@ from rich.text import Text
 
 from tui.session.command import Kind, Outcome
 
-from .drawing import cut
+from .drawing import Key, cut, key_line, key_styles
 from .monitor_view import View
-from .palette import ALARM, ATTENTION, ATTENTION_BLOCK, FAINT, KEY, STOP_KEY, STRONG
+from .palette import ALARM, ATTENTION, FAINT, STRONG
 
 OUTCOME_STYLES = {Kind.WORKING: ATTENTION, Kind.DONE: STRONG, Kind.REFUSED: ALARM}
 
@@ -27,31 +27,15 @@ def outcome_lines(outcome: Outcome, width: int) -> list[Text]:
     return [Text(text[:at], style), Text(cut(text[at + 1 :], width).rstrip(), style)]
 
 
-def mode_text(view: View) -> Text:
-    """Armed or not, in the first place of the status line."""
-    armed = view.control.armed_for
-    if armed is not None:
-        return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
-    return Text(" NOT ARMED  ", ALARM if view.lost else STRONG)
-
-
-def order_keys(view: View, keys: Sequence[tuple[str, str, str]]) -> Text:
+def order_keys(view: View, keys: Sequence[Key]) -> Text:
     """The line of keys: stop first; orders that cannot work now are dim."""
-    text = Text(no_wrap=True)
-    for index, (action, key, label) in enumerate(keys):
-        text.append("  " if index else " ")
-        style, words = _styles(view, action)
-        text.append(key, style)
-        text.append(f" {label}", words)
-    return text
 
+    def styles(action: str) -> tuple[Style, Style]:
+        if not action.startswith(("order", "reference")):
+            return key_styles(action)
+        return (ATTENTION, STRONG) if works_now(view, action) else (FAINT, FAINT)
 
-def _styles(view: View, action: str) -> tuple[Style, Style]:
-    if action.startswith("stop"):
-        return STOP_KEY, STOP_KEY
-    if not action.startswith(("order", "reference")):
-        return KEY, FAINT
-    return (ATTENTION, STRONG) if works_now(view, action) else (FAINT, FAINT)
+    return key_line(keys, styles)
 
 
 def works_now(view: View, action: str) -> bool:

@@ -13,8 +13,8 @@ from tui.session.keeper import TOLD_AFTER
 from tui.session.readings import Quality
 from tui.session.stop import Phase, StopReport
 
-from .drawing import cut, pair, rule
-from .monitor_orders import mode_text, outcome_lines
+from .drawing import armed_text, cut, pair, rule
+from .monitor_orders import outcome_lines
 from .monitor_view import View, age_text
 from .palette import (
     ALARM,
@@ -238,7 +238,7 @@ def _countdown(view: View) -> str:
 def status_lines(view: View, width: int) -> list[Text]:
     """What the panel itself does: monitoring, how fast, how well the line answers."""
     text = Text(no_wrap=True)
-    text.append_text(mode_text(view))
+    text.append_text(armed_text(view.control.armed_for, lost=view.lost))
     rate, wished = view.snapshot.rate if view.snapshot else 0.0, 1 / view.period
     counts = view.counters
     bad = counts.timeouts + counts.checksum + counts.wrong
