@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import asyncio
+
 import pytest
 
+from tests.programs import wait_until
 from tests.session.sets_bench import FAMILIES, bench
 from tui.session.identify import identify
 from tui.session.report import entries_of, report
@@ -51,6 +54,24 @@ async def test_what_was_changed_with_what_was_before() -> None:
     assert "- Reference: ATV312" in text
     assert "OCF" in text.partition("## Faults")[2].partition("##")[0]
     assert "| SP2 | 10.0 Hz | 7.0 Hz | ok | setting |" in text
+
+
+async def test_what_the_drive_stored_with_a_fault() -> None:
+    with bench("atv71", run_hz=35.0) as made:
+        await asyncio.to_thread(wait_until, lambda: made.drive.motor.frequency > 20, "it turns")
+        made.drive.provoke("OCF")
+        upload = Upload(made.session)
+        await upload.run()
+        held = upload.parameter_set()
+        text = report(made.profile, held, [])
+    assert text.count("What the drive stored with") == 1
+    found = text.partition("What the drive stored with DP0, OCF Overcurrent:")[2].partition("##")[0]
+    stored = made.profile.data.faults.stored[0]
+    assert [line.split(" | ")[0] for line in found.splitlines()[4:] if line] == [
+        f"| {code}" for code in stored
+    ]
+    assert held.raws[stored[0]] >= 200
+    assert f"| {held.raws[stored[0]] / 10:.1f} Hz |" in found
 
 
 async def test_the_scanner_tells_what_it_brings() -> None:

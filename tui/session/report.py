@@ -10,6 +10,7 @@ from pathlib import Path
 from tui.drive.chart import read_chart
 from tui.drive.compare import compare, factory_side, side_of
 from tui.drive.control_source import source_in_force
+from tui.drive.mapping import target
 from tui.drive.parameter_set import ParameterSet, lacking
 from tui.drive.profile import Profile
 from tui.drive.schema import Block, Quantity
@@ -140,13 +141,8 @@ class _Report:
         raw = self.values.raws.get(slot)
         if raw is None:
             return NOT_AVAILABLE
-        if block.selects_by == "address":
-            found = self.profile.at(raw & 0xFFFF) if raw else None
-            code = found.code if found else ""
-        else:
-            code = next((c.parameter for c in block.choices if c.raw == raw), "")
-        if code:
-            return f"{code} {self.profile[code].name}"
+        if (parameter := target(self.profile, block, raw & 0xFFFF)) is not None:
+            return f"{parameter.code} {parameter.name}"
         return "nothing" if not raw else f"raw {raw}"
 
     def watch(self) -> list[str]:
@@ -172,7 +168,14 @@ class _Report:
         data = self.profile.data.faults
         codes = [code for code in (data.parameter, *data.history) if code]
         rows = [(code, self.profile[code].name, self._fault(code)) for code in codes]
-        return ["## Faults", "", *_table(("code", "name", "fault"), rows)]
+        lines = ["## Faults", "", *_table(("code", "name", "fault"), rows)]
+        for code, stored in zip(data.history, data.stored, strict=False):
+            if self.values.raws.get(code) in (None, data.none):
+                continue
+            kept = [(one, self.profile[one].name, self.text(one)) for one in stored]
+            head = f"What the drive stored with {code}, {self._fault(code)}:"
+            lines += ["", head, "", *_table(("code", "name", "value"), kept)]
+        return lines
 
     def _fault(self, code: str) -> str:
         raw = self.values.raws.get(code)
