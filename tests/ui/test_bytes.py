@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.cells import get_character_cell_size
 from rich.console import RenderableType
 from rich.segment import Segment
 from rich.style import Style
@@ -15,10 +16,11 @@ from rich.text import Text
 from textual._compositor import CompositorUpdate
 from textual.app import App, ComposeResult
 from textual.containers import Horizontal
-from textual.screen import Screen
+from textual.screen import ModalScreen, Screen
 from textual.strip import Strip
+from textual.widgets import Label
 
-from tui.widgets.lean import lean
+from tui.widgets.lean import Shown, lean
 from tui.widgets.lines import Lines, cells, runs
 
 from .bytes_per_second import compare
@@ -52,8 +54,15 @@ class Terminal:
             if character == "\n":
                 self._x, self._y = 0, self._y + 1
             elif character != "\r":
+                width = get_character_cell_size(character)
+                if not width:
+                    before, colour = self.cells[self._y, self._x - 1]
+                    self.cells[self._y, self._x - 1] = (before + character, colour)
+                    continue
                 self.cells[self._y, self._x] = (character, self._colour)
-                self._x += 1
+                if width == 2:
+                    self.cells[self._y, self._x + 1] = ("", self._colour)
+                self._x += width
 
     def text(self) -> list[str]:
         return [
@@ -68,6 +77,7 @@ class Seen(App[None]):
     def __init__(self) -> None:
         super().__init__()
         self.terminal = Terminal()
+        self.shown = Shown()
         self.sent = 0
 
     def compose(self) -> ComposeResult:
@@ -76,7 +86,7 @@ class Seen(App[None]):
             yield Lines(id="right")
 
     def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
-        update = lean(renderable)
+        update = lean(renderable, self.shown)
         if isinstance(update, CompositorUpdate):
             data = update.render_segments(self.console)
             self.sent += len(data)
@@ -107,6 +117,51 @@ async def test_the_terminal_shows_what_the_screen_holds(seed: int) -> None:
             assert app.terminal.text() == [strip.text for strip in strips]
             for place, (character, colour) in fresh.cells.items():
                 assert app.terminal.cells[place] == (character, colour)
+
+
+class Dialog(ModalScreen[None]):
+    """Covers a part of what is below, and dims the rest."""
+
+    CSS = "Dialog { align: center middle; background: $background 60%; } Label { width: 12; }"
+
+    def compose(self) -> ComposeResult:
+        yield Label("wide 漢字 é e\u0301")
+
+
+async def test_dialogs_and_other_sizes_leave_no_trace() -> None:
+    import random
+
+    chance = random.Random(7)
+    app = Seen()
+
+    def agree() -> None:
+        strips = app.screen._compositor.render_strips()
+        assert [row.rstrip("?") for row in app.terminal.text()][: len(strips)] == [
+            strip.text for strip in strips
+        ]
+
+    async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+        for step in range(20):
+            for side in ("left", "right"):
+                app.query_one(f"#{side}", Lines).show([_line(chance) for _ in range(ROWS)])
+            await pilot.pause()
+            app.push_screen(Dialog())
+            await pilot.pause()
+            agree()
+            sent = app.sent
+            app.screen.refresh()
+            await pilot.pause()
+            assert app.sent == sent, "what is shown already is not sent again"
+            app.pop_screen()
+            await pilot.pause()
+            agree()
+            if step % 5 == 4:
+                # what a terminal shows after it was resized is its own affair
+                app.terminal.cells.clear()
+                app.shown.forget()
+                app.screen.refresh()
+                await pilot.pause()
+                agree()
 
 
 def _line(chance: Any) -> Text:

@@ -82,6 +82,7 @@ ACTIONS: tuple[Action, ...] = (
     ),
     of_app("command_palette", "ctrl+p", "all", "Find any action by its name."),
     of_app("help", "?,f1", "help", "Show every key."),
+    of_app("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
     of_app("quit", "q,ctrl+q", "leave", "Leave the panel."),
 )
 
