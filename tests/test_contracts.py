@@ -232,6 +232,6 @@ def test_readme_tells_every_key() -> None:
 
     table = re.findall(r"^\| ([^|]+) \| [^|]+ \|$", README.partition("## Keys")[2], re.MULTILINE)
     keys = {word for cell in table for word in re.split(r" and | or |, ", cell.strip())}
-    names = {"^p": "Ctrl+P", "[ ]": "]", "+ -": "-"}
+    names = {"^p": "Ctrl+P", "^l": "Ctrl+L", "[ ]": "]", "+ -": "-"}
     missing = {names.get(action.shown, action.shown) for action in ACTIONS} - keys
     assert missing == set()

@@ -9,7 +9,7 @@ SOURCES, FAULTS, PARAMETERS = "control source", "faults", "parameters"
 BLOCKS = "blocks"
 EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS)
 
-KEY_NAMES = {"escape": "Esc", "ctrl+p": "^p", "pageup": "PgUp", "pagedown": "PgDn"}
+KEY_NAMES = {"escape": "Esc", "ctrl+p": "^p", "ctrl+l": "^l", "pageup": "PgUp", "pagedown": "PgDn"}
 """Keys that a person reads otherwise than Textual writes them, capitals aside."""
 
 
