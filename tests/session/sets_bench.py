@@ -76,6 +76,12 @@ class Bench:
 SOURCES = {"ramp_increment", "high_speed", "low_speed", "max_frequency"}
 
 
+def state_known(session: DriveSession) -> bool:
+    """Whether the drive may be armed; a first cycle may fail on a busy machine."""
+    latest = session.monitor.latest
+    return latest is not None and not latest.error and latest.state.kind != "unknown"
+
+
 @contextmanager
 def bench(
     family: str,

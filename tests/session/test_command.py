@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import pytest
 
+from tests.session.sets_bench import state_known
 from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.drive import library
@@ -89,6 +90,7 @@ async def bench(
     try:
         await made.until(lambda: session.monitor.latest is not None)
         if armed:
+            await made.until(lambda: state_known(session))
             made.commander.arm()
         yield made
     finally:

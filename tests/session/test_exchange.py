@@ -7,7 +7,7 @@ from collections.abc import Mapping
 
 import pytest
 
-from tests.session.sets_bench import Bench, bench
+from tests.session.sets_bench import Bench, bench, state_known
 from tui.bus.errors import RequestRefused
 from tui.bus.line import Reply
 from tui.drive.errors import DriveError, ValueRefused
@@ -238,7 +238,7 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
         desk = MappingDesk(here.session, here.journal)
         desk.start()
         for _ in range(400):
-            if len(desk.views) == 2 and here.session.monitor.latest is not None:
+            if len(desk.views) == 2 and state_known(here.session):
                 break
             await asyncio.sleep(0.02)
         commander = Commander(here.session, here.journal)

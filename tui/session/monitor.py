@@ -206,8 +206,9 @@ class Monitor:
                     due.came()
                     self.known.note(readings)
                     begun.append(started)
-                    await self._learn(cycle)
                 self._publish(cycle, readings, rates, _span(begun, period), error)
+                if not error:
+                    await self._learn(cycle)
                 rest = started + period - time.monotonic()
                 await asyncio.sleep(period if error else max(0.0, rest))
         finally:
