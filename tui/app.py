@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterable
 from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar
 
-from rich.console import RenderableType
 from rich.text import Text
 from textual.app import SystemCommand
 from textual.driver import Driver
@@ -21,7 +20,7 @@ from tui.bus.errors import LineClosed
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line, state_folder
 from tui.widgets.clock import Clock
-from tui.widgets.lean import Shown, lean
+from tui.widgets.lean import LeanApp
 from tui.widgets.palette import THEME
 
 from .screens.actions import ACTIONS, CONNECTION, bindings
@@ -54,7 +53,7 @@ STOP_KEYS = frozenset({STOP_ANYWHERE, STOP_ALL_ANYWHERE, STOP_OUTSIDE_TEXT})
 Opener = Callable[..., OpenLine]
 
 
-class DrivePanelApp(Leaving):
+class DrivePanelApp(LeanApp, Leaving):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
@@ -81,7 +80,6 @@ class DrivePanelApp(Leaving):
         on_shown: Callable[[], None] | None = None,
     ) -> None:
         super().__init__()
-        self._terminal = Shown()
         self.register_theme(THEME)
         self.theme = THEME.name
         self.clock = clock or Clock()
@@ -239,7 +237,6 @@ class DrivePanelApp(Leaving):
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
         self.push_screen(self.connection)
-        self.app_resume_signal.subscribe(self, lambda _: self._terminal.forget())
         self.set_interval(HUNGER_LOOK, self._tell_hunger)
         self.set_interval(HUNGER_LOOK, self._tell_stops)
         if self._on_shown is not None:
@@ -303,19 +300,6 @@ class DrivePanelApp(Leaving):
         self._exit_renderables[:] = [
             Text(f"The panel had to stop: an error of its own ({error}). More is in {place}.")
         ]
-
-    def _display(self, screen: Screen[object], renderable: RenderableType | None) -> None:
-        """Send what changed, in as few bytes as that takes."""
-        super()._display(screen, lean(renderable, self._terminal))
-
-    def on_resize(self) -> None:
-        """What a terminal of another size shows is not known."""
-        self._terminal.forget()
-
-    def action_redraw(self) -> None:
-        """Draw the whole screen anew: something else may have written to the terminal."""
-        self._terminal.forget()
-        self.refresh()
 
     async def connect(self, text: str) -> None:
         """Open a line in place of the one that is open; raises the line's errors."""

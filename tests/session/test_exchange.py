@@ -263,6 +263,26 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
         here.session.close()
 
 
+async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
+    with bench("atv21", sets=EXAMPLE_21) as here:
+        here.session.monitor.start(period=0.1)
+        desk = MappingDesk(here.session, here.journal)
+        desk.start()
+        for _ in range(400):
+            if len(desk.views) == 2 and state_known(here.session):
+                break
+            await asyncio.sleep(0.02)
+        # disarmed as soon as one slot is another
+        desk.propose(plan_of(here, "write", ["FA50", "FA51"]))
+        desk.write(lambda: here.drive.raw("F870") == 1)
+        assert "no longer armed" in await settled(desk)
+        assert (here.drive.raw("F870"), here.drive.raw("F871")) == (4, 3)
+        with pytest.raises(MappingError, match="F870: in force after the drive's next reset"):
+            desk.meant("FA50=0x0000")
+        desk.stop()
+        here.session.close()
+
+
 # What a person agrees to
 
 
@@ -305,9 +325,10 @@ def test_what_cannot_be_meant_is_told(text: str, says: str) -> None:
 def test_slots_that_wait_for_a_reset_are_not_written_through() -> None:
     with bench("atv21") as here:
         outputs = plan_of(here, "write", ["FA00", "FA01"])
-        with pytest.raises(MappingError, match="F871 count after the drive's next reset"):
+        with pytest.raises(MappingError, match="F871: in force after the drive's next reset"):
             refuse_pending(outputs, {"F871": 3, "F875": 1})
-        refuse_pending(outputs, {"F875": 1})
+        # slots of the other block, and what never came to be written, hinder nothing
+        refuse_pending(outputs, {"F875": 1, "F870": 6})
         told = meant_of(here, outputs, "FA01=60")
         assert "F870 and F871 were set before" in told.follows
         # this drive has no function 23: a write of two words, and nothing comes back

@@ -161,6 +161,6 @@ def test_nothing_is_proved_that_is_not_so(
                 assert not proof.holds(slot, RAWS[other]), (slot, code, other)
 
 
-def test_every_choice_can_be_compared() -> None:
+def test_nothing_is_sure_before_anything_was_compared() -> None:
     told: Callable[[str, int], bool] = Proof(PROFILE, BLOCK).holds
     assert not any(told(slot, raw) for slot in BLOCK.slots for raw in (0, *RAWS.values(), 99))

@@ -23,7 +23,6 @@ from .options import (
 from .orders import complain
 
 if TYPE_CHECKING:
-    from tui.bus.line import Priority
     from tui.drive.schema import OrderId
     from tui.session.drive_session import DriveSession
     from tui.session.identify import DriveIdentity
@@ -177,7 +176,6 @@ async def _stop_all(
     Every address is asked once in haste before any is asked with patience: a silent one takes
     seconds to rule out, and meanwhile motors turn.
     """
-    from tui.bus.line import Priority
     from tui.session.journal import Journal
     from tui.session.stop import Stopper
 
@@ -187,11 +185,11 @@ async def _stop_all(
     left = list(devices)
     worst = 0
     try:
-        for priority in (Priority.BACKGROUND, Priority.OPERATOR_READ):
+        for patient in (False, True):
             asked, left = left, []
             for device in asked:
                 try:
-                    found = await _found(opened, device, profile_id, priority)
+                    found = await _found(opened, device, profile_id, patient=patient)
                 except Failure as failure:
                     complain(failure.format_message())
                     worst = max(worst, failure.exit_code)
@@ -212,22 +210,23 @@ async def _stop_all(
 
 
 async def _found(
-    opened: OpenLine, device: int, profile_id: str | None, priority: Priority
+    opened: OpenLine, device: int, profile_id: str | None, *, patient: bool
 ) -> Found | None:
     """The drive at an address; None where nobody answers yet.
 
     Raises Failure where it cannot be stopped, and why.
     """
     from tui.bus.errors import LineError, NoAnswer
-    from tui.bus.line import Priority as Priorities
+    from tui.bus.line import Priority
     from tui.session.identify import identify
 
+    priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
     try:
         identity = await identify(opened.line, device, priority=priority)
     except NoAnswer:
         return None
     except LineError as error:
-        if priority is Priorities.BACKGROUND:
+        if not patient:
             return None  # asked again, with patience
         raise Failure(f"Device {device}: NOT STOPPED: {error}", LINE_TROUBLE) from error
     if (found := await asyncio.to_thread(_session, opened, identity, profile_id)) is not None:

@@ -284,8 +284,12 @@ class _Exchange:
             if not changed:
                 continue
             text = f"{', '.join(changed)} of {block.name.lower()} were changed by somebody else"
-            if when == "before" or plan is self.inputs:
-                raise AssignmentRefused(f"{text}: nothing is taken from it. Look at them first.")
+            if when == "before":
+                raise AssignmentRefused(f"{text}: nothing was written. Look at them first.")
+            if plan is self.inputs:
+                raise AssignmentRefused(
+                    f"{text}: the outputs were written, of what came back nothing is taken."
+                )
             raise AssignmentRefused(
                 f"{text} while words were written through them: look at {self._names(held)}."
             )

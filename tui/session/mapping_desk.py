@@ -247,6 +247,10 @@ class MappingDesk:
         async def work() -> str:
             texts = []
             for plan in plans:
+                if plan.block.effective == "after-reset":
+                    # whatever becomes of the writing: what was written by then waits
+                    self.mapper.written |= {c.slot: c.new for c in self.changes(plan.block)}
+                    self._wait_for_a_reset()
                 done = await write_assignment(
                     self.session,
                     self.journal,
@@ -254,9 +258,6 @@ class MappingDesk:
                     expected=self._seen.get(plan.block.id),
                     allowed=allowed,
                 )
-                if done.after_reset:
-                    self.mapper.written |= {c.slot: c.new for c in done.changes}
-                    self._wait_for_a_reset()
                 self.views = {
                     **self.views,
                     plan.block.id: await self.mapper.look(plan.block),
@@ -348,7 +349,7 @@ class MappingDesk:
     async def _see_again(self) -> None:
         """After a refusal the person looks at what the drive holds now, and may write again."""
         with suppress(LineError, DriveError):
-            for id, plan in self.plans.items():
+            for id, plan in list(self.plans.items()):
                 view = await self.mapper.look(plan.block)
                 self.views = {**self.views, id: view}
                 self._seen[id] = view.raws

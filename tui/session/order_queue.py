@@ -51,8 +51,10 @@ class OrderQueue:
 
     def cancel(self) -> None:
         """End the order that is being carried out, and forget those behind it."""
-        if self._worker is not None:
-            self._worker.cancel()
+        with self._lock:
+            worker, self._worker = self._worker, None
+        if worker is not None:
+            worker.cancel()
         # a worker that had no time to begin would leave them to the next order
         self.drop(BY_STOP)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.drive.errors import ValueRefused
@@ -74,11 +74,14 @@ def meant(
     return Meant(outputs, inputs, wanted, "\n".join(lines))
 
 
-def refuse_pending(outputs: Assignment, waits: Collection[str]) -> None:
-    """Raise MappingError where slots count only after a reset that was not seen yet."""
-    if found := [slot for slot in outputs.block.slots if slot in waits]:
+def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:
+    """Raise MappingError where slots count only after a reset that was not seen yet.
+
+    `waits` are raw values by slot that were written since.
+    """
+    if found := [slot for slot, raw in outputs.slots.items() if waits.get(slot) == raw]:
         raise MappingError(
-            f"{', '.join(found)} count after the drive's next reset only: reset it first."
+            f"{', '.join(found)}: in force after the drive's next reset only; reset it first."
         )
 
 

@@ -14,6 +14,8 @@ from rich.cells import get_character_cell_size
 from rich.color import ColorSystem
 from rich.console import Console, RenderableType
 from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
+from textual.app import App
+from textual.screen import Screen
 from textual.strip import Strip
 
 Cell = tuple[str, str]
@@ -139,3 +141,27 @@ class Pen:
             self._parts.append("\x1b[0m")
             self._ansi = ""
         return "".join(self._parts)
+
+
+class LeanApp(App[None]):
+    """An app that sends what changed in as few bytes as that takes."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._terminal = Shown()
+
+    def _display(self, screen: Screen[object], renderable: RenderableType | None) -> None:
+        super()._display(screen, lean(renderable, self._terminal))
+
+    def on_mount(self) -> None:
+        """A terminal that was left for a while may show something else."""
+        self.app_resume_signal.subscribe(self, lambda _: self._terminal.forget())
+
+    def on_resize(self) -> None:
+        """What a terminal of another size shows is not known."""
+        self._terminal.forget()
+
+    def action_redraw(self) -> None:
+        """Draw the whole screen anew: something else may have written to the terminal."""
+        self._terminal.forget()
+        self.refresh()
