@@ -227,6 +227,30 @@ def test_the_test_run_keeps_out_of_the_users_folders(tmp_path: Path) -> None:
         assert Path(os.environ[name]).is_relative_to(tmp_path)
 
 
+def test_a_test_that_hangs_fails_and_the_run_goes_on(
+    tmp_path: Path, pytestconfig: pytest.Config
+) -> None:
+    assert 0 < float(pytestconfig.getini("timeout")) <= 600
+    (tmp_path / "test_hanging.py").write_text(
+        "import asyncio, threading\n"
+        "def test_thread():\n"
+        "    thread = threading.Thread(target=threading.Event().wait, daemon=True)\n"
+        "    thread.start()\n"
+        "    thread.join()\n"
+        "async def test_loop():\n"
+        "    await asyncio.Event().wait()\n"
+        "def test_after_them():\n"
+        "    pass\n"
+    )
+    command = [sys.executable, "-m", "pytest", "-c", str(ROOT / "pyproject.toml")]
+    command += ["--rootdir", str(tmp_path), "-p", "no:cacheprovider", "-o", "timeout=0.5"]
+    done = run(*command, "test_hanging.py", cwd=tmp_path)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert "2 failed, 1 passed" in done.stdout
+    assert "FAILED test_hanging.py::test_thread" in done.stdout
+    assert "FAILED test_hanging.py::test_loop" in done.stdout
+
+
 def test_readme_tells_every_key() -> None:
     from tui.screens.actions import ACTIONS
 
