@@ -40,7 +40,7 @@ if TYPE_CHECKING:
     from tui.session.mapping_desk import MappingDesk
     from tui.session.stop import Stopper, StopSummary
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 CONNECT_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""

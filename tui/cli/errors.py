@@ -86,13 +86,13 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
         except Exception as error:
             status = status_of(error)
             if status is None:
-                logging.getLogger("drivepanel").exception("unforeseen error")
+                logging.getLogger(__name__).exception("unforeseen error")
                 from .logs import log_file
 
                 raise Failure(
                     f"{type(error).__name__}: {error}\nThe details are in {log_file()}.", 1
                 ) from error
-            logging.getLogger("drivepanel").info("%s: %s", type(error).__name__, error)
+            logging.getLogger(__name__).info("%s: %s", type(error).__name__, error)
             raise Failure(str(error), status) from error
 
     return wrapped

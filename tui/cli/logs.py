@@ -8,6 +8,8 @@ from pathlib import Path
 
 from tui.session.state import state_folder
 
+PANEL = "tui"
+"""The logger above all others of the panel: each module logs to one by its own name."""
 LEVELS = (logging.INFO, logging.DEBUG)
 
 
@@ -18,9 +20,8 @@ def log_file() -> Path:
 
 def start_logging(verbose: int) -> None:
     """Log to the file; with more `-v` in more detail. Without a writable folder, not at all."""
-    logger = logging.getLogger("drivepanel")
+    logger = logging.getLogger(PANEL)
     logger.setLevel(LEVELS[min(verbose, len(LEVELS) - 1)])
-    logger.propagate = False
     try:
         log_file().parent.mkdir(parents=True, exist_ok=True)
         handler: logging.Handler = RotatingFileHandler(
@@ -31,11 +32,13 @@ def start_logging(verbose: int) -> None:
     handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
     stop_logging()
     logger.addHandler(handler)
+    logger.propagate = False
 
 
 def stop_logging() -> None:
     """Close the log."""
-    logger = logging.getLogger("drivepanel")
+    logger = logging.getLogger(PANEL)
     for handler in list(logger.handlers):
         logger.removeHandler(handler)
         handler.close()
+    logger.propagate = True

@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Protocol
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 NAMES = ("SIGHUP", "SIGTERM")
 """Without a handler the process would die with motors running and nothing cleaned up."""

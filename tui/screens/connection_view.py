@@ -27,7 +27,7 @@ from .line_list import LineList
 if TYPE_CHECKING:
     from tui.session.keeper import Look
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 ERROR_KIND, ALARM_KIND = "error", "alarm"
 STATES = 0.5

@@ -19,7 +19,7 @@ LARGEST = 1_000_000
 KEPT = 9
 SHOWN = 500
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True, slots=True)

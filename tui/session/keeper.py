@@ -26,7 +26,7 @@ from .monitor import monitoring_codes
 from .reader import Reader
 from .readings import Reading
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 MAY_TURN = frozenset({"running", "unknown"})
 """Kinds of state in which a motor that was commanded from here is not left alone unasked."""

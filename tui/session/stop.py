@@ -34,7 +34,7 @@ from .journal import Journal
 from .limits import limits_of
 from .writing import Writer
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 FRESH = 1.0
 """Seconds for which a state counts as that of now."""

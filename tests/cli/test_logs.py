@@ -1,0 +1,55 @@
+"""What ends up in the log file: everything that any module of the panel logs."""
+
+from __future__ import annotations
+
+import ast
+import logging
+from pathlib import Path
+
+import tui
+from tests.programs import wait_until
+from tui.cli.logs import log_file, start_logging
+from tui.session.lines import open_line
+
+SOURCES = Path(tui.__file__).parent
+
+
+async def unforeseen() -> None:
+    raise ZeroDivisionError("nobody thought of this")
+
+
+def test_work_that_dies_leaves_its_traceback_in_the_log() -> None:
+    start_logging(0)
+    opened = open_line("sim:atv71")
+    try:
+        worker = opened.line.spawn(unforeseen, "watching device 1")
+        wait_until(worker.done, "the worker's end")
+    finally:
+        opened.close()
+    said = log_file().read_text()
+    assert "watching device 1 ended by an error" in said
+    assert "Traceback" in said
+    assert "in unforeseen" in said
+    assert "ZeroDivisionError: nobody thought of this" in said
+
+
+def test_every_module_logs_by_its_own_name() -> None:
+    """The handler hangs above all of them; a logger of any other name is heard by nobody."""
+    named: dict[str, list[str]] = {}
+    for path in SOURCES.rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("getLogger"):
+                name = path.relative_to(SOURCES).as_posix()
+                named.setdefault(name, []).extend(ast.unparse(each) for each in node.args)
+    # the one that hangs the handler, and the one that silences pymodbus
+    assert named.pop("cli/logs.py") == ["PANEL", "PANEL"]
+    assert named["bus/line.py"] == ["'pymodbus'", "'pymodbus'"]
+    del named["bus/line.py"]
+    assert len(named) > 3
+    assert {call for calls in named.values() for call in calls} == {"__name__"}
+
+
+def test_the_handler_hangs_above_every_module() -> None:
+    start_logging(0)
+    logging.getLogger("tui.anything.at.all").warning("heard")
+    assert "WARNING heard" in log_file().read_text()
