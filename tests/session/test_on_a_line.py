@@ -7,11 +7,23 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
+from typing import cast
 
 import pytest
 
-from tui.bus.errors import LineBusy, LineLost, LinkSyntaxError, NoAnswer, RequestRefused
-from tui.bus.line import Line, Priority
+from tui.bus.errors import (
+    ChecksumFault,
+    LineBusy,
+    LineClosed,
+    LineError,
+    LineLost,
+    LinkSyntaxError,
+    NoAnswer,
+    RequestRefused,
+    Superseded,
+    WrongReply,
+)
+from tui.bus.line import Identification, Line, Priority
 from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.session.addresses import parse_addresses
@@ -75,6 +87,72 @@ async def test_a_scan_finds_every_drive_and_no_other(five: OpenLine) -> None:
     results: list[ScanResult] = []
     await scan(five.line, range(1, 8), results.append)
     assert [result.device for result in results] == [1, 2, 3, 4, 5]
+
+
+async def test_a_second_scan_finds_drives_without_function_43_and_those_behind_them() -> None:
+    opened = open_line("sim:powerdrive@1,varmeca@2,atv71@3")
+    try:
+        first: list[ScanResult] = []
+        await scan(opened.line, range(1, 5), first.append)
+        for device, profile in enumerate(("powerdrive", "varmeca", "atv71"), start=1):
+            DriveSession(opened.line, device, library.load(profile))  # describes it to the line
+        again: list[ScanResult] = []
+        await scan(opened.line, range(1, 5), again.append)
+        assert again == first
+        assert [result.device for result in again] == [1, 2, 3]
+        assert not any(result.error for result in again)
+        nobody = library.load("powerdrive")
+        DriveSession(opened.line, 4, nobody)
+        with pytest.raises(NoAnswer):  # what is known of it does not make it present
+            await identify(opened.line, 4)
+    finally:
+        opened.close()
+
+
+class Trouble:
+    """A line on which one address has an error of its own."""
+
+    def __init__(self, error: LineError) -> None:
+        self.error = error
+
+    async def identify(self, device: int, **_: object) -> Identification:
+        if device == 2:
+            raise self.error
+        return Identification(1, {1: b"ATV71HU15M3"})
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        LineBusy("Too many requests wait."),
+        WrongReply(2, 43, 0),
+        ChecksumFault(2, 43, 0),
+        Superseded(2, 0),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+async def test_what_is_wrong_with_one_address_ends_no_scan(error: LineError) -> None:
+    results: list[ScanResult] = []
+    await scan(cast("Line", Trouble(error)), range(1, 4), results.append)
+    assert [result.device for result in results] == [1, 2, 3]
+    assert [result.error for result in results] == ["", str(error), ""]
+
+
+@pytest.mark.parametrize("error", [LineLost("gone"), LineClosed()])
+async def test_a_scan_ends_with_its_line(error: LineError) -> None:
+    results: list[ScanResult] = []
+    with pytest.raises(type(error)):
+        await scan(cast("Line", Trouble(error)), range(1, 4), results.append)
+    assert [result.device for result in results] == [1]
+
+
+async def test_a_broken_profile_of_the_user_ends_no_scan(five: OpenLine) -> None:
+    folder = library.user_folder()
+    folder.mkdir(parents=True)
+    (folder / "mine.toml").write_text('[profile]\nid = "mine"\n', encoding="utf-8")
+    results: list[ScanResult] = []
+    await scan(five.line, [ADDRESSES["powerdrive"], ADDRESSES["atv71"]], results.append)
+    assert [r.identity.candidates[0] for r in results if r.identity] == ["powerdrive", "atv71"]
 
 
 async def test_nobody_there(five: OpenLine) -> None:

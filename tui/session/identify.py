@@ -6,10 +6,19 @@ import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from tui.bus.errors import DeviceException, ExchangeError, NoAnswer
+from tui.bus.errors import (
+    DeviceException,
+    LineClosed,
+    LineError,
+    LineLost,
+    NoAnswer,
+    RequestRefused,
+)
 from tui.bus.line import Identification, Line, Priority
 from tui.drive import library
+from tui.drive.errors import DriveError
 
+IDENTIFY = 43
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
 
 
@@ -49,19 +58,17 @@ async def identify(
 ) -> DriveIdentity:
     """Ask a drive who it is by function 43.
 
-    A drive that refuses the function is there, but nameless. One that stays silent is asked
-    for the status word of each family that has no function 43. Raises NoAnswer where nothing
-    answers at all, and the line's other errors.
+    A drive that refuses the function is there, but nameless. One that stays silent, or of which
+    it is known that it has no function 43 (its limits came from a profile before), is asked for
+    the status word of each family without that function. Raises NoAnswer where nothing answers
+    at all, and the line's other errors.
     """
     try:
         answer = await _ask(line, device, priority)
     except DeviceException:
-        return DriveIdentity(device, "", "", "", "", None, ())
-    except NoAnswer:
-        candidates = await _nameless_families(line, device, priority)
-        if not candidates:
-            raise
-        return DriveIdentity(device, "", "", "", "", None, candidates)
+        return _nameless(device)
+    except (NoAnswer, RequestRefused):
+        return _nameless(device, await _nameless_families(line, device, priority))
     return await asyncio.to_thread(_identity, device, answer)
 
 
@@ -73,6 +80,10 @@ async def _ask(line: Line, device: int, priority: Priority) -> Identification:
         if priority >= Priority.BACKGROUND:
             raise
         return await line.identify(device, priority=priority)
+
+
+def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:
+    return DriveIdentity(device, "", "", "", "", None, candidates)
 
 
 def _identity(device: int, answer: Identification) -> DriveIdentity:
@@ -94,23 +105,36 @@ def _identity(device: int, answer: Identification) -> DriveIdentity:
 
 
 async def _nameless_families(line: Line, device: int, priority: Priority) -> tuple[str, ...]:
-    """Profiles without function 43 whose status word the device lets be read."""
+    """Profiles without function 43 whose status word the device lets be read.
+
+    None of them where it only refuses: it is there. Raises NoAnswer where nothing answers.
+    """
     probes = await asyncio.to_thread(_status_words_without_identification)
+    refused = False
     for address, profiles in probes.items():
         try:
             await line.read(device, address, 1, priority=priority)
-        except (DeviceException, NoAnswer):
+        except DeviceException:
+            refused = True
+        except NoAnswer:
             continue
-        return profiles
-    return ()
+        else:
+            return profiles
+    if refused:
+        return ()
+    raise NoAnswer(device, IDENTIFY, 0)
 
 
 def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
     found: dict[int, tuple[str, ...]] = {}
     for listing in library.listings():
-        if library.mentions_function(listing.path, 43):
+        if library.mentions_function(listing.path, IDENTIFY):
             continue
-        profile = library.load(listing.id)
+        try:
+            profile = library.load(listing.id)
+        except DriveError:
+            # a profile that cannot be used is told where it is chosen; it ends no search
+            continue
         status = profile.quantity("status_word")
         if status is not None:
             found[status.address] = (*found.get(status.address, ()), profile.id)
@@ -120,7 +144,7 @@ def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
 async def scan(line: Line, devices: Iterable[int], found: Callable[[ScanResult], None]) -> None:
     """Ask each address in turn, behind everything else; `found` hears of all not silent.
 
-    Raises the line's errors that are not one drive's: closed, lost.
+    What is wrong with one address ends nothing. Raises LineClosed and LineLost.
     """
     for device in devices:
         try:
@@ -128,6 +152,8 @@ async def scan(line: Line, devices: Iterable[int], found: Callable[[ScanResult],
             result = ScanResult(device, identity)
         except NoAnswer:
             continue
-        except ExchangeError as fault:
+        except (LineClosed, LineLost):
+            raise
+        except LineError as fault:
             result = ScanResult(device, None, str(fault))
         found(result)
