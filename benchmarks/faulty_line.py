@@ -21,7 +21,7 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 
-from tui.bus.rtu import frame
+from tui.wire.frames import frame
 
 ROOT = Path(__file__).resolve().parents[1]
 DEVICES = (1, 2, 3, 4)

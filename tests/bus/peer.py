@@ -15,7 +15,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Self
 
-from tui.bus.rtu import frame
+from tui.wire.frames import frame
 
 Step = bytes | float
 """Bytes to send, or seconds to wait before the next step."""

@@ -17,7 +17,7 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.bus.line import Priority, Timing
-from tui.bus.rtu import frame
+from tui.wire.frames import frame
 
 from .conftest import BRISK, PATIENT, OpenLine
 from .peer import PtyPeer, Script, Step, eventually, honest, reply, silent

@@ -13,7 +13,6 @@ from tui.bus.link import (
     RtuTcpLink,
     SerialLink,
     TcpLink,
-    bits_per_character,
     character_time,
     label,
     parse_link,
@@ -103,18 +102,6 @@ def test_labels() -> None:
     assert label(SerialLink("/dev/ttyUSB0")) == "serial:/dev/ttyUSB0,19200,8E1"
     assert label(TcpLink("10.0.0.5")) == "tcp:10.0.0.5:502"
     assert label(RtuTcpLink("::1", 4001)) == "rtu-tcp:[::1]:4001"
-
-
-@pytest.mark.parametrize(
-    ("format_", "bits"), [("8N1", 10), ("8E1", 11), ("8O1", 11), ("8N2", 11), ("8E2", 12)]
-)
-def test_bits_per_character(format_: str, bits: int) -> None:
-    assert bits_per_character(format_) == bits
-
-
-def test_unknown_format() -> None:
-    with pytest.raises(ValueError, match="7E1"):
-        bits_per_character("7E1")
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,9 @@ from tui.bus.errors import LineBusy, LineClosed, Superseded
 from tui.bus.jobs import Job, JobQueue
 from tui.bus.line import Priority, Timing
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
-from tui.bus.rtu import Piece, frame
+from tui.bus.rtu import Piece
 from tui.bus.trace import Trace
+from tui.wire.frames import frame
 
 from .conftest import WIDE
 from .peer import honest_pdu

@@ -19,7 +19,7 @@ from tui.bus.requests import (
     objects_of,
     words_of,
 )
-from tui.bus.rtu import frame
+from tui.wire.frames import frame
 
 from .conftest import WIDE
 from .peer import honest_pdu

@@ -12,8 +12,8 @@ from tui.bus import connection
 from tui.bus.errors import ExchangeError
 from tui.bus.line import Line, LineStatus, Priority, Timing
 from tui.bus.link import RtuTcpLink, SerialLink
-from tui.bus.rtu import frame
 from tui.bus.serial_thread import ThreadedSerial
+from tui.wire.frames import frame
 
 from .conftest import OpenLine
 from .peer import PtyPeer, Step, TcpPeer, eventually, honest, reply, silent

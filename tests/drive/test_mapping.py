@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 
 from tui.drive import library
 from tui.drive.errors import DriveError, UnknownParameter
-from tui.drive.frames import crc16, hex_text
 from tui.drive.mapping import (
     UNUSED,
     Assignment,
@@ -35,6 +34,7 @@ from tui.drive.mapping_wire import cost, frame, microseconds, saving, stretches
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.schema import Block
 from tui.drive.user_words import UserWord, format_named, is_no_value, word_named
+from tui.wire.frames import crc16, hex_text
 
 ATV21, ATV71 = library.load("atv21"), library.load("atv71")
 TIMING = WireTiming()

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from tui.wire.frames import hex_text
+
 EXCEPTION = 0x80
 IDENTIFY = 43
 MEI_IDENTIFICATION = 14
@@ -42,7 +44,7 @@ class Expectation:
             return f"function {pdu[0] if pdu else 'none'} instead of {self.function}"
         if self.length is not None and len(pdu) != self.length:
             return f"{len(pdu)} bytes instead of {self.length}"
-        return f"{pdu[1:6].hex(' ')} where {self.prefix[1:].hex(' ')} was due"
+        return f"{hex_text(pdu[1:6])} where {hex_text(self.prefix[1:])} was due"
 
 
 def identification_extent(data: bytes | bytearray, start: int = 0) -> int | None:

@@ -6,18 +6,15 @@ import os
 import re
 from dataclasses import dataclass, replace
 
+from tui.wire.times import FAST, character_seconds, is_format, silent_seconds
+
 from .errors import LinkSyntaxError
 
 FORMS = (
     "serial:PATH[,BAUD[,FORMAT]] such as serial:/dev/ttyUSB0,19200,8E1, tcp:HOST[:PORT], "
     "or rtu-tcp:HOST:PORT; ,timeout=SECONDS at the end sets the longest wait for a reply"
 )
-FAST = 19200
-"""Above this rate the silence between frames is FAST_SILENCE (Modbus over serial line 2.5.1.1)."""
-FAST_SILENCE = 0.00175
-SILENT_CHARACTERS = 3.5
 MODBUS_PORT = 502
-_FORMAT = re.compile(r"8([NEO])([12])")
 _TIMEOUT = re.compile(r"(.*),\s*timeout\s*=([^,]*)", re.IGNORECASE)
 SHORTEST_TIMEOUT, LONGEST_TIMEOUT = 0.02, 30.0
 _PORT_NAME = re.compile(r"(?:/dev/.+|\\\\\.\\.+|COM\d+)", re.IGNORECASE)
@@ -112,7 +109,7 @@ def _serial(text: str, rest: str) -> SerialLink:
     if not (baud.isascii() and baud.isdecimal() and 50 <= int(baud) <= 4_000_000):
         raise LinkSyntaxError(f"{text}: {baud!r} is not a baud rate. Write one such as 19200.")
     format_ = settings[1].upper() if len(settings) > 1 else link.format
-    if not _FORMAT.fullmatch(format_):
+    if not is_format(format_):
         raise LinkSyntaxError(
             f"{text}: {format_!r} is not a format. Write 8E1, 8N1, 8O1, 8N2 or the like; "
             "Modbus RTU needs eight data bits."
@@ -152,33 +149,27 @@ def _bracketed(host: str) -> str:
     return f"[{host}]" if ":" in host else host
 
 
-def bits_per_character(format_: str) -> int:
-    """Bits on the wire for one character: start, data, parity and stop bits. Raises ValueError."""
-    match = _FORMAT.fullmatch(format_)
-    if match is None:
-        raise ValueError(f"{format_!r} is not a serial format")
-    return 1 + 8 + (match[1] != "N") + int(match[2])
+_BEHIND_A_SERVER = FAST, "8E1"
+"""The rate behind a device server is not known here; RTU over TCP counts as this."""
 
 
 def character_time(link: Link) -> float:
-    """Seconds for one character; 0 over Modbus TCP.
-
-    The rate behind a device server is not known here: RTU over TCP counts as 19 200 baud 8E1.
-    """
+    """Seconds for one character, 19 200 baud 8E1 behind a device server; 0 over Modbus TCP."""
     match link:
         case SerialLink(_, baud, format_):
-            return bits_per_character(format_) / baud
+            return character_seconds(baud, format_)
         case RtuTcpLink():
-            return bits_per_character("8E1") / FAST
+            return character_seconds(*_BEHIND_A_SERVER)
         case TcpLink():
             return 0.0
 
 
 def silence(link: Link) -> float:
-    """Seconds of silence between two frames: 3.5 characters, 1.75 ms above 19 200 baud.
-
-    0 over Modbus TCP.
-    """
-    if isinstance(link, SerialLink) and link.baud > FAST:
-        return FAST_SILENCE
-    return SILENT_CHARACTERS * character_time(link)
+    """Seconds of silence between two frames; 0 over Modbus TCP."""
+    match link:
+        case SerialLink(_, baud, format_):
+            return silent_seconds(baud, format_)
+        case RtuTcpLink():
+            return silent_seconds(*_BEHIND_A_SERVER)
+        case TcpLink():
+            return 0.0

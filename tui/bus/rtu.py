@@ -5,26 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pymodbus.framer.rtu import FramerRTU
+from tui.wire.frames import frame_end, is_whole
 
 from .expectation import EXCEPTION, Expectation, exception_code, exception_extents
-
-MIN_FRAME = 4
-MAX_FRAME = 256
-_TABLE = tuple(FramerRTU.crc16_table)
-
-
-def frame(device: int, pdu: bytes) -> bytes:
-    """The frame of a request or reply: device, function and data, checksum."""
-    body = bytes([device]) + pdu
-    return body + FramerRTU.compute_CRC(body).to_bytes(2, "big")
-
-
-def is_whole(data: bytes | bytearray) -> bool:
-    """Whether the bytes end with the checksum of the others."""
-    return len(data) >= MIN_FRAME and FramerRTU.check_CRC(
-        bytes(data[:-2]), int.from_bytes(data[-2:], "big")
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +80,7 @@ def pieces(data: bytes | bytearray) -> list[Piece]:
     found: list[Piece] = []
     loose = at = 0
     while at < len(data):
-        end = _frame_end(data, at)
+        end = frame_end(data, at)
         if end is None:
             at += 1
             continue
@@ -108,16 +91,6 @@ def pieces(data: bytes | bytearray) -> list[Piece]:
     if len(data) > loose:
         found.append(Piece(bytes(data[loose:]), whole=False))
     return found
-
-
-def _frame_end(data: bytes | bytearray, start: int) -> int | None:
-    """End of the shortest frame that begins at `start`: the checksum over all of it is zero."""
-    crc = 0xFFFF
-    for at in range(start, min(len(data), start + MAX_FRAME)):
-        crc = (crc >> 8) ^ _TABLE[(crc ^ data[at]) & 0xFF]
-        if crc == 0 and at - start + 1 >= MIN_FRAME:
-            return at + 1
-    return None
 
 
 def begins_reply(data: bytes, device: int, function: int) -> bool:

@@ -6,10 +6,12 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 
+from tui.wire.frames import MAX_FRAME, frame
+
 from .errors import LineLost
 from .link import Link, RtuTcpLink, character_time, silence
 from .master import Outcome, Sending, Surroundings, settle
-from .rtu import MAX_FRAME, frame, pieces
+from .rtu import pieces
 from .rtu_exchange import Kind, RtuExchange, Verdict
 from .transport import Transport
 

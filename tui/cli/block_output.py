@@ -69,8 +69,8 @@ def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
 
 
 def _frame(session: DriveSession, view: BlockView) -> str:
-    from tui.drive.frames import hex_text
     from tui.drive.mapping_wire import frame
+    from tui.wire.frames import hex_text
 
     inputs = view.plan if view.block.direction == "read" else None
     outputs = view.plan if view.block.direction == "write" else None

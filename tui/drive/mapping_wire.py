@@ -9,7 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from .frames import read_frame, read_write_frame, write_frame
+from tui.wire.frames import read_frame, read_write_frame, write_frame
+
 from .mapping import Assignment, target
 from .profile import Profile
 from .read_plan import ReadRequest, WireTiming, plan_reads, request_of, run_length

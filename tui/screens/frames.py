@@ -11,6 +11,7 @@ from tui.bus.line import Frame, Line
 from tui.widgets.drawing import rule, short
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN
+from tui.wire.frames import hex_text
 
 from .actions import FRAMES, bindings
 from .base import PanelScreen
@@ -61,6 +62,6 @@ def frame_line(frame: Frame, now: float, width: int) -> Text:
     text.append(f"{frame.direction:<4}", FAINT)
     note = f"  {frame.note}" if frame.note else ""
     room = max(FEWEST, width - text.cell_len - len(note))
-    text.append(short(frame.data.hex(" ").upper(), room), PLAIN)
+    text.append(short(hex_text(frame.data), room), PLAIN)
     text.append(note, ALARM)
     return text

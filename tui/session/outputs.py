@@ -6,13 +6,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.drive.errors import ValueRefused
-from tui.drive.frames import hex_text
 from tui.drive.mapping import Assignment, MappingError, describe, target
 from tui.drive.mapping_wire import frame, reach, together
 from tui.drive.profile import Profile
 from tui.drive.schema import Parameter
 from tui.drive.shown import number_of
 from tui.drive.values import encode, to_words
+from tui.wire.frames import hex_text
 
 REFERENCES = frozenset({"command_frequency", "command_speed"})
 

@@ -1,4 +1,8 @@
-"""Modbus RTU frames: checksum and the length a request announces. Pure functions."""
+"""Modbus RTU frames as a drive sees them: checksum and the length a request announces.
+
+Pure functions. The checksum is written here once more, beside that of tui.wire: a simulated drive
+is an independent witness, which would not notice a fault that it shares with the line.
+"""
 
 from __future__ import annotations
 

@@ -63,7 +63,10 @@ class LineTiming:
 
     @property
     def silence(self) -> float:
-        """Silence that ends a frame, in s: 3.5 characters, 1.75 ms above 19200 baud."""
+        """Silence that ends a frame, in s: 3.5 characters, 1.75 ms above 19200 baud.
+
+        Worked out here and not by tui.wire, whose witness the simulator is.
+        """
         return 0.00175 if self.baud > 19200 else 3.5 * self.character
 
 

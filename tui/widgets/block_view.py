@@ -7,7 +7,6 @@ from collections.abc import Sequence
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.frames import hex_text
 from tui.drive.mapping import Assignment, describe, target
 from tui.drive.mapping_wire import Saving, Stretch, frame, microseconds, together
 from tui.drive.profile import is_verified
@@ -17,6 +16,7 @@ from tui.drive.values import NOT_AVAILABLE
 from tui.session.mapping import BlockView, Force, Slot, wire_timing
 from tui.session.mapping_desk import MappingDesk
 from tui.session.verdict import Verdict
+from tui.wire.frames import hex_text
 
 from .drawing import cut, rule, wrapped
 from .palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG
