@@ -22,10 +22,11 @@ from rich.console import Console
 from rich.table import Table
 
 from tui.drive.library import load
-from tui.drive.mapping import block_of, empty, pick
+from tui.drive.mapping import empty, pick
 from tui.drive.mapping_wire import cost
 from tui.drive.profile import Profile
 from tui.drive.read_plan import WireTiming
+from tui.drive.schema import Block
 from tui.session.drive_session import DriveSession
 from tui.session.lines import open_line
 from tui.session.monitor import Snapshot, rates_of
@@ -65,11 +66,14 @@ class Row:
     """Share of the cycles that came through the block."""
 
 
+def read_block(profile: Profile) -> Block:
+    """The block that Monitor reads."""
+    return next(block for block in profile.data.blocks if block.direction == "read")
+
+
 def slots_for(profile: Profile, codes: tuple[str, ...]) -> dict[str, int]:
     """Raw values of the slots of the read block, standing for these from the first on."""
-    block = block_of(profile, "read")
-    assert block is not None
-    plan = empty(block)
+    plan = empty(read_block(profile))
     for place, code in enumerate(codes):
         plan = pick(profile, plan, place, code)
     return plan.slots
@@ -89,8 +93,7 @@ async def measured(
     line_timing = LineTiming(baud, "8N1", True)
     spec_turnaround = float(profile.data.link.turnaround_ms) / 1000
     timing = WireTiming(line_timing.character, line_timing.silence, spec_turnaround)
-    block = block_of(profile, "read")
-    assert block is not None
+    block = read_block(profile)
     slots = slots_for(profile, stand if with_block else ())
     counted = cost(profile, codes, timing, slots)
     simulation = Simulation([DriveSpec(family, 1, sets=slots, run_hz=RUN_HZ)], timing=line_timing)

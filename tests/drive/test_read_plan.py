@@ -13,7 +13,6 @@ from tui.drive.errors import DriveError, UnknownParameter
 from tui.drive.profile import Profile
 from tui.drive.read_plan import ReadPlan, WireTiming, plan_reads
 from tui.drive.schema import ProfileData
-from tui.drive.write_plan import plan_write
 
 TIMING = WireTiming(character=11 / 19200, silence=3.5 * 11 / 19200, turnaround=0.005)
 
@@ -26,7 +25,6 @@ def profile_of(
     single: bool = False,
     blocks: Sequence[dict[str, object]] = (),
     write_only: Sequence[int] = (),
-    both: tuple[int, int] | None = None,
 ) -> Profile:
     """A profile with a word P<address> at each address."""
     tables = {
@@ -36,11 +34,6 @@ def profile_of(
         "functions": [
             {"code": 3, "name": "Read", "max_read": longest},
             {"code": 6, "name": "Write"},
-            *(
-                [{"code": 23, "name": "Both", "max_read": both[0], "max_write": both[1]}]
-                if both
-                else []
-            ),
         ],
         "reading": {"gaps_readable": gaps, "single_words_only": single},
         "monitoring": {"values": []},
@@ -255,51 +248,3 @@ def test_no_split_is_cheaper(
         )
     )
     assert plan.seconds == pytest.approx(cheapest)
-
-
-def test_reading_rides_on_a_write_where_the_drive_can() -> None:
-    profile = profile_of([10, 11, 50], both=(20, 20))
-    plan = plan_write(profile, 8501, 2, codes([10, 11, 50]), TIMING)
-    assert plan.riding is not None
-    assert (plan.riding.address, plan.riding.count) == (10, 2)
-    assert [(r.address, r.count) for r in plan.reads] == [(50, 1)]
-    assert plan.seconds == pytest.approx(TIMING.read_write(2, 2) + TIMING.read(1))
-    assert plan.microseconds == round(plan.seconds * 1e6)
-
-
-def test_without_function_23_it_is_written_first_and_read_then() -> None:
-    plan = plan_write(profile_of([10]), 8501, 1, ["P10"], TIMING)
-    assert plan.riding is None
-    assert plan.seconds == pytest.approx(TIMING.write(1, multiple=False) + TIMING.read(1))
-
-
-@settings(deadline=None)
-@given(
-    known=st.sets(st.integers(0, 16), min_size=1, max_size=10),
-    share=st.randoms(use_true_random=False),
-    ride=st.integers(1, 6),
-    write=st.integers(1, 5),
-)
-def test_nothing_rides_cheaper(known: set[int], share: object, ride: int, write: int) -> None:
-    longest = 8
-    profile = profile_of(sorted(known), longest=longest, both=(ride, 4))
-    wanted = sorted(a for a in known if share.random() < 0.6)  # type: ignore[attr-defined]
-    plan = plan_write(profile, 8501, write, codes(wanted), TIMING)
-    read = [*plan.reads, *([plan.riding] if plan.riding else [])]
-    places = sorted(place.code for request in read for place in request.places)
-    assert places == sorted(codes(wanted))
-
-    def allowed(run: Sequence[int], limit: int) -> bool:
-        return run[-1] - run[0] < limit and set(range(run[0], run[-1] + 1)) <= known
-
-    costs = []
-    for split in splits(wanted):
-        times = [TIMING.read(run[-1] - run[0] + 1) for run in split]
-        if all(allowed(run, longest) for run in split):
-            costs.append(TIMING.write(write, multiple=write > 1) + sum(times))
-        for at, run in enumerate(split):
-            others = [*split[:at], *split[at + 1 :]]
-            if write <= 4 and allowed(run, ride) and all(allowed(o, longest) for o in others):
-                rides = TIMING.read_write(run[-1] - run[0] + 1, write)
-                costs.append(rides + sum(times) - times[at])
-    assert plan.seconds == pytest.approx(min(costs))

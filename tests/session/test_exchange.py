@@ -7,11 +7,12 @@ from collections.abc import Mapping
 
 import pytest
 
+from tests.blocks import block_of
 from tests.session.sets_bench import Bench, bench, state_known
 from tui.bus.errors import RequestRefused
 from tui.bus.line import Reply
 from tui.drive.errors import DriveError, ValueRefused
-from tui.drive.mapping import Assignment, MappingError, block_of, empty, pick
+from tui.drive.mapping import Assignment, MappingError, empty, pick
 from tui.drive.mapping_wire import frame, reach
 from tui.session.command import Commander
 from tui.session.exchange import exchange
@@ -26,9 +27,7 @@ EXAMPLE_OUT = ["CMD", "LFRD", "HSP", "LSP", "ACC", "DEC"]
 
 
 def plan_of(here: Bench, direction: str, codes: list[str]) -> Assignment:
-    block = block_of(here.profile, direction)
-    assert block is not None
-    plan = empty(block)
+    plan = empty(block_of(here.profile, direction))
     for place, code in enumerate(codes):
         plan = pick(here.profile, plan, place, code)
     return plan

@@ -9,14 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from tests.blocks import block_of
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.line import Reply
 from tui.drive import library
-from tui.drive.mapping import Assignment, block_of, empty, factory, pick
+from tui.drive.mapping import Assignment, empty, factory, pick
 from tui.drive.mapping_wire import frame, span
 from tui.drive.schema import Block
-from tui.drive.user_words import NO_WORDS, UserWord
+from tui.drive.user_words import COUNT, UserWord
 from tui.session.drive_session import DriveSession
 from tui.session.lines import open_line
 from tui.session.mapping import Force, Mapper, wire_timing
@@ -25,15 +26,14 @@ from tui.session.user_words import load_words, read_words, save_words
 from tui.session.verdict import Verdict
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
+NO_WORDS = (UserWord(),) * COUNT
 EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]
 EXAMPLE_OUT = ["CMD", "LFRD", "HSP", "LSP", "ACC", "DEC"]
 READ_BLOCK = {"F875": 1, "F876": 2, "F877": 3, "F878": 4, "F879": 5}
 
 
 def block(here: Bench, direction: str) -> Block:
-    found = block_of(here.profile, direction)
-    assert found is not None
-    return found
+    return block_of(here.profile, direction)
 
 
 def plan_of(here: Bench, direction: str, codes: list[str]) -> Assignment:
@@ -365,7 +365,6 @@ async def test_trembling_values_of_a_real_line_are_no_difference() -> None:
         session = DriveSession(opened.line, 1, library.load("atv21"))
         mapper = Mapper(session)
         read = block_of(session.profile, "read")
-        assert read is not None
         for _ in range(3):
             view = await mapper.look(read)
             assert Verdict.CHANGED not in {s.verdict for s in view.slots}

@@ -9,17 +9,14 @@ from dataclasses import dataclass
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from tests.blocks import block_of
 from tui.drive import library
-from tui.drive.mapping import block_of
-from tui.drive.schema import Block
 from tui.drive.values import decode
 from tui.session.proof import Proof
 from tui.session.readings import Quality, Reading
 
 PROFILE = library.load("atv21")
-FOUND = block_of(PROFILE, "read")
-assert FOUND is not None
-BLOCK: Block = FOUND
+BLOCK = block_of(PROFILE, "read")
 CODES = [choice.parameter for choice in BLOCK.choices]
 RAWS = {choice.parameter: choice.raw for choice in BLOCK.choices}
 

@@ -21,8 +21,6 @@ MARGIN = 4
 LATE_MARGIN = 2.0
 """Late replies are awaited so many times longer than the worst lateness seen."""
 LONGEST_WAIT = 10.0
-PILED_UP = 0.5
-"""How much longer a reply is awaited for each other request without an answer."""
 QUIET_SHARE = 0.3
 """Longest that the whole line keeps quiet for one late device, as a share of the time-out."""
 FORGET = 0.99

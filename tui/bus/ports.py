@@ -28,17 +28,12 @@ class PortInfo:
 
     path: str
     description: str
-    hardware_id: str
 
 
 def list_ports() -> list[PortInfo]:
     """The serial ports of this machine, in the order of their names."""
     ports = (
-        PortInfo(
-            port.device,
-            "" if port.description in (None, "n/a") else port.description,
-            "" if port.hwid in (None, "n/a") else port.hwid,
-        )
+        PortInfo(port.device, "" if port.description in (None, "n/a") else port.description)
         for port in system_ports.comports()
     )
     return sorted(ports, key=lambda port: _by_number(port.path))

@@ -77,11 +77,6 @@ class Problem:
     """True where it must not be written so; else it is only to be known."""
 
 
-def block_of(profile: Profile, direction: str) -> Block | None:
-    """The block that is read (`read`) or written (`write`), or None."""
-    return next((b for b in profile.data.blocks if b.direction == direction), None)
-
-
 def has_blocks(profile: Profile) -> bool:
     """Whether the family has an indirect block or a communication scanner at all."""
     return bool(profile.data.blocks)

@@ -218,7 +218,7 @@ def _runs(
 ) -> list[ReadRequest]:
     """The cheapest split of parameters into runs of neighbours, by dynamic programming."""
     ordered = sorted(parameters, key=lambda p: p.address)
-    best = cheapest(profile, ordered, timing, unreadable)
+    best = _cheapest(profile, ordered, timing, unreadable)
     runs: list[ReadRequest] = []
     end = len(ordered)
     while end:
@@ -228,7 +228,7 @@ def _runs(
     return runs[::-1]
 
 
-def cheapest(
+def _cheapest(
     profile: Profile,
     ordered: Sequence[Parameter],
     timing: WireTiming,

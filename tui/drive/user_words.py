@@ -7,7 +7,7 @@ protected shows `-----`, never a number.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Literal, get_args
 
 from .mapping import NONE, MappingError
@@ -35,13 +35,8 @@ class UserWord:
             return f"{word:04X} hex"
         return str(word - 0x10000 if self.format == "signed" and word > 0x7FFF else word)
 
-    def next_format(self) -> UserWord:
-        """The same word in the next format."""
-        return replace(self, format=FORMATS[(FORMATS.index(self.format) + 1) % len(FORMATS)])
-
 
 UserWords = tuple[UserWord, ...]
-NO_WORDS: UserWords = (UserWord(),) * COUNT
 
 
 def word_named(profile: Profile, text: str, format: Format = "hex") -> UserWord:

@@ -358,10 +358,6 @@ class MappingDesk:
         """Tell why something was not done."""
         self._say(text, "refused")
 
-    def tell(self, text: str) -> None:
-        """Tell what was done."""
-        self._say(text, "done")
-
     def _say(self, text: str, kind: str) -> None:
         self.said = Said(text, kind, time.monotonic())
 

@@ -1,0 +1,11 @@
+"""The block of a family that a test is about."""
+
+from __future__ import annotations
+
+from tui.drive.profile import Profile
+from tui.drive.schema import Block
+
+
+def block_of(profile: Profile, direction: str) -> Block:
+    """The block that is read (`read`) or written (`write`)."""
+    return next(block for block in profile.data.blocks if block.direction == direction)
