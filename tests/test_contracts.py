@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import os
 import re
 import stat
@@ -205,6 +206,19 @@ def test_every_package_that_the_project_needs_is_pinned() -> None:
             if wanted is None or any(wanted.evaluate({"extra": e}) for e in ("", *extras)):
                 waiting.append(inner.partition(";")[0])
     assert {name for name, _ in needed} - set(pins()) == set()
+
+
+def test_values_become_text_in_one_place() -> None:
+    """Screen, journal and command line go through tui.drive.shown, which knows of scales."""
+    found = set()
+    for path in (ROOT / "tui").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if not isinstance(node, ast.ImportFrom) or not f".{node.module}".endswith(".values"):
+                continue
+            if any(name.name == "decode" for name in node.names):
+                found.add(path.relative_to(ROOT / "tui").as_posix())
+    # the writer does not ask for scale sources yet
+    assert found - {"session/writing.py"} == {"drive/shown.py"}
 
 
 def test_nothing_in_the_project_names_this_machine() -> None:

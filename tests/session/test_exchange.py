@@ -118,7 +118,8 @@ async def test_only_what_was_named_is_written() -> None:
         (request,) = sent(here, 23)
         # two words from NC5 on: command word and references are not touched
         assert request.endswith("31dd000204002d0037")
-        assert {entry.code for entry in here.journal.recent} == {"ACC", "DEC"}
+        told = {(entry.code, entry.new) for entry in here.journal.recent}
+        assert told == {("ACC", "4.5 s"), ("DEC", "5.5 s")}
 
 
 async def test_what_stands_between_two_named_ones_keeps_its_value() -> None:
@@ -303,6 +304,15 @@ def test_a_person_sees_each_value_and_the_frame_before_it_goes_out() -> None:
         assert (
             rest[-1].replace(" ", "").lower().startswith("frame:011731c5000831d9000306000f038401c2")
         )
+
+
+def test_a_value_whose_scale_is_not_known_is_told_raw() -> None:
+    with bench("atv71") as here:
+        outputs = plan_of(here, "write", EXAMPLE_OUT)
+        told = meant(here.profile, 1, outputs, None, {"LFRD": 900}, "acc=16#0032")
+        assert "ACC 50 raw" in told.follows
+        told = meant(here.profile, 1, outputs, None, {"LFRD": 900, "INR": 1}, "acc=16#0032")
+        assert "ACC 5.0 s" in told.follows
 
 
 @pytest.mark.parametrize(

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any, cast
 
 import pytest
+from rich.text import Text
 from textual.pilot import Pilot
 
 from tui.drive import library
@@ -15,6 +16,7 @@ from tui.session.editor import Editor
 from tui.session.favourites import Marks
 from tui.session.journal import Journal
 from tui.session.said import Said
+from tui.widgets.parameter_view import news_lines
 
 from . import fakes
 from .test_command_pictures import FakeCommander
@@ -152,3 +154,13 @@ def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
         await pilot.pause()
 
     assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+def test_another_hands_value_is_told_as_the_drive_counts_it() -> None:
+    """An Altivar 31 without a ramp increment counts in tenths; that is not an unknown scale."""
+    editor = StillEditor(fakes.session_of(None), Journal())
+    editor.session.profile = library.load("atv31")
+    editor.raws, editor.lacking = {"ACC": 30}, frozenset({"Inr"})
+    editor.changed_elsewhere = {"ACC": 50}
+    said = "\n".join(line.plain for line in news_lines(editor, "ACC", Text(""), 100))
+    assert "it was 5.0 s" in said

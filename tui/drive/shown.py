@@ -1,4 +1,8 @@
-"""A raw value as a person reads it, given the raw values that its scale and unit follow."""
+"""A raw value as a person reads it: the one way to text for screen, journal and command line.
+
+Needed are the raw values that the parameter's scale and unit follow, and what the drive lacks:
+where a scale is not known the value is shown raw, never in a unit that it may not have.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +12,7 @@ from decimal import Decimal
 
 from .profile import Profile
 from .schema import Parameter
-from .values import Value, decode
+from .values import Value, decode, raw_range
 
 
 def shown(
@@ -24,6 +28,52 @@ def shown(
     if parameter.unit_by is not None and value.number is not None:
         value = replace(value, unit=profile.unit(parameter, raws))
     return value
+
+
+def shown_text(
+    profile: Profile,
+    parameter: Parameter,
+    raw: int | None,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> str:
+    """The reading of a raw value with its unit; empty where there is no value."""
+    return "" if raw is None else shown(profile, parameter, raw, raws, absent).display
+
+
+def typed_text(
+    profile: Profile,
+    parameter: Parameter,
+    raw: int,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> str:
+    """A raw value as a person types it in one word: hexadecimal for bit words, else a number."""
+    if parameter.bits:
+        return shown(profile, parameter, raw, raws, absent).text
+    number = number_of(profile, parameter, raw, raws, absent)
+    return str(raw) if number is None else f"{number:f}"
+
+
+def limits_text(
+    profile: Profile,
+    parameter: Parameter,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> str:
+    """From the lowest to the highest value that the profile allows, in the parameter's unit."""
+    low, high = raw_range(parameter)
+    scale = profile.scale(parameter, raws, absent)
+    if scale is None:
+        return f"raw {low}..{high}"
+    return f"{low * scale:f}..{high * scale:f} {profile.unit(parameter, raws)}".rstrip()
+
+
+def depends_on(parameter: Parameter) -> tuple[str, ...]:
+    """Codes that must be read, or known to be lacking, before a value can be told in its unit."""
+    scale = parameter.scale_by.parameter if parameter.scale_by else ""
+    unit = parameter.unit_by.parameter if parameter.unit_by else ""
+    return tuple(code for code in (scale, unit) if code)
 
 
 def number_of(

@@ -15,7 +15,8 @@ from tui.drive.mapping import UNUSED, Assignment, describe, problems, refusing, 
 from tui.drive.mapping_wire import reach, span
 from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
 from tui.drive.schema import Parameter
-from tui.drive.values import check_raw, decode, from_words, to_words
+from tui.drive.shown import depends_on, shown_text
+from tui.drive.values import check_raw, from_words, to_words
 from tui.drive.writable import AT_REST, is_order
 
 from .asking import Asker
@@ -124,8 +125,8 @@ class _Exchange:
         return Exchanged(known, self._read(reply))
 
     async def _read_scales(self) -> None:
-        """What the outputs' scales depend on: errors and the journal tell engineering values."""
-        sources = [p.scale_by.parameter for p in self.targets if p.scale_by is not None]
+        """What scales and units depend on: errors and the journal tell engineering values."""
+        sources = [code for parameter in self.targets for code in depends_on(parameter)]
         await self.asker.ask_raws(dict.fromkeys(sources))
 
     async def _held(self) -> dict[str, int]:
@@ -253,11 +254,8 @@ class _Exchange:
         self.journal.add(entry)
 
     def _text(self, parameter: Parameter, raw: int | None) -> str:
-        if raw is None:
-            return ""
-        profile = self.session.profile
-        scale = profile.scale(parameter, self._raws(), self.asker.lacking)
-        return decode(parameter, raw, profile.names(parameter), scale).display
+        profile, lacking = self.session.profile, self.asker.lacking
+        return shown_text(profile, parameter, raw, self._raws(), lacking)
 
     def _raws(self) -> dict[str, int]:
         """All raw values known, for scales."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from tui.drive.errors import ValueRefused
@@ -10,7 +10,7 @@ from tui.drive.mapping import Assignment, MappingError, describe, target
 from tui.drive.mapping_wire import frame, reach, together
 from tui.drive.profile import Profile
 from tui.drive.schema import Parameter
-from tui.drive.shown import number_of
+from tui.drive.shown import shown_text, typed_text
 from tui.drive.values import encode, to_words
 from tui.wire.frames import hex_text
 
@@ -35,11 +35,16 @@ def output_codes(profile: Profile, outputs: Assignment) -> dict[str, Parameter]:
     return {parameter.code: parameter for parameter in found if parameter is not None}
 
 
-def example(profile: Profile, outputs: Assignment, raws: Mapping[str, int]) -> str:
+def example(
+    profile: Profile,
+    outputs: Assignment,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> str:
     """What may be typed for the first two of these outputs: what they hold now."""
-    codes = list(output_codes(profile, outputs))[:2]
+    first = list(output_codes(profile, outputs).values())[:2]
     return " ".join(
-        f"{code}={number_text(profile, code, raws.get(code, 0), raws)}" for code in codes
+        f"{p.code}={typed_text(profile, p, raws.get(p.code, 0), raws, absent)}" for p in first
     )
 
 
@@ -50,10 +55,12 @@ def meant(
     inputs: Assignment | None,
     raws: Mapping[str, int],
     text: str,
+    absent: Collection[str] = (),
 ) -> Meant:
-    """What a text like `LFRD=1500 ACC=5.0` means. `raws` are known raw values, for scales.
+    """What a text like `LFRD=1500 ACC=5.0` means.
 
-    Raises ValueRefused and UnknownParameter with what is wrong.
+    `raws` are known raw values, for scales; `absent` are codes that the drive lacks. Raises
+    ValueRefused and UnknownParameter with what is wrong.
     """
     stand = output_codes(profile, outputs)
     wanted: dict[str, int] = {}
@@ -62,12 +69,12 @@ def meant(
         parameter = profile.find(code)
         if not sign or parameter.code not in stand:
             raise ValueRefused(f"{part!r}: write CODE=VALUE with one of {', '.join(stand)}.")
-        scale = profile.scale(parameter, raws)
+        scale = profile.scale(parameter, raws, absent)
         wanted[parameter.code] = encode(parameter, value, profile.names(parameter), scale).raw
     if not wanted:
         raise ValueRefused(f"Write CODE=VALUE with one of {', '.join(stand)}.")
     places = reach(profile, outputs, wanted)
-    lines = [*_lines(profile, outputs, places, wanted, raws)]
+    lines = [*_lines(profile, outputs, places, wanted, raws, absent)]
     words = [_word(profile, outputs, place, wanted, raws) for place in places]
     inputs, _ = together(profile, inputs, outputs, "write")
     lines.append(f"Frame: {hex_text(frame(profile, device, inputs, outputs, words, places))}")
@@ -85,18 +92,16 @@ def refuse_pending(outputs: Assignment, waits: Mapping[str, int]) -> None:
         )
 
 
-def number_text(profile: Profile, code: str, raw: int, raws: Mapping[str, int]) -> str:
-    """A raw value as a person types it: a word of bits in hexadecimal, else a number."""
-    parameter = profile[code]
-    if parameter.bits:
-        return f"16#{raw & 0xFFFF:04X}"
-    number = number_of(profile, parameter, raw, raws)
-    return str(raw) if number is None else f"{number:f}"
-
-
-def values_text(profile: Profile, values: Mapping[str, int], raws: Mapping[str, int]) -> str:
-    """Codes and their values in one line."""
-    return ", ".join(f"{c} {number_text(profile, c, raw, raws)}" for c, raw in values.items())
+def values_text(
+    profile: Profile,
+    values: Mapping[str, int],
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> str:
+    """Codes and their values in one line; `absent` are codes that the drive lacks."""
+    return ", ".join(
+        f"{c} {shown_text(profile, profile[c], raw, raws, absent)}" for c, raw in values.items()
+    )
 
 
 def _lines(
@@ -105,15 +110,15 @@ def _lines(
     places: range,
     wanted: Mapping[str, int],
     raws: Mapping[str, int],
+    absent: Collection[str],
 ) -> list[str]:
     block = outputs.block
     lines, beside = [], []
     for place in places:
         code = describe(profile, block, outputs.raws[place])
         if code in wanted:
-            value = number_text(profile, code, wanted[code], raws)
-            unit = "" if profile[code].bits else profile[code].unit
-            lines.append(f"{block.slots[place]}: {code} {value} {unit}".rstrip())
+            value = shown_text(profile, profile[code], wanted[code], raws, absent)
+            lines.append(f"{block.slots[place]}: {code} {value}")
         else:
             beside.append(code)
     if beside:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Hashable, Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from decimal import Decimal
 
 from tui.bus.errors import DeviceException, NoAnswer
@@ -14,7 +14,8 @@ from tui.bus.link import TcpLink, character_time, silence
 from tui.drive.profile import Profile, is_verified
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
 from tui.drive.schema import Block, Parameter
-from tui.drive.values import Value, decode, from_words, percent_of, word_count
+from tui.drive.shown import depends_on, shown
+from tui.drive.values import Value, from_words, percent_of, word_count
 
 from .limits import limits_of
 from .readings import Quality, Reading
@@ -136,7 +137,7 @@ class Reader:
         return await self.read(codes, priority=Priority.POLL)
 
     async def _read_sources(self, codes: list[str], priority: Priority) -> None:
-        sources = {source for code in codes for source in _depends_on(self.profile[code])}
+        sources = {source for code in codes for source in _sources_of(self.profile[code])}
         oldest = time.monotonic() - SOURCE_AGE if priority >= Priority.POLL else math.inf
         due = frozenset(
             code
@@ -295,11 +296,7 @@ class Reader:
     def _value(self, parameter: Parameter, raw: int) -> Value:
         known = {code: one.raw for code, one in self._sources.items() if one.raw is not None}
         absent = {code for code, one in self._sources.items() if one.absent}
-        scale = self.profile.scale(parameter, known, absent)
-        value = decode(parameter, raw, self.profile.names(parameter), scale)
-        if parameter.unit_by is not None and value.number is not None:
-            value = replace(value, unit=self.profile.unit(parameter, known))
-        return value
+        return shown(self.profile, parameter, raw, known, absent)
 
     def _physical(self, parameter: Parameter, value: Value) -> Value | None:
         """A percentage in the unit of its rating: the person's, else the drive's own."""
@@ -316,8 +313,6 @@ class Reader:
         return Value(value.raw, number, rating.unit, f"{number:f}")
 
 
-def _depends_on(parameter: Parameter) -> list[str]:
-    """Parameters without which this one's value cannot be told."""
-    scale = parameter.scale_by.parameter if parameter.scale_by else ""
-    unit = parameter.unit_by.parameter if parameter.unit_by else ""
-    return [code for code in (scale, unit, parameter.rating) if code]
+def _sources_of(parameter: Parameter) -> list[str]:
+    """Parameters without which this one's value, or the rating that it is a part of, is unknown."""
+    return [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]

@@ -9,7 +9,8 @@ from rich.text import Text
 from tui.drive.control_source import Change
 from tui.drive.profile import Profile
 from tui.drive.schema import ControlSource, Way
-from tui.drive.values import NOT_AVAILABLE, decode
+from tui.drive.shown import shown
+from tui.drive.values import NOT_AVAILABLE
 
 from .drawing import cut, wrapped
 from .palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
@@ -61,8 +62,8 @@ def _change(profile: Profile, change: Change, width: int) -> Text:
 def _named(profile: Profile, change: Change, raw: int | None) -> str:
     if raw is None:
         return NOT_AVAILABLE
-    value = decode(change.parameter, raw, profile.names(change.parameter), None)
-    return value.text if str(raw) in value.text else f"{value.text} ({raw})"
+    text = shown(profile, change.parameter, raw, {}).display
+    return text if str(raw) in text else f"{text} ({raw})"
 
 
 def note_lines(source: ControlSource, found: Sequence[Change], width: int) -> list[Text]:

@@ -12,8 +12,8 @@ from rich.text import Text
 from tui.drive.profile import is_verified
 from tui.drive.rows import not_factory
 from tui.drive.schema import Parameter
-from tui.drive.shown import shown
-from tui.drive.values import NOT_AVAILABLE, is_enumeration, raw_range, set_bits
+from tui.drive.shown import limits_text, shown
+from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
 from tui.drive.writable import marks, waits_for_reset
 from tui.session.editor import Editor
 
@@ -198,11 +198,7 @@ def range_text(editor: Editor, parameter: Parameter) -> str:
         return f"{len(names)} values"
     if parameter.min is None and parameter.max is None:
         return ""
-    low, high = raw_range(parameter)
-    scale = editor.session.profile.scale(parameter, editor.raws, editor.lacking)
-    if scale is None:
-        return f"raw {low}..{high}"
-    return f"{low * scale:f}..{high * scale:f} {parameter.unit}".rstrip()
+    return limits_text(editor.session.profile, parameter, editor.raws, editor.lacking)
 
 
 def detail_lines(editor: Editor, code: str, width: int) -> list[Text]:
@@ -292,7 +288,7 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     code, profile = parameter.code, editor.session.profile
     edit, result = editor.edits.get(code), editor.results.get(code)
     if code in editor.changed_elsewhere:
-        before = shown(profile, parameter, editor.changed_elsewhere[code], editor.raws).display
+        before = _shown(editor, parameter, editor.changed_elsewhere[code])
         said = f"Changed by somebody else: it was {before}. u drops your edit, y keeps it."
         return Text(said, ALARM)
     if result is not None and not result.done:
