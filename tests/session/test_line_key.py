@@ -1,0 +1,62 @@
+"""The key of a line: the same however the line was typed, another for another line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from tui.session.line_key import line_key
+
+
+def test_a_port_is_found_behind_its_links(tmp_path: Path) -> None:
+    port, link = tmp_path / "ttyUSB0", tmp_path / "by-id-adapter"
+    port.touch()
+    link.symlink_to(port)
+    assert line_key(f"serial:{link},9600,8N1") == line_key(str(port)) == f"serial:{port}"
+
+
+def test_a_link_that_leads_elsewhere_now_is_another_line(tmp_path: Path) -> None:
+    link = tmp_path / "by-id-adapter"
+    link.symlink_to(tmp_path / "ttyUSB0")
+    before = line_key(f"serial:{link}")
+    link.unlink()
+    link.symlink_to(tmp_path / "ttyUSB1")
+    assert line_key(f"serial:{link}") != before
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("serial:/dev/ttyS77,19200,8E1", "/dev/ttyS77"),
+        ("/dev/ttyS77 19200 8E1", "SERIAL: /dev/ttyS77 , 9600"),
+        ("/dev/ttyS77 19200 8E1 timeout=2", "/dev/ttyS77,timeout=0.5"),
+        ("COM3", r"serial:\\.\com3,9600"),
+        ("tcp:Gateway.Plant", " TCP:gateway.plant.:502,timeout=2"),
+        ("tcp:[::1]", "tcp:[0:0:0:0:0:0:0:1]:502"),
+        ("rtu-tcp:MOXA:4001", "rtu-tcp:moxa:4001"),
+        ("sim:atv71@2,atv21", "SIM: atv21@1, ATV71@2"),
+    ],
+)
+def test_spellings_of_one_line(one: str, other: str) -> None:
+    assert line_key(one) == line_key(other)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"),
+    [
+        ("/dev/ttyS77", "/dev/ttyS7"),
+        ("/dev/TTYS77", "/dev/ttyS77"),
+        ("tcp:gateway", "tcp:gateway:503"),
+        ("tcp:gateway:4001", "rtu-tcp:gateway:4001"),
+        ("sim:atv71", "sim:atv71@2"),
+        ("sim:atv71", "sim:atv21"),
+    ],
+)
+def test_different_lines(one: str, other: str) -> None:
+    assert line_key(one) != line_key(other)
+
+
+@pytest.mark.parametrize("text", ["", "  ", "sim:", "sim:atv71@2,atv21@2", "tcp:", "nonsense:1"])
+def test_what_is_no_line_is_its_own_key(text: str) -> None:
+    assert line_key(text) == text.strip()

@@ -1,0 +1,62 @@
+"""Which line is meant, however it was typed: two texts of one line have the same key."""
+
+from __future__ import annotations
+
+import os
+import re
+from ipaddress import ip_address
+
+from tui.bus.errors import LinkSyntaxError
+from tui.bus.link import RtuTcpLink, SerialLink, TcpLink, parse_link
+
+SIMULATED = "sim:"
+_LABEL_SETTINGS = re.compile(r"\s\d+(\s8[NEO][12](\stimeout=\S+)?)?$", re.IGNORECASE)
+"""Settings behind a path as a screen shows them: `/dev/ttyUSB0 19200 8E1`."""
+_WINDOWS_PORT = re.compile(r"(?:\\\\\.\\)?(COM\d+)", re.IGNORECASE)
+
+
+def line_key(text: str) -> str:
+    """The line without its spelling: a port's real path, a host in small letters, no settings.
+
+    Takes what a person typed, or a line's label. Links such as /dev/serial/by-id are followed as
+    they lead now; names of hosts are not looked up. A text that is no line is its own key.
+    """
+    text = text.strip()
+    if text.casefold().startswith(SIMULATED):
+        return _simulated(text)
+    try:
+        link = parse_link(text)
+    except LinkSyntaxError:
+        return text.casefold()
+    match link:
+        case SerialLink(path=path):
+            return f"serial:{_port(path)}"
+        case TcpLink(host=host, port=port):
+            return f"tcp:{_host(host)}:{port}"
+        case RtuTcpLink(host=host, port=port):
+            return f"rtu-tcp:{_host(host)}:{port}"
+
+
+def _port(path: str) -> str:
+    if found := _WINDOWS_PORT.fullmatch(path):
+        return found[1].upper()
+    return os.path.realpath(_LABEL_SETTINGS.sub("", path))
+
+
+def _host(host: str) -> str:
+    try:
+        return f"[{ip_address(host)}]" if ":" in host else str(ip_address(host))
+    except ValueError:
+        return host.casefold().rstrip(".")
+
+
+def _simulated(text: str) -> str:
+    """A simulated line by its drives with their addresses, in the order of these."""
+    from tui.simulator import SimulatorError, parse_drives
+
+    try:
+        drives = parse_drives(text[len(SIMULATED) :])
+    except SimulatorError:
+        return text.casefold()
+    in_order = sorted(drives, key=lambda drive: drive.address)
+    return SIMULATED + ",".join(f"{drive.profile}@{drive.address}" for drive in in_order)
