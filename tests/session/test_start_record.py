@@ -1,0 +1,92 @@
+"""What a person is told of a motor that runs, by the record of its start."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from datetime import UTC, datetime, timedelta, timezone
+from typing import Any
+
+import pytest
+
+from tui.session.identify import DriveIdentity
+from tui.session.start_record import StartRecord, offer
+
+ZONE = timezone(timedelta(hours=2))
+NOW = datetime(2026, 3, 5, 18, 2, tzinfo=ZONE)
+RECORD = StartRecord(
+    line="/dev/ttyUSB0",
+    device=2,
+    profile="atv71",
+    vendor="TELEMECANIQUE",
+    reference="ATV71HU22N4",
+    version="0201",
+    name="MACHINE 4",
+    order="forward",
+    boot_id="boot",
+    pid=7,
+    started="100",
+    program="panel",
+    left_running=False,
+    wall="2026-03-05T17:34:09.120+02:00",
+)
+IDENTITY = DriveIdentity(
+    2, "TELEMECANIQUE", "ATV71HU22N4", "0201", "MACHINE 4", "atv71", ("atv71", "atv61")
+)
+TODAY = "runs since 17:34 by a command from here, that program ended"
+
+
+def test_a_motor_that_runs_is_told() -> None:
+    assert offer(RECORD, IDENTITY, True, NOW) == TODAY
+
+
+def test_one_that_does_not_run_is_not() -> None:
+    assert offer(RECORD, IDENTITY, False, NOW) == ""
+
+
+def test_the_date_is_told_where_it_is_not_today() -> None:
+    tomorrow = NOW + timedelta(days=1)
+    assert "since 2026-03-05 17:34 by" in offer(RECORD, IDENTITY, True, tomorrow)
+
+
+def test_the_time_is_told_in_the_zone_of_now() -> None:
+    assert "since 15:34 by" in offer(RECORD, IDENTITY, True, NOW.astimezone(UTC))
+
+
+def test_a_motor_that_was_left_running_is_told_so() -> None:
+    text = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW)
+    assert text == (
+        "runs since 17:34 by a command from here, left running on purpose, that program ended"
+    )
+
+
+def test_a_time_that_is_none_is_left_out() -> None:
+    text = offer(replace(RECORD, wall="soon"), IDENTITY, True, NOW)
+    assert text == "runs by a command from here, that program ended"
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"device": 3},
+        {"vendor": "LEROY"},
+        {"reference": "ATV71HU30N4"},
+        {"version": "0202"},
+        {"name": "MACHINE 5"},
+        {"profile": "atv31", "candidates": ("atv31",)},
+    ],
+    ids=lambda other: next(iter(other)),
+)
+def test_another_drive_withdraws_the_offer(other: dict[str, Any]) -> None:
+    assert offer(RECORD, replace(IDENTITY, **other), True, NOW) == ""
+
+
+def test_what_was_not_said_is_no_difference() -> None:
+    nameless = DriveIdentity(2, "", "", "", "", None, ())
+    assert offer(RECORD, nameless, True, NOW) == TODAY
+    assert offer(RECORD, None, True, NOW) == TODAY
+    silent = replace(RECORD, vendor="", reference="", version="", name="", profile="")
+    assert offer(silent, IDENTITY, True, NOW) == TODAY
+
+
+def test_a_profile_that_may_fit_is_no_other() -> None:
+    assert offer(replace(RECORD, profile="atv61"), IDENTITY, True, NOW) == TODAY

@@ -1,0 +1,524 @@
+"""Starts on record: there before the run frame, found by the next program, in no stop's way."""
+
+from __future__ import annotations
+
+import errno
+import json
+import logging
+import os
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tests.programs import PATIENCE, wait_until
+from tui.session.identify import DriveIdentity
+from tui.session.line_key import line_key
+from tui.session.processes import Processes
+from tui.session.start_record import StartRecord
+from tui.session.starts import StartNotRecorded, StartOvertaken, Starts
+
+LINE = "tcp:gateway"
+IDENTITY = DriveIdentity(2, "V", "R", "0201", "MACHINE 4", "atv71", ("atv71",))
+LIVING, ENDED = 900_001, 900_002
+
+PROGRAM = """
+import sys
+from pathlib import Path
+from tui.session.identify import DriveIdentity
+from tui.session.starts import Starts
+starts = Starts(Path(sys.argv[1]))
+for line in sys.stdin:
+    word, device = line.split()
+    if word == "begin":
+        identity = DriveIdentity(int(device), "V", "R", "0201", "MACHINE 4", "atv71", ("atv71",))
+        record = starts.record("tcp:gateway", identity, "atv71", "forward", program="run")
+        starts.begin(record, 60)
+        starts.sent("tcp:gateway", int(device))
+    else:
+        starts.end("tcp:gateway", int(device))
+        starts.close(60)
+    print("done", flush=True)
+"""
+
+
+class MadeUp(Processes):
+    """This program, one other that lives, and no more."""
+
+    def started(self, pid: int) -> str | None:
+        return "100" if pid in (os.getpid(), LIVING) else None
+
+
+class Other:
+    """Another program that records starts, told what to do."""
+
+    def __init__(self, folder: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, "-c", PROGRAM, str(folder)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def does(self, word: str, device: int = 2) -> None:
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(f"{word} {device}\n")
+        self.process.stdin.flush()
+        assert self.process.stdout.readline() == "done\n"
+
+    def kill(self) -> None:
+        """SIGKILL, and its status fetched."""
+        self.process.kill()
+        self.process.communicate(timeout=PATIENCE)
+
+
+@contextmanager
+def other_program(folder: Path) -> Iterator[Other]:
+    program = Other(folder)
+    try:
+        yield program
+    finally:
+        program.kill()
+
+
+@pytest.fixture
+def starts(tmp_path: Path) -> Iterator[Starts]:
+    made = Starts(tmp_path, MadeUp())
+    yield made
+    assert made.close(PATIENCE)
+
+
+@pytest.fixture
+def hung(monkeypatch: pytest.MonkeyPatch) -> Iterator[threading.Event]:
+    """A disk that hangs in flushing once the event is clear; it goes on at the end of the test."""
+    works, real = threading.Event(), os.fsync
+    works.set()
+
+    def flush(number: int) -> None:
+        assert works.wait(PATIENCE)
+        real(number)
+
+    monkeypatch.setattr(os, "fsync", flush)
+    yield works
+    works.set()
+
+
+def start(pid: int = ENDED, line: str = LINE, device: int = 2, **more: Any) -> StartRecord:
+    """A start by the program of that number."""
+    record = Starts(processes=MadeUp()).record(
+        line, replace(IDENTITY, device=device), "atv71", "forward", program="panel"
+    )
+    return replace(record, **{"pid": pid, "started": "100", **more})
+
+
+def files(starts: Starts) -> list[Path]:
+    return sorted(starts.folder.glob("*.json"))
+
+
+def test_a_start_of_a_killed_program_is_found(tmp_path: Path) -> None:
+    starts = Starts(tmp_path)
+    with other_program(tmp_path) as program:
+        program.does("begin")
+        assert starts.found(LINE, 2) is None, "its program lives: the motor is that one's"
+        program.kill()
+    found = starts.found(LINE, 2)
+    assert found is not None
+    assert (found.pid, found.program, found.name) == (program.process.pid, "run", "MACHINE 4")
+    starts.end(LINE, 2)
+    assert starts.found(LINE, 2) is None
+    assert starts.close(PATIENCE)
+    assert files(starts) == []
+
+
+def test_two_programs_keep_each_other_s_records(tmp_path: Path) -> None:
+    starts = Starts(tmp_path)
+    with other_program(tmp_path) as one, other_program(tmp_path) as other:
+        devices = range(1, 9)
+
+        def busy(program: Other, mine: int) -> None:
+            for device in devices:
+                program.does("begin", device)
+                if device % 2 == mine:
+                    program.does("end", device)
+
+        with ThreadPoolExecutor(2) as pool:
+            list(pool.map(busy, [one, other], [0, 1]))
+        kept = [json.loads(file.read_text()) for file in files(starts)]
+        by_pid = {
+            program.process.pid: sorted(
+                record["device"] for record in kept if record["pid"] == program.process.pid
+            )
+            for program in (one, other)
+        }
+        assert by_pid == {one.process.pid: [1, 3, 5, 7], other.process.pid: [2, 4, 6, 8]}
+        one.kill()
+        assert [record.device for record in starts.all_found(LINE)] == [1, 3, 5, 7]
+        other.kill()
+        assert [record.device for record in starts.all_found(LINE)] == [*devices]
+
+
+def test_a_rest_seen_by_another_program_keeps_a_living_one_s_start(starts: Starts) -> None:
+    starts.begin(start(LIVING))
+    starts.sent(LINE, 2)
+    starts.end(LINE, 2)
+    assert starts.close(PATIENCE)
+    assert len(files(starts)) == 1
+
+
+def test_a_reused_number_is_not_the_program_that_started(starts: Starts) -> None:
+    starts.begin(start(LIVING, started="99"))
+    assert starts.found(LINE, 2) is not None
+
+
+def test_a_restart_of_the_machine_ends_all_programs(starts: Starts) -> None:
+    starts.begin(start(LIVING, boot_id="another"))
+    assert starts.found(LINE, 2) is not None
+
+
+def test_it_is_found_whatever_way_the_line_was_typed(starts: Starts, tmp_path: Path) -> None:
+    port, link = tmp_path / "ttyUSB0", tmp_path / "adapter"
+    port.touch()
+    link.symlink_to(port)
+    starts.begin(start(line=f"serial:{link},9600,8N1"))
+    assert starts.found(str(port), 2) is not None
+    starts.end(str(port), 2)
+    assert starts.close(PATIENCE)
+    assert files(starts) == []
+
+
+def test_a_port_that_has_another_number_now_is_found_by_its_link(
+    starts: Starts, tmp_path: Path
+) -> None:
+    link = tmp_path / "adapter"
+    link.symlink_to(tmp_path / "ttyUSB0")
+    starts.begin(start(line=f"serial:{link}"))
+    link.unlink()
+    link.symlink_to(tmp_path / "ttyUSB1")
+    assert starts.found(f"serial:{tmp_path / 'ttyUSB1'}", 2) is not None
+    assert starts.found(f"serial:{tmp_path / 'ttyUSB0'}", 2) is None
+
+
+def test_two_lines_with_the_same_device(starts: Starts) -> None:
+    starts.begin(start(line="tcp:one", name="A"))
+    starts.begin(start(line="tcp:two", name="B"))
+    starts.note_stop("tcp:one", 2)
+    assert starts.found("tcp:one", 2) is None
+    assert starts.all_found("tcp:two")[0].name == "B"
+    assert starts.close(PATIENCE)
+    assert len(files(starts)) == 1
+
+
+def test_the_newest_start_counts_in_any_zone(starts: Starts) -> None:
+    starts.begin(start(name="new", pid=ENDED, wall="2026-03-05T16:00:00+00:00"))
+    starts.begin(start(name="old", pid=ENDED + 1, wall="2026-03-05T17:30:00+02:00"))
+    found = starts.found(LINE, 2)
+    assert found is not None
+    assert found.name == "new"
+
+
+def test_a_motor_that_was_taken_over_is_no_longer_offered(starts: Starts) -> None:
+    starts.begin(start())
+    found = starts.found(LINE, 2)
+    assert found is not None
+    mine = starts.taken_over(found, "TCP:Gateway", "panel")
+    starts.begin(mine)
+    assert starts.found(LINE, 2) is None
+    assert (mine.wall, mine.pid) == (found.wall, os.getpid())
+    starts.note_stop("TCP:Gateway", 2)
+    assert starts.close(PATIENCE)
+    assert files(starts) == []
+
+
+def test_a_rest_read_before_the_run_frame_does_not_take_the_record(starts: Starts) -> None:
+    starts.begin(start(os.getpid()))
+    starts.end(LINE, 2)
+    read = time.monotonic()
+    starts.sent(LINE, 2)
+    starts.end(LINE, 2, seen=read)
+    assert starts.close(PATIENCE)
+    assert len(files(starts)) == 1
+    starts.end(LINE, 2)
+    assert starts.close(PATIENCE)
+    assert files(starts) == []
+
+
+def test_a_start_after_an_end_stays(starts: Starts, hung: threading.Event) -> None:
+    starts.begin(start())
+    starts.sent(LINE, 2)
+    hung.clear()
+    starts.end(LINE, 2)
+    assert starts.found(LINE, 2) is None, "it is on its way out"
+    with ThreadPoolExecutor(1) as pool:
+        begun = pool.submit(starts.begin, start(name="again"), PATIENCE)
+        hung.set()
+        begun.result(PATIENCE)
+    found = starts.found(LINE, 2)
+    assert found is not None
+    assert found.name == "again"
+
+
+@pytest.mark.parametrize("nothing", ["end", "note_stop"])
+def test_a_hung_disk_holds_up_no_stop(starts: Starts, hung: threading.Event, nothing: str) -> None:
+    starts.begin(start())
+    starts.sent(LINE, 2)
+    hung.clear()
+    for _ in range(1000):
+        getattr(starts, nothing)(LINE, 2)
+        getattr(starts, nothing)(LINE, 3)
+    assert len(starts._waiting) <= 2
+    assert not starts.close(0.01)
+    hung.set()
+    assert starts.close(PATIENCE)
+    assert files(starts) == []
+
+
+def test_a_hung_disk_refuses_a_start_and_leaves_none(starts: Starts, hung: threading.Event) -> None:
+    starts.folder.mkdir(parents=True)
+    hung.clear()
+    for _ in range(3):
+        with pytest.raises(StartNotRecorded, match=r"the disk did not answer within 0\.01 s"):
+            starts.begin(start(), 0.01)
+    assert not starts._waiting
+    hung.set()
+    assert starts.close(PATIENCE)
+    assert [*starts.folder.iterdir()] == []
+
+
+def test_a_refused_start_keeps_the_one_of_the_motor_that_runs(
+    starts: Starts, hung: threading.Event
+) -> None:
+    starts.begin(start(name="first"))
+    starts.sent(LINE, 2)
+    hung.clear()
+    with pytest.raises(StartNotRecorded):
+        starts.begin(start(name="second"), 0.01)
+    hung.set()
+    assert starts.close(PATIENCE)
+    found = starts.found(LINE, 2)
+    assert found is not None
+    assert found.name == "first"
+    starts.end(LINE, 2)
+    assert starts.close(PATIENCE)
+    assert files(starts) == [], "its standstill counts as before"
+
+
+@pytest.mark.parametrize("ahead", [None, "tcp:elsewhere"], ids=["written", "waiting"])
+def test_a_stop_overtakes_a_start_that_is_being_recorded(
+    starts: Starts, hung: threading.Event, ahead: str | None
+) -> None:
+    starts.folder.mkdir(parents=True)
+    hung.clear()
+    with ThreadPoolExecutor(2) as pool:
+        if ahead:
+            first = pool.submit(starts.begin, start(line=ahead), PATIENCE)
+            wait_until(lambda: starts._current is not None, "the disk at work")
+        begun = pool.submit(starts.begin, start(), PATIENCE)
+        wait_until(
+            lambda: bool(starts._waiting if ahead else starts._current), "the start on its way"
+        )
+        starts.note_stop(LINE, 2)
+        with pytest.raises(StartOvertaken, match="A stop of drive 2 came before its start"):
+            begun.result(PATIENCE)
+        hung.set()
+        if ahead:
+            first.result(PATIENCE)
+    assert starts.close(PATIENCE)
+    assert len(files(starts)) == (1 if ahead else 0)
+    starts.begin(start())
+    assert starts.found(LINE, 2) is not None
+
+
+def test_a_rest_seen_while_a_start_is_recorded_does_not_refuse_it(
+    starts: Starts, hung: threading.Event
+) -> None:
+    hung.clear()
+    with ThreadPoolExecutor(1) as pool:
+        begun = pool.submit(starts.begin, start(), PATIENCE)
+        wait_until(lambda: starts._current is not None, "the disk at work")
+        starts.end(LINE, 2)
+        hung.set()
+        begun.result(PATIENCE)
+    assert starts.found(LINE, 2) is not None
+
+
+def a_file(folder: Path) -> Path:
+    folder.write_text("no folder")
+    return folder
+
+
+@pytest.mark.parametrize(
+    "place", [a_file, lambda _: Path("/proc/self"), lambda _: Path("/dev/full")]
+)
+def test_a_folder_that_cannot_be_written_refuses_the_start(
+    tmp_path: Path, place: Callable[[Path], Path]
+) -> None:
+    starts = Starts(place(tmp_path / "place"), MadeUp())
+    with pytest.raises(StartNotRecorded) as caught:
+        starts.begin(start(), PATIENCE)
+    assert str(caught.value).startswith(f"The start of drive 2 was not recorded in {starts.folder}")
+    assert "DRIVEPANEL_STATE" in str(caught.value)
+    starts.end(LINE, 2)
+    starts.note_stop(LINE, 2)
+    assert starts.found(LINE, 2) is None
+    assert starts.close(PATIENCE)
+
+
+def test_a_full_disk_refuses_the_start_and_leaves_nothing(
+    starts: Starts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(_: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    starts.begin(start(name="first"))
+    with monkeypatch.context() as patch:
+        patch.setattr(os, "fsync", full)
+        with pytest.raises(StartNotRecorded, match="No space left on device"):
+            starts.begin(start(name="second"), PATIENCE)
+    found = starts.found(LINE, 2)
+    assert found is not None
+    assert found.name == "first"
+    assert [file.suffix for file in starts.folder.iterdir()] == [".json"]
+
+
+def test_it_is_flushed_before_it_has_its_name(
+    starts: Starts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen: list[list[str]] = []
+    starts.folder.mkdir(parents=True)
+    monkeypatch.setattr(
+        os, "fsync", lambda _: seen.append([file.suffix for file in starts.folder.iterdir()])
+    )
+    starts.begin(start(), PATIENCE)
+    assert seen == [[".part"], [".json"]], "the file, then the folder"
+
+
+def test_no_thread_refuses_a_start_and_a_stop_goes_on(
+    starts: Starts, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    starts.begin(start())
+    assert starts.close(PATIENCE)
+
+    def none_left(_: threading.Thread) -> None:
+        raise RuntimeError("can't start new thread")
+
+    with monkeypatch.context() as patch:
+        patch.setattr(threading.Thread, "start", none_left)
+        starts.note_stop(LINE, 2)
+        with pytest.raises(StartNotRecorded, match="can't start new thread"):
+            starts.begin(start(), PATIENCE)
+    assert starts.found(LINE, 2) is None, "its stop is not forgotten"
+    starts.note_stop(LINE, 2)
+    assert starts.close(PATIENCE)
+    assert files(starts) == []
+
+
+@pytest.mark.parametrize(
+    "text", [b"", b"{", b"[]", b'{"line": "tcp:gateway"}', b"\xff\xfe", b'{"line": 3}']
+)
+def test_a_damaged_file_is_set_aside(
+    starts: Starts, text: bytes, caplog: pytest.LogCaptureFixture
+) -> None:
+    starts.begin(start())
+    (file,) = files(starts)
+    file.write_bytes(text)
+    with caplog.at_level(logging.ERROR, logger="drivepanel"):
+        assert starts.found(LINE, 2) is None
+    assert "is damaged and set aside" in caplog.text
+    assert file.with_suffix(".damaged").read_bytes() == text
+    starts.begin(start(ENDED + 1))
+    assert starts.found(LINE, 2) is not None
+
+
+def test_what_is_no_record_is_left_alone(starts: Starts) -> None:
+    starts.begin(start())
+    (starts.folder / "folder.json").mkdir()
+    (starts.folder / "notes.txt").write_text("mine")
+    starts.note_stop(LINE, 2)
+    assert starts.close(PATIENCE)
+    assert sorted(file.name for file in starts.folder.iterdir()) == ["folder.json", "notes.txt"]
+
+
+def test_it_lies_in_the_state_folder(tmp_path: Path) -> None:
+    assert Starts().folder == tmp_path / "state" / "starts"
+
+
+def test_a_record_names_this_program() -> None:
+    record = Starts().record(LINE, IDENTITY, "atv71", "reverse", program="run", left_running=True)
+    here = Processes()
+    assert (record.pid, record.boot_id) == (os.getpid(), here.boot_id())
+    assert record.started == here.started(os.getpid())
+    assert (record.order, record.left_running, record.program) == ("reverse", True, "run")
+    assert record.begun is not None
+
+
+DRIVES = st.tuples(st.sampled_from(["tcp:one", "TCP:One:502", "tcp:two"]), st.integers(1, 2))
+STEPS = st.one_of(
+    st.tuples(st.just("begin"), DRIVES, st.sampled_from([os.getpid(), LIVING, ENDED, ENDED + 1])),
+    st.tuples(st.sampled_from(["sent", "end", "note_stop", "close"]), DRIVES, st.just(0)),
+)
+Drive = tuple[str, int]
+
+
+class Model:
+    """Starts without disk and threads: who started which drive, in order."""
+
+    def __init__(self) -> None:
+        self.begun: dict[tuple[Drive, int], int] = {}
+        self.under_way: set[Drive] = set()
+
+    def begin(self, drive: Drive, pid: int, number: int) -> None:
+        self.begun[drive, pid] = number
+        self.under_way.add(drive)
+
+    def remove(self, drive: Drive) -> None:
+        self.under_way.discard(drive)
+        gone = [one for one in self._of(drive) if one[1] != LIVING]
+        self.begun = {one: number for one, number in self.begun.items() if one not in gone}
+
+    def found(self, drive: Drive) -> int | None:
+        mine = self._of(drive)
+        if any(pid in (LIVING, os.getpid()) for _, pid in mine):
+            return None
+        return max((self.begun[one] for one in mine), default=None)
+
+    def _of(self, drive: Drive) -> list[tuple[Drive, int]]:
+        key = (line_key(drive[0]), drive[1])
+        return [one for one in self.begun if (line_key(one[0][0]), one[0][1]) == key]
+
+
+@settings(max_examples=60)
+@given(st.lists(STEPS, max_size=14))
+def test_any_order_of_calls(steps: list[tuple[str, Drive, int]]) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        starts, model = Starts(Path(folder), MadeUp()), Model()
+        for number, (word, drive, pid) in enumerate(steps):
+            line, device = drive
+            if word == "begin":
+                wall = f"2026-03-05T17:{number:02}:00+01:00"
+                starts.begin(start(pid, line, device, name=str(number), wall=wall), PATIENCE)
+                model.begin(drive, pid, number)
+            elif word == "close":
+                assert starts.close(PATIENCE)
+            else:
+                getattr(starts, word)(line, device)
+                if word == "sent":
+                    model.under_way.discard(drive)
+                elif word == "note_stop" or drive not in model.under_way:
+                    model.remove(drive)
+            found = starts.found(line, device)
+            wanted = model.found(drive)
+            assert (found and found.name) == (None if wanted is None else str(wanted))
+        assert starts.close(PATIENCE)
+        assert len(files(starts)) == len(model.begun)
