@@ -108,7 +108,8 @@ async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]
     app = DrivePanelApp(open_line=opener, start=text, read_only=read_only)
     try:
         async with app.run_test(size=(80, 24)) as pilot:
-            await until(pilot, lambda: len(app.connection.found) == len(families))
+            # a drive is listed once it has its profile; Enter before that is for nobody
+            await until(pilot, lambda: app.connection.drives.option_count == len(families))
             drives = app.connection.query_one("#drives", OptionList)
             drives.focus()
             drives.highlighted = 0

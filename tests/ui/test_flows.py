@@ -52,7 +52,8 @@ def shown(app: DrivePanelApp, part: str) -> str:
 
 
 async def to_monitor(app: DrivePanelApp, pilot: Pilot[None], device: int) -> MonitorScreen:
-    await until(pilot, lambda: len(app.connection.found) == len(DRIVES))
+    # a drive is listed once it has its profile; Enter before that is for nobody
+    await until(pilot, lambda: app.connection.drives.option_count == len(DRIVES))
     drives = app.connection.query_one("#drives", OptionList)
     drives.focus()
     drives.highlighted = sorted(app.connection.found).index(device)
