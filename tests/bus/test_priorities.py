@@ -49,6 +49,31 @@ async def test_urgent_requests_overtake(open_line: OpenLine) -> None:
         assert [request[3] for request in peer.requests] == [50, 0, 1, 2, 3, 4, 5]
 
 
+@pytest.mark.parametrize("function", [6, 16, 23])
+async def test_a_write_that_became_forbidden_while_it_waited_is_not_sent(
+    open_line: OpenLine, function: int
+) -> None:
+    with PtyPeer(slow) as peer:
+        line = open_line(peer.path)
+        before = asyncio.create_task(line.read(1, 50))
+        await asyncio.to_thread(peer.await_requests, 1)
+        why = [""]
+        if function == 23:
+            work: Awaitable[object] = line.read_write(1, 60, 1, 99, [7], forbidden=lambda: why[0])
+        else:
+            work = line.write(1, 99, [7], multiple=function == 16, forbidden=lambda: why[0])
+        waiting = asyncio.ensure_future(work)
+        await asyncio.sleep(0.02)
+        why[0] = "A stop came."
+        with pytest.raises(RequestRefused, match=r"^A stop came\.$"):
+            await waiting
+        await before
+        # the next one is asked anew
+        why[0] = ""
+        await line.write(1, 99, [8], forbidden=lambda: why[0])
+        assert [request[1] for request in peer.requests] == [3, 6]
+
+
 async def test_stop_waits_for_the_exchange_in_flight_only(open_line: OpenLine) -> None:
     def silent_for_reads(request: bytes, _count: int) -> Sequence[Step]:
         return [reply(request)] if request[1] == 6 else []

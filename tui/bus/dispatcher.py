@@ -13,6 +13,7 @@ from .errors import (
     LineError,
     LineLost,
     NoAnswer,
+    RequestRefused,
     WrongReply,
 )
 from .jobs import Answer, Job, JobQueue
@@ -117,6 +118,9 @@ class Dispatcher:
         if not job.begun and not job.answer.set_running_or_notify_cancel():
             return
         job.begun = True
+        if job.forbidden is not None and (why := job.forbidden()):
+            job.fail(RequestRefused(why))
+            return
         begun = self._clock()
         try:
             outcome = await master.exchange(self._sending(job))

@@ -40,6 +40,8 @@ class Job:
     """Place among the jobs of its priority; kept when it is sent again."""
     replaceable: bool = False
     """Whether a newer write of the same register may take its place while it waits."""
+    forbidden: Callable[[], str] | None = None
+    """Asked just before it is sent: why it must not be any more, or empty."""
 
     def __post_init__(self) -> None:
         # made now, in the thread of the one who asks: the line's own has a silence to keep

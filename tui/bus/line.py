@@ -143,17 +143,21 @@ class Line:
         priority: Priority = Priority.OPERATOR_WRITE,
         multiple: bool | None = None,
         replaceable: bool = False,
+        forbidden: Callable[[], str] | None = None,
     ) -> float:
         """Write registers, once; returns when the answer came (line's clock, seconds).
 
         One word goes by function 6 and more by 16, unless `multiple` says which; a device with
         only one of them gets that. The answer alone proves little: read back. A `replaceable`
         write (a reference, never a command) raises Superseded without having been sent when a
-        newer one of the same register came while it waited.
+        newer one of the same register came while it waited. `forbidden` is asked in the line's
+        thread just before the frame goes out; where it gives a reason, RequestRefused is raised
+        in its place.
         """
         limits = self._devices[device].limits
         request = _write(device, address, values, multiple, limits.functions)
-        return (await self._ask(request, priority, replaceable=replaceable)).time
+        answer = await self._ask(request, priority, replaceable=replaceable, forbidden=forbidden)
+        return answer.time
 
     async def read_write(
         self,
@@ -164,10 +168,11 @@ class Line:
         values: Sequence[int],
         *,
         priority: Priority = Priority.OPERATOR_WRITE,
+        forbidden: Callable[[], str] | None = None,
     ) -> Reply:
-        """Write registers, then read `count` others, by function 23, once."""
+        """Write registers, then read `count` others, by function 23, once; see `write`."""
         request = ReadWrite(device, read_address, count, write_address, tuple(values))
-        answer = await self._ask(request, priority)
+        answer = await self._ask(request, priority, forbidden=forbidden)
         return Reply(words_of(answer.pdu), answer.time)
 
     async def diagnose(
@@ -231,13 +236,14 @@ class Line:
         limits: Limits | None = None,
         *,
         replaceable: bool = False,
+        forbidden: Callable[[], str] | None = None,
     ) -> Answer:
         """Check a request, queue it, await its answer."""
         limits = limits or self._devices[request.device].limits
         reason = refusal(request, limits, read_only=self.read_only)
         if reason:
             raise RequestRefused(reason)
-        job = Job(request, priority, limits, replaceable=replaceable)
+        job = Job(request, priority, limits, replaceable=replaceable, forbidden=forbidden)
         self._engine.submit(job)
         return await asyncio.wrap_future(job.answer)
 
