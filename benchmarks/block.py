@@ -27,9 +27,9 @@ from tui.drive.mapping_wire import cost
 from tui.drive.profile import Profile
 from tui.drive.read_plan import WireTiming
 from tui.drive.schema import Block
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.lines import open_line
-from tui.session.monitor import Snapshot, rates_of
+from tui.session.monitor import Monitor, Snapshot, rates_of
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 EIGHT = ("ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT")
@@ -99,16 +99,16 @@ async def measured(
     simulation = Simulation([DriveSpec(family, 1, sets=slots, run_hz=RUN_HZ)], timing=line_timing)
     simulation.start()
     opened = open_line(f"serial:{simulation.serve_pty()},{baud},8N1", wait=5.0)
-    session = DriveSession(opened.line, 1, profile)
+    monitor = Monitor(DriveSession(opened.line, 1, profile))
     taken: list[Snapshot] = []
-    session.monitor.listen(taken.append)
+    monitor.listen(taken.append)
     try:
-        session.monitor.start(list(codes), period=0.05)
-        await _settled(session, codes, counted.microseconds / 1e6)
+        monitor.start(list(codes), period=0.05)
+        await _settled(monitor, codes, counted.microseconds / 1e6)
         taken.clear()
         await asyncio.sleep(seconds)
     finally:
-        session.close()
+        monitor.stop()
         opened.close()
         simulation.stop()
     good = [one for one in taken if not one.error]
@@ -127,13 +127,13 @@ async def measured(
     )
 
 
-async def _settled(session: DriveSession, codes: Sequence[str], design: float) -> None:
+async def _settled(monitor: Monitor, codes: Sequence[str], design: float) -> None:
     """Wait until the monitor knows the drive's turnaround, and uses all that it is to use."""
     end = time.monotonic() + PROVED_WITHIN
     while time.monotonic() < end:
-        latest = session.monitor.latest
+        latest = monitor.latest
         warm = latest is not None and latest.cycle > WARM
-        if warm and session.monitor.reader.seconds(codes) <= design * AS_DESIGNED:
+        if warm and monitor.reader.seconds(codes) <= design * AS_DESIGNED:
             return
         await asyncio.sleep(0.05)
 

@@ -28,8 +28,8 @@ from tui.bus.line import Line
 from tui.bus.link import parse_link
 from tui.drive.library import load
 from tui.drive.read_plan import WireTiming, plan_reads
-from tui.session.drive_session import DriveSession
-from tui.session.monitor import monitoring_codes
+from tui.session.drive import DriveSession
+from tui.session.monitor import Monitor, monitoring_codes
 from tui.simulator import LineTiming
 
 FAMILIES = ("atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca")
@@ -58,20 +58,20 @@ def watch() -> None:
     line = Line(parse_link(first["text"]))
     line.open(wait=5.0)
     drives = {int(address): family for address, family in first["drives"].items()}
-    sessions = {a: DriveSession(line, a, load(family)) for a, family in drives.items()}
-    for session in sessions.values():
-        session.monitor.start(period=first["period"])
+    monitors = {a: Monitor(DriveSession(line, a, load(one))) for a, one in drives.items()}
+    for monitor in monitors.values():
+        monitor.start(period=first["period"])
     print(json.dumps({}), flush=True)
     seconds = json.loads(sys.stdin.readline())["seconds"]
-    before = _state(line, sessions)
+    before = _state(line, monitors)
     time.sleep(seconds)
-    print(json.dumps({"before": before, "after": _state(line, sessions)}), flush=True)
+    print(json.dumps({"before": before, "after": _state(line, monitors)}), flush=True)
     line.close()
 
 
-def _state(line: Line, sessions: Mapping[int, DriveSession]) -> dict[str, object]:
+def _state(line: Line, monitors: Mapping[int, Monitor]) -> dict[str, object]:
     used = resource.getrusage(resource.RUSAGE_SELF)
-    latest = {address: session.monitor.latest for address, session in sessions.items()}
+    latest = {address: monitor.latest for address, monitor in monitors.items()}
     return {
         "time": time.monotonic(),
         "cpu": used.ru_utime + used.ru_stime,

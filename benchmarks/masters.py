@@ -65,12 +65,13 @@ def contest() -> None:
 def _reader(job: dict[str, Any]) -> dict[str, object]:
     from tui.bus.line import Line
     from tui.bus.link import parse_link
+    from tui.session.drive import DriveSession
     from tui.session.reader import Reader
 
     profile = load(job["family"])
     line = Line(parse_link(job["text"]))
     line.open(wait=5.0)
-    reader = Reader(line, DEVICE, profile)
+    reader = Reader(DriveSession(line, DEVICE, profile))
     codes = monitoring_codes(profile)
     ends: list[float] = []
     done = threading.Event()
@@ -135,14 +136,14 @@ def _minimalmodbus(job: dict[str, Any]) -> dict[str, object]:
 def panel() -> None:
     """The whole panel, watching one drive as fast as it can; cycle ends go to a pipe."""
     from tui.app import DrivePanelApp
-    from tui.session.drive_session import DriveSession
+    from tui.session.console import DriveConsole
 
     text, pipe = sys.argv[1], int(sys.argv[2])
 
     class Watched(DrivePanelApp):
-        def show_monitor(self, session: DriveSession) -> None:
-            session.monitor.listen(lambda _: _tell(pipe))
-            super().show_monitor(session)
+        def show_monitor(self, console: DriveConsole) -> None:
+            console.monitor.listen(lambda _: _tell(pipe))
+            super().show_monitor(console)
 
     app = Watched(start=text, device=DEVICE)
     app.period = SHORTEST_PERIOD

@@ -37,9 +37,10 @@ from tui.bus.errors import LineError
 from tui.bus.line import Line
 from tui.bus.link import parse_link
 from tui.drive.library import load
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.keeper import Keeper
-from tui.session.monitor import Snapshot
+from tui.session.monitor import Monitor, Snapshot
+from tui.session.reader import Reader
 from tui.session.readings import Reading
 
 PERIOD = 0.5
@@ -97,21 +98,23 @@ class Watched:
             device: DriveSession(self.line, device, load(FAMILIES[device]))
             for device in served.devices
         }
+        self._monitors = {d: Monitor(session) for d, session in self._sessions.items()}
         self._keeper = Keeper(self.line)
 
     def start(self) -> None:
         """Open the line and watch all drives."""
         self.line.open(wait=5.0)
         for device, session in self._sessions.items():
-            self._keeper.keep(session)
-            session.monitor.listen(partial(self._see, device))
+            monitor = self._monitors[device]
+            self._keeper.keep(session, monitor)
+            monitor.listen(partial(self._see, device))
             own = sorted(self._values[device])
-            session.monitor.start(period=PERIOD, extra=self._chance.sample(own, EXTRAS))
+            monitor.start(period=PERIOD, extra=self._chance.sample(own, EXTRAS))
 
     def close(self) -> None:
         """Let the drives go and close the line."""
-        for session in self._sessions.values():
-            session.close()
+        for monitor in self._monitors.values():
+            monitor.stop()
         self._keeper.stop()
         self.line.close()
 
@@ -174,7 +177,7 @@ class Watched:
         self.tally.operator_reads += 1
         try:
             async with asyncio.timeout(limit):
-                found = await self._sessions[device].read(codes)
+                found = await Reader(self._sessions[device]).read(codes)
         except TimeoutError:
             self.tally.given_up += 1
         except LineError as error:

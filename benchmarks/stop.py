@@ -67,7 +67,9 @@ def panel() -> None:
     from tui.bus.line import Priority
     from tui.drive.errors import DriveError
     from tui.drive.library import load
-    from tui.session.drive_session import DriveSession
+    from tui.session.console import DriveConsole
+    from tui.session.drive import DriveSession
+    from tui.session.monitor import Monitor
     from tui.session.reader import Reader
 
     text, drives, own_keys = sys.argv[1], json.loads(sys.argv[2]), sys.argv[3] == "own"
@@ -77,13 +79,14 @@ def panel() -> None:
             found = super().get_driver_class()
             return found if own_keys else found.__base__  # type: ignore[return-value]
 
-        def show_monitor(self, session: DriveSession) -> None:
-            super().show_monitor(session)
+        def show_monitor(self, console: DriveConsole) -> None:
+            super().show_monitor(console)
+            session = console.session
             for device, family in drives.items():
                 if int(device) != session.device:
                     other = DriveSession(session.line, int(device), load(family))
-                    other.monitor.start(period=0.1)
-            reader = Reader(session.line, session.device, session.profile)
+                    Monitor(other).start(period=0.1)
+            reader = Reader(session)
 
             async def upload() -> None:
                 codes = [p.code for p in session.profile.parameters if p.access != "w"]

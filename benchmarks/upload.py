@@ -28,7 +28,7 @@ from tui.drive.profile import Profile
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.values import word_count
 from tui.session.asking import neighbours
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.upload import Upload, readable_codes
 from tui.simulator import LineTiming
 
@@ -54,8 +54,8 @@ def measure(wire: WireLine, family: str, baud: int) -> dict[str, Any]:
     gaps = record.gaps()
     return {
         "seconds": seconds,
-        "read": len(upload.asker.raws),
-        "refused": len(upload.asker.absent),
+        "read": len(upload.raws),
+        "refused": len(upload.absent),
         "requests": len(record.exchanges),
         "same_requests": record.least(),
         "smallest_silence": min(gaps) / wire.times.silence,

@@ -66,9 +66,11 @@ async def _run(size: tuple[int, int]) -> None:
         app.save_screenshot(f"{name}-{size[0]}x{size[1]}.svg", str(HERE))
 
     async with app.run_test(size=size) as pilot:
-        known = app.connection.found
-        await until(pilot, lambda: len(known) == len(DRIVES))
-        await until(pilot, lambda: all(d.state not in ("", "asking") for d in known.values()))
+        await until(pilot, lambda: len(app.connection.found) == len(DRIVES))
+        fleet = app.fleet
+        if fleet is None:
+            raise RuntimeError("drives were found on no line")
+        await until(pilot, lambda: len(fleet.keeper.looks) == len(DRIVES))
         await pilot.pause(1.0)
         save("connection")
         await pilot.press(*["down"] * (WATCHED - 1), "enter")

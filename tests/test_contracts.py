@@ -217,8 +217,7 @@ def test_values_become_text_in_one_place() -> None:
                 continue
             if any(name.name == "decode" for name in node.names):
                 found.add(path.relative_to(ROOT / "tui").as_posix())
-    # the writer does not ask for scale sources yet
-    assert found - {"session/writing.py"} == {"drive/shown.py"}
+    assert found == {"drive/shown.py"}
 
 
 def test_nothing_in_the_project_names_this_machine() -> None:

@@ -31,14 +31,11 @@ from .screens.stop_keys import STOP_ALL_ANYWHERE, STOP_ANYWHERE, STOP_OUTSIDE_TE
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
-    from tui.session.command import Commander
-    from tui.session.drive_session import DriveSession
-    from tui.session.editor import Editor
-    from tui.session.fault_record import Recorder
+    from tui.session.console import DriveConsole
+    from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.keeper import Keeper
-    from tui.session.mapping_desk import MappingDesk
-    from tui.session.stop import Stopper, StopSummary
+    from tui.session.stop import StopSummary
 
 log = logging.getLogger(__name__)
 
@@ -87,8 +84,7 @@ class DrivePanelApp(LeanApp, Leaving):
         self.low_bandwidth = low_bandwidth
         self.period = 0.5
         self.opened: OpenLine | None = None
-        self.keeper: Keeper | None = None
-        self.stopper: Stopper | None = None
+        self.fleet: Fleet | None = None
         self.connection = ConnectionScreen()
         self._open = open_line
         self._start = start
@@ -101,10 +97,6 @@ class DrivePanelApp(LeanApp, Leaving):
         self._hungry: set[int] = set()
         self._told: StopSummary | None = None
         self._journal: Journal | None = None
-        self._commanders: dict[int, Commander] = {}
-        self._recorders: dict[int, Recorder] = {}
-        self.editors: dict[int, Editor] = {}
-        self.desks: dict[int, MappingDesk] = {}
 
     @property
     def journal(self) -> Journal:
@@ -151,24 +143,13 @@ class DrivePanelApp(LeanApp, Leaving):
         self._stop(everything=True)
 
     def _stop(self, *, everything: bool) -> None:
-        stopper = self.stopper
-        if stopper is None:
+        fleet = self.fleet
+        if fleet is None:
             return
-        sessions = [found.session for found in self.connection.found.values() if found.session]
-        if not everything:
-            sessions = self._shown(sessions)
+        sessions = fleet.sessions if everything else self._shown(fleet)
         if sessions:
             with suppress(LineClosed):
-                stopper.stop(sessions)
-
-    def commander(self, session: DriveSession) -> Commander:
-        """What commands a drive of the open line."""
-        from tui.session.command import Commander
-
-        known = self._commanders.get(session.device)
-        if known is None or known.session is not session:
-            known = self._commanders[session.device] = Commander(session, self.journal)
-        return known
+                fleet.stop(sessions)
 
     def follow(self, line: str, device: int) -> None:
         """Open the line anew as a drive now wants it, and watch that drive."""
@@ -176,63 +157,28 @@ class DrivePanelApp(LeanApp, Leaving):
             self.pop_screen()
         self.connection.start(line, device)
 
-    def session_at(self, device: int) -> DriveSession | None:
-        """The drive found at an address of the open line, or None."""
-        found = self.connection.found.get(device)
-        return found.session if found else None
-
-    def editor(self, session: DriveSession) -> Editor:
-        """What edits the parameters of a drive of the open line."""
-        from tui.session.editor import Editor
-
-        known = self.editors.get(session.device)
-        if known is None or known.session is not session:
-            known = self.editors[session.device] = Editor(session, self.journal)
-        return known
-
-    def mapping_desk(self, session: DriveSession) -> MappingDesk:
-        """What proposes and writes the blocks of a drive of the open line."""
-        from tui.session.mapping_desk import MappingDesk
-
-        known = self.desks.get(session.device)
-        if known is None or known.session is not session:
-            known = self.desks[session.device] = MappingDesk(session, self.journal)
-        return known
-
-    def recorder(self, session: DriveSession) -> Recorder:
-        """What keeps the seconds before a trip of a drive of the open line."""
-        from tui.session.fault_record import Recorder
-
-        known = self._recorders.get(session.device)
-        if known is None or known.session is not session:
-            known = self._recorders[session.device] = Recorder(session, self.journal)
-            session.monitor.listen(known.take)
-        return known
-
-    def stop_drive(self, session: DriveSession, order: OrderId) -> None:
+    def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
         """Stop one drive, in its own way."""
-        if self.stopper is not None:
+        if self.fleet is not None:
             with suppress(LineClosed):
-                self.stopper.stop([session], order)
+                self.fleet.stop([console.session], order)
 
     async def on_event(self, event: Event) -> None:
         """A key keeps an armed drive armed; the next one waits for it."""
         if isinstance(event, Key) and not event.is_forwarded:
             if not self._keys.admit(event):
                 return
-            for commander in self._commanders.values():
-                commander.touch()
+            for session in self.fleet.sessions if self.fleet else ():
+                session.arming.touch()
         await super().on_event(event)
 
-    def _shown(self, found: list[DriveSession]) -> list[DriveSession]:
+    def _shown(self, fleet: Fleet) -> list[DriveSession]:
         """The drive whose screen is open; without one those commanded from here, else all."""
-        from tui.session.drive_session import DriveSession
-
         for screen in reversed(self.screen_stack):
-            session = getattr(screen, "session", None)
-            if isinstance(session, DriveSession):
-                return [session]
-        return [session for session in found if session.commanded] or found
+            console = getattr(screen, "console", None)
+            if console is not None:
+                return [console.session]
+        return fleet.commanded or fleet.sessions
 
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
@@ -246,7 +192,7 @@ class DrivePanelApp(LeanApp, Leaving):
 
     def _tell_hunger(self) -> None:
         """Tell of a drive that is about to act because it was not asked in time."""
-        hungry = self.keeper.hungry() if self.keeper else []
+        hungry = self.fleet.keeper.hungry() if self.fleet else []
         for one in hungry:
             if one.device not in self._hungry and one.left > 0:
                 does = f": {one.watch.reaction.does}" if one.watch.reaction else "."
@@ -260,7 +206,7 @@ class DrivePanelApp(LeanApp, Leaving):
 
     def _tell_stops(self) -> None:
         """Tell what the last stop has come to where the screen on top does not show it."""
-        reports = list(self.stopper.reports.values()) if self.stopper else []
+        reports = list(self.fleet.stopper.reports.values()) if self.fleet else []
         if not reports:
             return
         from tui.session.stop import StopSummary
@@ -270,8 +216,8 @@ class DrivePanelApp(LeanApp, Leaving):
         if stop == self._told:
             return
         before, self._told = self._told, stop
-        session = getattr(self.screen, "session", None)
-        if session is not None and {session.device} == {r.device for r in stop.reports}:
+        console = getattr(self.screen, "console", None)
+        if console is not None and {console.device} == {r.device for r in stop.reports}:
             return
         if self.screen is self.connection:
             self.connection.say(stop.head, stop.text, "error" if stop.failed else "alarm")
@@ -310,12 +256,12 @@ class DrivePanelApp(LeanApp, Leaving):
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
-        self._commanders, self._recorders, self.editors, self.desks = {}, {}, {}, {}
-        from tui.session.keeper import Keeper
-        from tui.session.stop import Stopper
+        from tui.session.fleet import Fleet
+        from tui.session.recording import StartKeeper
 
-        self.keeper = Keeper(self.opened.line)
-        self.stopper = Stopper(self.opened.line, self.journal)
+        # the motors of a simulated line end with it
+        starts = StartKeeper("panel") if self.opened.simulation is None else None
+        self.fleet = Fleet(self.opened.line, self.journal, starts)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 
@@ -324,8 +270,7 @@ class DrivePanelApp(LeanApp, Leaving):
         opened = self._open(text, read_only=self.read_only, wait=CONNECT_WITHIN)
         # here, where nobody waits for a key: what the loop asks for next
         import tui.screens.monitor
-        import tui.session.keeper
-        import tui.session.stop  # noqa: F401
+        import tui.session.fleet  # noqa: F401
 
         if self._gone:
             opened.close()
@@ -334,29 +279,31 @@ class DrivePanelApp(LeanApp, Leaving):
 
     async def disconnect(self) -> None:
         """Close the open line, if there is one."""
-        opened, self.opened, self.keeper, self.stopper = self.opened, None, None, None
+        opened, self.opened = self.opened, None
+        fleet, self.fleet = self.fleet, None
         if opened is not None:
             await asyncio.to_thread(opened.close)
+            if fleet is not None and fleet.starts is not None:
+                await asyncio.to_thread(fleet.starts.close)
             log.info("closed %s", opened.label)
 
-    def show_monitor(self, session: DriveSession) -> None:
+    def show_monitor(self, console: DriveConsole) -> None:
         """Show Monitor on a drive."""
         from .screens.monitor import MonitorScreen
 
-        log.info("watching device %s, %s", session.device, session.profile.id)
-        self.push_screen(MonitorScreen(session))
+        log.info("watching device %s, %s", console.device, console.session.profile.id)
+        self.push_screen(MonitorScreen(console))
 
     def step_drive(self, device: int, step: int) -> None:
         """Monitor on the next or previous drive found on the line."""
         from .screens.monitor import MonitorScreen
 
-        drives = sorted(d for d, found in self.connection.found.items() if found.session)
-        if len(drives) < 2 or device not in drives:
+        consoles = self.fleet.consoles if self.fleet else []
+        at = next((at for at, one in enumerate(consoles) if one.device == device), None)
+        if len(consoles) < 2 or at is None:
             self.notify("This is the only drive found on the line.", timeout=3)
             return
-        found = self.connection.found[drives[(drives.index(device) + step) % len(drives)]]
-        if found.session is not None:
-            self.switch_screen(MonitorScreen(found.session))
+        self.switch_screen(MonitorScreen(consoles[(at + step) % len(consoles)]))
 
     def action_help(self) -> None:
         """Every key of the screen on top."""

@@ -352,6 +352,17 @@ def test_stop_needs_no_arming(way: tuple[str, ...]) -> None:
         assert stands(simulation)
 
 
+def test_4_a_motor_at_0_hz_that_is_still_enabled_is_not_stopped() -> None:
+    """Run at the terminals with reference 0: the next turn of the potentiometer turns it."""
+    with bench(DriveSpec("atv71", 1, sets={"FR1": 1})) as (simulation, line):
+        simulation.drive(1).run(0.0)
+        done = drivepanel("stop", line)
+        assert (done.returncode, done.stdout) == (4, "")
+        assert "Device 1, Altivar 71: NOT STOPPED" in done.stderr
+        assert "0 Hz and is still enabled" in done.stderr
+        assert "Stop it at the machine" in done.stderr
+
+
 def test_stop_all_stops_each() -> None:
     specs = [DriveSpec(one, n, run_hz=20.0) for n, one in enumerate(("atv71", "atv21"), start=1)]
     with bench(*specs) as (simulation, line):

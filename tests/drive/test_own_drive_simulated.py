@@ -11,9 +11,10 @@ from click.testing import CliRunner
 
 from tui.cli.main import main
 from tui.drive import library
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.lines import open_line
+from tui.session.reader import Reader
 from tui.simulator import DriveSpec, SimulatedDrive, Simulation
 
 README = Path(__file__).parents[2] / "profiles" / "README.md"
@@ -73,8 +74,7 @@ async def test_it_is_read_over_a_line_with_its_state(
         opened = open_line(f"tcp:{host}:{port}", wait=5)
         try:
             session = DriveSession(opened.line, ADDRESS, profile)
-            readings = await session.read(["FREQ", "RAMP", "MODE", "STAT", "TRIP"])
-            session.close()
+            readings = await Reader(session).read(["FREQ", "RAMP", "MODE", "STAT", "TRIP"])
         finally:
             opened.close()
     texts = {code: one.value.text for code, one in readings.items() if one.value}

@@ -71,7 +71,17 @@ def node(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> str:
 @pytest.fixture
 def terminal_with(peer: Peer, tmp_path: Path) -> Iterator[Callable[[list[str]], Terminal]]:
     """Opens a terminal in which a command runs."""
-    tmux = (peer("tmux", "tmux"), "-S", str(tmp_path / "tmux"), "-f", os.devnull)
+    yield from _terminals(peer("tmux", "tmux"), tmp_path / "tmux")
+
+
+@pytest.fixture
+def second_terminal(peer: Peer, tmp_path: Path) -> Iterator[Callable[[list[str]], Terminal]]:
+    """The same beside it."""
+    yield from _terminals(peer("tmux", "tmux"), tmp_path / "tmux2")
+
+
+def _terminals(program: str, socket: Path) -> Iterator[Callable[[list[str]], Terminal]]:
+    tmux = (program, "-S", str(socket), "-f", os.devnull)
     started: list[Terminal] = []
 
     def start(command: list[str]) -> Terminal:

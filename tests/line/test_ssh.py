@@ -111,7 +111,7 @@ def test_the_demo_over_ssh(
     terminal.press("Enter")
     terminal.wait_for("ATV71", "device 4", "RUNNING", "Hz")
     terminal.press("q")
-    terminal.wait_for("Leave the panel?", "device 1 after 3 s")
+    terminal.wait_for("Leave the panel?", "Device 1, Altivar 21: left alone it acts 3 s after")
     terminal.press("q")
     pid = int((tmp_path / "pid").read_text())
     wait_until(lambda: not runs(pid), "the panel left on its key")

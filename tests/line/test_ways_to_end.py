@@ -25,6 +25,7 @@ class Running(NamedTuple):
     simulation: Simulation
     terminal: Terminal
     pid: int
+    line: str
 
     @property
     def speed(self) -> float:
@@ -51,7 +52,7 @@ def running(start: Start, *options: str, family: str = "atv71") -> Iterator[Runn
         terminal.press("a", "f", "3", "0", "Enter", "r")
         wait_until(lambda: simulation.drive(1).motor.frequency > 2, "the motor runs")
         terminal.wait_for("RUNNING")
-        yield Running(simulation, terminal, terminal.client())
+        yield Running(simulation, terminal, terminal.client(), line)
     finally:
         simulation.stop()
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from typing import Any
 
 from tui.bus.line import Line, LineStatus
 from tui.bus.link import RtuTcpLink, SerialLink
@@ -14,8 +16,10 @@ from tui.drive.edits import Edits
 from tui.drive.profile import Profile
 from tui.session.applying import Applied, apply_edits
 from tui.session.asking import Asker
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.journal import Journal
+from tui.session.monitor import Monitor
+from tui.session.work import Permit
 from tui.simulator import DriveSpec, FaultRates, Simulation
 from tui.simulator.drive import SimulatedDrive
 
@@ -36,6 +40,12 @@ class Bench:
         """The drive's profile."""
         return self.session.profile
 
+    def permit(self) -> Permit:
+        """The right to write: armed for as long as the test, where the line lets one arm."""
+        if not self.session.line.read_only:
+            self.session.arming.arm(seconds=math.inf)
+        return Permit(self.session.work, self.session.work.stops)
+
     async def stage(self, **typed: str) -> Edits:
         """Edits as typed, against what the drive holds."""
         asker = Asker(self.session)
@@ -48,7 +58,24 @@ class Bench:
 
     async def apply(self, **typed: str) -> Applied:
         """Stage and apply."""
-        return await apply_edits(self.session, self.journal, await self.stage(**typed))
+        return await self.write(await self.stage(**typed))
+
+    async def write(self, edits: Edits, **how: Any) -> Applied:
+        """Apply what was staged, armed."""
+        return await apply_edits(self.session, self.journal, edits, permit=self.permit(), **how)
+
+    def after_writes(self, count: int, then: Callable[[], None]) -> None:
+        """Do something as soon as the drive has answered so many writes from now on."""
+        honest, left = self.session.line.write, [count]
+
+        async def counted(*what: Any, **how: Any) -> float:
+            answered = await honest(*what, **how)
+            left[0] -= 1
+            if left[0] == 0:
+                then()
+            return answered
+
+        self.session.line.write = counted  # type: ignore[method-assign]
 
     def writes(self) -> list[tuple[int, int]]:
         """Registers and words of all writes of one word so far."""
@@ -76,9 +103,9 @@ class Bench:
 SOURCES = {"ramp_increment", "high_speed", "low_speed", "max_frequency"}
 
 
-def state_known(session: DriveSession) -> bool:
+def state_known(monitor: Monitor) -> bool:
     """Whether the drive may be armed; a first cycle may fail on a busy machine."""
-    latest = session.monitor.latest
+    latest = monitor.latest
     return latest is not None and not latest.error and latest.state.kind != "unknown"
 
 

@@ -32,7 +32,7 @@ async def test_edits_are_written_read_back_and_recorded() -> None:
             told.append((done, of, result.text))
 
         edits = await made.stage(ACC="5 s", DEC="7,25")
-        applied = await apply_edits(made.session, made.journal, edits, progress=progress)
+        applied = await made.write(edits, progress=progress)
         assert outcomes(applied) == {"ACC": Outcome.DONE, "DEC": Outcome.DONE}
         assert (made.drive.raw("ACC"), made.drive.raw("DEC")) == (50, 73)
         assert told == [(1, 2, "ACC: 3.0 s -> 5.0 s"), (2, 2, "DEC: 3.0 s -> 7.3 s")]
@@ -72,13 +72,13 @@ async def test_a_change_by_somebody_else_is_not_overwritten() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="7 s")
         made.drive.set("ACC", 90)
-        applied = await apply_edits(made.session, made.journal, edits)
+        applied = await made.write(edits)
         assert outcomes(applied) == {"ACC": Outcome.CHANGED, "DEC": Outcome.DONE}
         assert "was 3.0 s and is now 9.0 s" in text(applied, "ACC")
         assert made.drive.raw("ACC") == 90
         (left,) = applied.left
         assert (left.old, left.new) == (90, 50)
-        again = await apply_edits(made.session, made.journal, applied.left)
+        again = await made.write(applied.left)
         assert outcomes(again) == {"ACC": Outcome.DONE}
         assert made.drive.raw("ACC") == 50
 
@@ -87,7 +87,7 @@ async def test_a_scale_that_somebody_else_changes_is_seen() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.set("INR", 0)
-        applied = await apply_edits(made.session, made.journal, edits)
+        applied = await made.write(edits)
         assert outcomes(applied) == {"ACC": Outcome.CHANGED}
         assert "INR was changed" in text(applied, "ACC")
         assert made.writes() == []
@@ -99,7 +99,7 @@ async def test_what_the_drive_holds_already_is_not_written() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.set("ACC", 50)
-        applied = await apply_edits(made.session, made.journal, edits)
+        applied = await made.write(edits)
         assert outcomes(applied) == {"ACC": Outcome.DONE}
         assert made.writes() == []
 
@@ -112,18 +112,18 @@ async def test_stopped_only_is_checked_against_the_state_of_now() -> None:
         assert "FrS" in applied.left
         made.drive.halt()
         await rest(made)
-        again = await apply_edits(made.session, made.journal, applied.left)
+        again = await made.write(applied.left)
         assert outcomes(again) == {"FrS": Outcome.DONE}
 
 
 async def test_unverified_ones_are_written_once_confirmed() -> None:
     with bench("atv21") as made:
         edits = await made.stage(F111="Forced local")
-        refused = await apply_edits(made.session, made.journal, edits)
+        refused = await made.write(edits)
         assert outcomes(refused) == {"F111": Outcome.REFUSED}
         assert "unverified" in text(refused, "F111")
         assert made.writes() == []
-        done = await apply_edits(made.session, made.journal, refused.left, confirmed={"F111"})
+        done = await made.write(refused.left, confirmed={"F111"})
         assert outcomes(done) == {"F111": Outcome.DONE}
 
 
@@ -131,7 +131,7 @@ async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s", DEC="6 s")
         made.drive.busy = True
-        applied = await apply_edits(made.session, made.journal, edits)
+        applied = await made.write(edits)
         assert outcomes(applied) == {"ACC": Outcome.DRIVE_REFUSED, "DEC": Outcome.DRIVE_REFUSED}
         told = text(applied, "ACC")
         assert "exception 4, Not completed" in told
@@ -148,7 +148,7 @@ async def test_a_protected_parameter_is_not_written_blindly() -> None:
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.registers.protect([made.profile["ACC"]])
-        applied = await apply_edits(made.session, made.journal, edits)
+        applied = await made.write(edits)
         assert outcomes(applied) == {"ACC": Outcome.REFUSED}
         assert "cannot be read" in text(applied, "ACC")
         assert made.writes() == []
@@ -158,7 +158,7 @@ async def test_a_silent_refusal_is_found_by_reading() -> None:
     with bench("powerdrive") as made:
         edits = await made.stage(**{"15.07": "5"})
         made.drive.busy = True
-        applied = await apply_edits(made.session, made.journal, edits)
+        applied = await made.write(edits)
         assert outcomes(applied) == {"15.07": Outcome.NOT_TAKEN}
         assert "refuses by silence" in text(applied, "15.07")
         assert "15.07" in applied.left
@@ -182,7 +182,7 @@ async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
             if done == 1:
                 made.simulation.unplug()
 
-        applied = await apply_edits(made.session, made.journal, edits, progress=progress)
+        applied = await made.write(edits, progress=progress)
         first, *others = applied.results
         assert first.outcome is Outcome.DONE
         assert [result.outcome for result in others] == [Outcome.NOT_SENT] * 2
@@ -191,10 +191,34 @@ async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
         made.simulation.replug()
 
 
+@pytest.mark.parametrize("end", ["a stop", "disarmed"])
+async def test_what_lets_nothing_more_through_ends_it_and_keeps_the_rest(end: str) -> None:
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
+        permit = made.permit()
+
+        def ended() -> None:
+            if end == "a stop":
+                made.session.work.stop("F12")
+            else:
+                made.session.arming.disarm("No key for a minute: no longer armed.")
+
+        made.after_writes(1, ended)
+        applied = await apply_edits(made.session, made.journal, edits, permit=permit)
+        assert [r.outcome for r in applied.results] == [
+            Outcome.DONE, Outcome.NOT_SENT, Outcome.NOT_SENT,
+        ]  # fmt: skip
+        assert {edit.code for edit in applied.left} == {r.edit.code for r in applied.results[1:]}
+        why = "a stop came after it (F12)" if end == "a stop" else "no longer armed"
+        assert why in applied.stopped
+        assert why in applied.results[1].text
+        assert len(made.writes()) == 1
+
+
 async def test_lost_replies_do_not_write_twice_nor_forget() -> None:
     with bench("atv71", faults=FaultRates(lost=0.1)) as made:
         edits = await made.stage(ACC="5 s", DEC="6 s")
-        applied = await apply_edits(made.session, made.journal, edits)
+        applied = await made.write(edits)
         for result in applied.results:
             held = made.drive.raw(result.edit.code)
             assert result.done == (held == result.edit.new), result.text
@@ -207,7 +231,7 @@ async def test_a_read_only_line_writes_nothing() -> None:
     with bench("atv71", read_only=True) as made:
         edits = await made.stage(ACC="5 s")
         with pytest.raises(RequestRefused, match="read-only"):
-            await apply_edits(made.session, made.journal, edits)
+            await made.write(edits)
 
 
 async def test_nobody_answers_before_anything_was_written(
@@ -218,7 +242,7 @@ async def test_nobody_answers_before_anything_was_written(
         edits = await made.stage(ACC="5 s")
         made.drive.power_off()
         with pytest.raises(NoAnswer):
-            await apply_edits(made.session, made.journal, edits)
+            await made.write(edits)
 
 
 # Line settings
@@ -261,7 +285,7 @@ async def test_saved_settings_outlast_a_power_off(family: str) -> None:
         made.drive.power_cycle()
         assert made.drive.raw(code) == 30
         await made.apply(**{code: "5 s"})
-        assert "saved to EEPROM" in await save_to_eeprom(made.session, made.journal)
+        assert "saved to EEPROM" in await save_to_eeprom(made.session, made.journal, made.permit())
         made.drive.power_cycle()
         assert made.drive.raw(code) == 50
         assert made.journal.recent[-1].why == "save to EEPROM"
@@ -271,16 +295,16 @@ async def test_saved_settings_outlast_a_power_off(family: str) -> None:
 async def test_families_without_a_known_order_are_refused_with_words(family: str) -> None:
     with bench(family) as made:
         with pytest.raises(MemoryRefused, match=r"nothing is to be saved|keypad"):
-            await save_to_eeprom(made.session, made.journal)
+            await save_to_eeprom(made.session, made.journal, made.permit())
         with pytest.raises(MemoryRefused, match="keypad"):
-            await factory_reset(made.session, made.journal, confirmed={"CMI"})
+            await factory_reset(made.session, made.journal, made.permit(), confirmed={"CMI"})
         assert made.writes() == []
 
 
 @pytest.mark.parametrize(("family", "confirmed"), [("atv31", {"CMI"}), ("atv312", set())])
 async def test_factory_settings_come_back(family: str, confirmed: set[str]) -> None:
     with bench(family, sets={"ACC": 99, "HSP": 400, "SP2": 333}) as made:
-        told = await factory_reset(made.session, made.journal, confirmed=confirmed)
+        told = await factory_reset(made.session, made.journal, made.permit(), confirmed=confirmed)
         assert "recalled in working memory" in told
         factory = made.profile["SP2"].factory
         assert (made.drive.raw("ACC"), made.drive.raw("SP2")) == (30, factory)
@@ -292,16 +316,16 @@ async def test_factory_settings_come_back(family: str, confirmed: set[str]) -> N
 async def test_an_unverified_order_needs_to_be_confirmed() -> None:
     with bench("atv31") as made:
         with pytest.raises(MemoryRefused, match="unverified"):
-            await factory_reset(made.session, made.journal)
+            await factory_reset(made.session, made.journal, made.permit())
         assert made.writes() == []
 
 
 async def test_an_altivar_71_recalls_the_groups_that_were_chosen() -> None:
     with bench("atv71", sets={"ACC": 99}) as made:
         with pytest.raises(MemoryRefused, match="FRY selects no group"):
-            await factory_reset(made.session, made.journal)
+            await factory_reset(made.session, made.journal, made.permit())
         made.drive.set("FRY", 1)
-        await factory_reset(made.session, made.journal)
+        await factory_reset(made.session, made.journal, made.permit())
         assert made.drive.raw("ACC") == made.profile["ACC"].factory or made.drive.raw("ACC") == 30
 
 
@@ -310,7 +334,7 @@ async def test_neither_is_ordered_while_the_motor_runs(family: str) -> None:
     with bench(family, run_hz=20.0, sets={} if family == "atv312" else {"FRY": 1}) as made:
         for order in (save_to_eeprom, factory_reset):
             with pytest.raises(MemoryRefused, match="motor stopped"):
-                await order(made.session, made.journal)
+                await order(made.session, made.journal, made.permit())
         assert made.writes() == []
 
 
@@ -325,4 +349,4 @@ async def test_a_drive_that_refuses_to_save_says_why() -> None:
     with bench("atv71") as made:
         made.drive.busy = True
         with pytest.raises(DeviceException, match="Check whether the parameter can be written"):
-            await save_to_eeprom(made.session, made.journal)
+            await save_to_eeprom(made.session, made.journal, made.permit())

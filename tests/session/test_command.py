@@ -9,6 +9,7 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from decimal import Decimal
 from pathlib import Path
+from types import SimpleNamespace
 from typing import NamedTuple
 
 import pytest
@@ -18,11 +19,14 @@ from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.drive.orders import OrderRefused
-from tui.session import command as module
-from tui.session.command import Commander, Kind, Outcome
-from tui.session.drive_session import DriveSession
+from tui.session import arming
+from tui.session.arming import ARMED_FOR
+from tui.session.command import Commander
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.stop import Phase, Stopper
+from tui.session.work import Kind, Outcome
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
@@ -35,9 +39,17 @@ class Bench(NamedTuple):
 
     drive: SimulatedDrive
     line: Line
-    commander: Commander
+    console: DriveConsole
     stopper: Stopper
     simulation: Simulation
+
+    @property
+    def commander(self) -> Commander:
+        return self.console.commander
+
+    @property
+    def session(self) -> DriveSession:
+        return self.console.session
 
     async def done(self, kind: Kind = Kind.DONE, seconds: float = 10.0) -> str:
         """What the order that was just given comes to."""
@@ -54,6 +66,11 @@ class Bench(NamedTuple):
     async def order(self, id: str, kind: Kind = Kind.DONE) -> str:
         self.commander.order(id)  # type: ignore[arg-type]
         return await self.done(kind)
+
+    async def arm(self) -> None:
+        """Arm; a state that is not fresh is read before."""
+        self.commander.arm()
+        await self.until(lambda: self.session.arming.armed)
 
     async def until(self, holds: Callable[[], bool], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
@@ -81,17 +98,15 @@ async def bench(
     simulation.start()
     line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
     line.open(wait=5.0)
-    session = DriveSession(line, 1, library.load(family))
-    session.monitor.start(period=0.1)
     journal = Journal()
-    made = Bench(
-        simulation.drive(1), line, Commander(session, journal), Stopper(line, journal), simulation
-    )
+    console = DriveConsole(DriveSession(line, 1, library.load(family)), journal)
+    console.monitor.start(period=0.1)
+    made = Bench(simulation.drive(1), line, console, Stopper(line, journal), simulation)
     try:
-        await made.until(lambda: session.monitor.latest is not None)
+        await made.until(lambda: console.latest is not None)
         if armed:
-            await made.until(lambda: state_known(session))
-            made.commander.arm()
+            await made.until(lambda: state_known(console.monitor))
+            await made.arm()
         yield made
     finally:
         journal.close()
@@ -113,7 +128,7 @@ async def test_run_reverse_and_stop(family: str) -> None:
         await made.until(lambda: made.drive.motor.frequency > 3)
         await made.order("reverse")
         await made.until(lambda: made.drive.motor.frequency < -3)
-        made.stopper.stop([made.commander.session])
+        made.stopper.stop([made.session])
         await made.until(lambda: made.drive.motor.frequency == 0)
         await made.until(lambda: made.stopped)
 
@@ -163,22 +178,26 @@ async def test_nothing_is_commanded_before_arming() -> None:
 
 
 async def test_arming_ends_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "ARMED_FOR", 0.3)
+    later = [0.0]
+    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + later[0])
+    monkeypatch.setattr(arming, "time", clock)
     async with bench("atv71") as made:
-        await asyncio.sleep(0.2)
-        made.commander.touch()
-        await asyncio.sleep(0.2)
+        later[0] += ARMED_FOR - 20
+        made.session.arming.touch()
+        later[0] += ARMED_FOR - 20
         assert made.commander.armed_for is not None
-        await asyncio.sleep(0.2)
+        later[0] += 20
         assert made.commander.armed_for is None
-        assert "No key" in made.commander.why_disarmed
+        assert "No key" in made.session.arming.why_disarmed
+        with pytest.raises(OrderRefused, match="No key"):
+            made.commander.order("forward")
 
 
 async def test_a_lost_line_disarms() -> None:
     async with bench("atv71") as made:
         made.simulation.unplug()
         await made.until(lambda: made.commander.armed_for is None)
-        assert "line was lost" in made.commander.why_disarmed
+        assert "line was lost" in made.session.arming.why_disarmed
 
 
 async def test_a_read_only_line_is_not_armed() -> None:
@@ -189,8 +208,32 @@ async def test_a_read_only_line_is_not_armed() -> None:
 
 async def test_a_drive_whose_state_is_unknown_is_not_armed() -> None:
     async with bench("atv71", armed=False, sets={"CHCF": 0}) as made:
-        with pytest.raises(OrderRefused, match="state of the drive is not known"):
-            made.commander.arm()
+        made.commander.arm()
+        assert "state of the drive is not known" in await made.done(Kind.REFUSED)
+        assert made.commander.armed_for is None
+
+
+async def test_a_stop_while_the_state_is_read_leaves_the_drive_disarmed() -> None:
+    async with bench("atv71", armed=False) as made:
+        made.console.monitor.stop()
+        made.session.image.forget()
+        made.commander.arm()
+        made.stopper.stop([made.session])
+        await made.until(lambda: made.stopped)
+        assert made.commander.armed_for is None
+        with pytest.raises(OrderRefused, match="ot armed"):
+            made.commander.order("forward")
+
+
+async def test_a_stop_ends_arming() -> None:
+    async with bench("atv71") as made:
+        made.stopper.stop([made.session])
+        assert made.commander.armed_for is None
+        with pytest.raises(OrderRefused, match="no longer armed"):
+            made.commander.order("forward")
+        await made.until(lambda: made.stopped)
+        await made.arm()
+        await made.order("forward")
 
 
 REFUSALS = [
@@ -266,7 +309,7 @@ async def test_a_fault_is_reset_and_starts_nothing(family: str) -> None:
 
 async def test_options_of_an_altivar_21_stay_from_order_to_order() -> None:
     async with bench("atv21") as made:
-        chart = made.commander.session.profile.data.charts[0]
+        chart = made.session.profile.data.charts[0]
         options = {option.id: option for option in chart.options}
         made.commander.refer("20")
         await made.done()
@@ -276,7 +319,7 @@ async def test_options_of_an_altivar_21_stay_from_order_to_order() -> None:
         assert made.drive.raw("FA00") == 0xC440
         made.commander.choose_option(options["motor"], 0x0010)
         assert "stopped only" in await made.done(Kind.REFUSED)
-        made.stopper.stop([made.commander.session])
+        made.stopper.stop([made.session])
         await made.until(lambda: made.stopped)
         assert made.drive.raw("FA00") == 0xC040
 
@@ -296,7 +339,7 @@ async def test_a_stop_ends_an_order_on_its_way() -> None:
         made.commander.refer("20")
         await made.done()
         made.commander.order("forward")
-        made.stopper.stop([made.commander.session])
+        made.stopper.stop([made.session])
         await made.until(lambda: made.stopped)
         await asyncio.sleep(1.0)
         assert made.drive.motor.frequency == 0
@@ -307,8 +350,7 @@ async def test_a_journal_that_cannot_be_written_stops_no_command(tmp_path: Path)
     (tmp_path / "file").touch()
     journal = Journal(tmp_path / "file")
     async with bench("atv71") as made:
-        commander = Commander(made.commander.session, journal)
-        commander.arm()
+        commander = Commander(made.session, journal)
         commander.order("forward")
         await made.until(lambda: commander.outcome is not None)
         assert commander.outcome is not None

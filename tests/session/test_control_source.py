@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.session.command import Kind
+from tui.session.work import Kind
 
 from .test_command import ALTIVARS, bench
 
@@ -12,7 +12,7 @@ from .test_command import ALTIVARS, bench
 @pytest.mark.parametrize("family", ALTIVARS)
 async def test_every_configuration_is_written_and_read_back(family: str) -> None:
     async with bench(family) as made:
-        profile = made.commander.session.profile
+        profile = made.session.profile
         for source in profile.data.control_sources:
             made.commander.configure(source)
             assert source.name in await made.done()
@@ -22,7 +22,7 @@ async def test_every_configuration_is_written_and_read_back(family: str) -> None
 
 async def test_only_what_differs_is_written() -> None:
     async with bench("atv71") as made:
-        source = made.commander.session.profile.data.control_sources[1]
+        source = made.session.profile.data.control_sources[1]
         made.commander.configure(source)
         assert "FR2, RFC" in await made.done()
         made.commander.configure(source)
@@ -35,7 +35,7 @@ async def test_never_while_the_motor_turns() -> None:
         await made.done()
         await made.order("forward")
         before = made.writes()
-        made.commander.configure(made.commander.session.profile.data.control_sources[3])
+        made.commander.configure(made.session.profile.data.control_sources[3])
         assert "motor stopped only" in await made.done(Kind.REFUSED)
         assert made.writes() == before
 
@@ -43,6 +43,6 @@ async def test_never_while_the_motor_turns() -> None:
 async def test_a_word_that_cannot_be_read_changes_nothing() -> None:
     async with bench("atv71", protects=frozenset({"RFC"})) as made:
         before = made.writes()
-        made.commander.configure(made.commander.session.profile.data.control_sources[1])
+        made.commander.configure(made.session.profile.data.control_sources[1])
         assert "RFC cannot be read" in await made.done(Kind.REFUSED)
         assert made.writes() == before

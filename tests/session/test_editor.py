@@ -22,7 +22,7 @@ from .test_command import FAMILIES, Bench, bench
 async def editing(family: str, **spec: object) -> AsyncIterator[tuple[Bench, Editor]]:
     """A drive with an editor that reads."""
     async with bench(family, **spec) as made:  # type: ignore[arg-type]
-        editor = Editor(made.commander.session, made.commander._writer.journal)
+        editor = made.console.editor
         editor.start()
         try:
             yield made, editor
@@ -120,7 +120,7 @@ async def test_what_somebody_else_changes_is_noticed_and_not_overwritten() -> No
         editor.apply()
         assert "still staged" in await written(made, editor)
         assert made.drive.raw("ACC") == 55
-        editor.said = None
+        made.session.work.outcome = None
         editor.accept_changes()
         editor.apply()
         assert "1 written" in await written(made, editor)
@@ -148,7 +148,7 @@ async def test_an_unverified_one_is_confirmed_once() -> None:
         assert refused.reason == "unverified"
         editor.confirm("F112")
         assert editor.refusal("F112") is None
-        again = Editor(editor.session, editor.journal)
+        again = Editor(editor.session, editor.journal, editor.watched)
         assert again.refusal("F112") is None or again.refusal("F112").reason != "unverified"  # type: ignore[union-attr]
 
 
@@ -171,18 +171,18 @@ async def test_save_to_eeprom_and_factory_settings() -> None:
         editor.apply()
         await written(made, editor)
         assert editor.unsaved == {"ACC"}
-        editor.said = None
+        made.session.work.outcome = None
         editor.save()
         assert "saved" in await written(made, editor)
         assert editor.unsaved == set()
-        editor.said = None
+        made.session.work.outcome = None
         editor.factory()
         assert "factory settings are recalled" in await written(made, editor)
 
 
 async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
     async with editing("atv71") as (made, editor):
-        session = made.commander.session
+        session = made.session
         upload = Upload(session, ["ACC", "DEC", "HSP", "INR"])
         await upload.run()
         file = tmp_path / "set.toml"

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Mapping
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
 
 import pytest
 
@@ -14,12 +15,15 @@ from tui.bus.line import Reply
 from tui.drive.errors import DriveError, ValueRefused
 from tui.drive.mapping import Assignment, MappingError, empty, pick
 from tui.drive.mapping_wire import frame, reach
+from tui.session import exchange as module
 from tui.session.command import Commander
-from tui.session.exchange import exchange
+from tui.session.exchange import Exchanged
 from tui.session.mapping_desk import MappingDesk
 from tui.session.mapping_write import AssignmentRefused
+from tui.session.monitor import Monitor
 from tui.session.outputs import Meant, meant, refuse_pending
 from tui.session.stop import Stopper
+from tui.session.work import Permit
 from tui.session.writing import NotTaken
 
 EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]
@@ -46,12 +50,32 @@ async def both(here: Bench) -> tuple[Assignment, Assignment]:
     return inputs, outputs
 
 
+async def exchange(
+    here: Bench,
+    outputs: Assignment,
+    wanted: Mapping[str, int],
+    inputs: Assignment | None = None,
+    *,
+    in_force: bool = False,
+) -> Exchanged:
+    """An exchange with a drive that is armed."""
+    return await module.exchange(
+        here.session,
+        here.journal,
+        outputs,
+        wanted,
+        inputs,
+        permit=here.permit(),
+        in_force=in_force,
+    )
+
+
 async def test_eight_inputs_and_six_outputs_in_one_exchange() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         inputs, outputs = await both(here)
         first = {code: here.drive.raw(code) for code in EXAMPLE_OUT}
         wanted = {EXAMPLE_OUT[0]: first[EXAMPLE_OUT[0]], "ACC": 45, "DEC": 55}
-        done = await exchange(here.session, here.journal, outputs, wanted, inputs)
+        done = await exchange(here, outputs, wanted, inputs)
         (request,) = sent(here, 23)
         held = {code: here.drive.raw(code) for code in EXAMPLE_OUT}
         words = tuple(held[code] & 0xFFFF for code in EXAMPLE_OUT)
@@ -78,20 +102,27 @@ async def test_an_exchange_that_is_refused_here(
     with bench("atv71", sets={"CHCF": 1}) as here:
         inputs, outputs = await both(here)
         with pytest.raises(error, match=says):
-            await exchange(here.session, here.journal, outputs, wanted, inputs)
+            await exchange(here, outputs, wanted, inputs)
         assert sent(here, 23) == []
 
 
 async def test_an_exchange_needs_arming_and_the_interlocks_of_an_order() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         inputs, outputs = await both(here)
-        with pytest.raises(AssignmentRefused, match="not armed"):
-            await exchange(here.session, here.journal, outputs, {}, inputs, allowed=lambda: False)
+        with pytest.raises(AssignmentRefused, match="Not armed"):
+            await module.exchange(
+                here.session,
+                here.journal,
+                outputs,
+                {"ACC": 40},
+                inputs,
+                permit=Permit(here.session.work, here.session.work.stops),
+            )
         here.drive.set("CCC", 1)
         here.drive.set("CHCF", 1)
         here.drive.set("NCA1", 3204)
         with pytest.raises(AssignmentRefused, match="changed by somebody else"):
-            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
+            await exchange(here, outputs, {"ACC": 40}, inputs)
         assert sent(here, 23) == []
 
 
@@ -107,13 +138,13 @@ async def test_outputs_moved_during_an_exchange_are_told() -> None:
 
         here.session.line.read_write = moved  # type: ignore[method-assign]
         with pytest.raises(AssignmentRefused, match=r"NCA5, NCA6.*look at"):
-            await exchange(here.session, here.journal, outputs, {"ACC": 40}, inputs)
+            await exchange(here, outputs, {"ACC": 40}, inputs)
 
 
 async def test_only_what_was_named_is_written() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         inputs, outputs = await both(here)
-        done = await exchange(here.session, here.journal, outputs, {"ACC": 45, "DEC": 55}, inputs)
+        done = await exchange(here, outputs, {"ACC": 45, "DEC": 55}, inputs)
         assert done.outputs == {"ACC": 45, "DEC": 55}
         (request,) = sent(here, 23)
         # two words from NC5 on: command word and references are not touched
@@ -126,7 +157,7 @@ async def test_what_stands_between_two_named_ones_keeps_its_value() -> None:
     with bench("atv71", sets={"CHCF": 1, "LSP": 41}) as here:
         _, outputs = await both(here)
         assert reach(here.profile, outputs, ["ACC", "HSP"]) == range(2, 5)
-        done = await exchange(here.session, here.journal, outputs, {"HSP": 450, "ACC": 45})
+        done = await exchange(here, outputs, {"HSP": 450, "ACC": 45})
         assert done.outputs == {"HSP": 450, "LSP": 41, "ACC": 45}
         assert sent(here, 23) == []
         assert sent(here, 16)[-1].endswith("31db00030601c20029002d")
@@ -136,7 +167,7 @@ async def test_nothing_named_is_nothing_written() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         _, outputs = await both(here)
         with pytest.raises(AssignmentRefused, match="No output was named"):
-            await exchange(here.session, here.journal, outputs, {})
+            await exchange(here, outputs, {})
         assert sent(here, 16) == []
 
 
@@ -152,7 +183,7 @@ async def test_a_value_that_the_drive_does_not_keep_is_told() -> None:
 
         here.session.line.write = undone  # type: ignore[method-assign]
         with pytest.raises(NotTaken, match=r"ACC: written 4\.5 s, the drive holds 9\.9 s"):
-            await exchange(here.session, here.journal, outputs, {"ACC": 45})
+            await exchange(here, outputs, {"ACC": 45})
         assert here.journal.recent[-1].answer == "holds another value"
 
 
@@ -160,7 +191,7 @@ async def test_a_read_only_line_exchanges_nothing() -> None:
     with bench("atv71", read_only=True) as here:
         outputs = plan_of(here, "write", ["ACC"])
         with pytest.raises(RequestRefused):
-            await exchange(here.session, here.journal, outputs, {"ACC": 45})
+            await exchange(here, outputs, {"ACC": 45})
 
 
 # The write block of the Altivar 21
@@ -174,9 +205,9 @@ async def test_the_manuals_two_words_through_the_write_block() -> None:
         outputs = plan_of(here, "write", ["FA00", "FA01"])
         wanted = {"FA00": 0xC400, "FA01": 6000}
         with pytest.raises(AssignmentRefused, match="nobody has confirmed"):
-            await exchange(here.session, here.journal, outputs, wanted)
+            await exchange(here, outputs, wanted)
         assert sent(here, 16) == []
-        done = await exchange(here.session, here.journal, outputs, wanted, in_force=True)
+        done = await exchange(here, outputs, wanted, in_force=True)
         assert done.outputs == wanted
         assert sent(here, 16) == ["01101870000204c4001770"]
         assert here.drive.raw("FA01") == 6000
@@ -186,7 +217,7 @@ async def test_one_named_word_of_the_write_block_brings_the_other_along() -> Non
     with bench("atv21", sets=EXAMPLE_21) as here:
         here.drive.set("FA00", 0x8000)
         outputs = plan_of(here, "write", ["FA00", "FA01"])
-        await exchange(here.session, here.journal, outputs, {"FA01": 3000}, in_force=True)
+        await exchange(here, outputs, {"FA01": 3000}, in_force=True)
         assert sent(here, 16) == ["011018700002048000" + "0bb8"]
 
 
@@ -198,7 +229,7 @@ async def test_a_write_block_that_stands_for_something_else_is_found_out() -> No
         outputs = plan_of(here, "write", ["FA50", "FA01"])
         here.drive.set("FA51", 7)
         with pytest.raises(NotTaken, match=r"something else.*FA51 went to"):
-            await exchange(here.session, here.journal, outputs, {"FA01": 500}, in_force=True)
+            await exchange(here, outputs, {"FA01": 500}, in_force=True)
 
 
 # A stop
@@ -215,72 +246,122 @@ async def settled(desk: MappingDesk) -> str:
 async def test_a_stop_ends_an_exchange_before_its_words_go_out() -> None:
     with bench("atv71", sets={"CHCF": 1}) as here:
         await both(here)
-        here.session.monitor.start(period=0.1)
-        desk = MappingDesk(here.session, here.journal)
+        monitor = Monitor(here.session)
+        monitor.start(period=0.1)
+        desk = MappingDesk(here.session, monitor, here.journal)
         desk.start()
         for _ in range(400):
             if len(desk.views) == 2:
                 break
             await asyncio.sleep(0.02)
         stopper = Stopper(here.session.line, here.journal)
-        desk.exchange(desk.meant("CMD=16#000F LFRD=900"), lambda: True)
+        here.permit()
+        desk.exchange(desk.meant("CMD=16#000F LFRD=900"))
         stopper.stop([here.session])
         assert "stop" in await settled(desk)
         await asyncio.sleep(0.5)
         assert sent(here, 23) == []
         desk.stop()
-        here.session.close()
+        monitor.stop()
 
 
 async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None:
     with bench("atv71") as here:
-        here.session.monitor.start(period=0.1)
-        desk = MappingDesk(here.session, here.journal)
+        monitor = Monitor(here.session)
+        monitor.start(period=0.1)
+        desk = MappingDesk(here.session, monitor, here.journal)
         desk.start()
         for _ in range(400):
-            if len(desk.views) == 2 and state_known(here.session):
+            if len(desk.views) == 2 and state_known(monitor):
                 break
             await asyncio.sleep(0.02)
         commander = Commander(here.session, here.journal)
-        commander.arm()
+        here.permit()
         desk.propose(plan_of(here, "read", EXAMPLE_IN))
-        desk.write(lambda: True)
+        desk.write()
         commander.order("forward")
+        assert here.session.work.busy_for(commander)
         stopper = Stopper(here.session.line, here.journal)
         stopper.stop([here.session])
-        assert "ended by a stop" in await settled(desk)
+        assert "ended by a stop" in (await settled(desk)).lower()
         await asyncio.sleep(0.5)
         assert commander.outcome is not None
-        assert commander.outcome.text == "ended by a stop"
+        assert "ended by a stop" in commander.outcome.text.lower()
+        assert not here.session.work.busy_for(commander)
         assert here.drive.motor.frequency == 0
+        assert {word for register, word in here.writes() if register == 8501} <= {7}
         assert here.drive.raw("NMA8") != 7121
         # what was proposed stays, against what the drive holds now
         assert desk.changes(plan_of(here, "read", []).block)
-        desk.write(lambda: True)
+        desk.write()
+        assert "no longer armed" in await settled(desk)
+        assert here.drive.raw("NMA8") != here.profile["LFT"].address
+        here.permit()
+        desk.write()
         assert "Written and read back" in await settled(desk)
         assert here.drive.raw("NMA8") == here.profile["LFT"].address
         desk.stop()
-        here.session.close()
+        monitor.stop()
+
+
+@asynccontextmanager
+async def at_desk(here: Bench) -> AsyncIterator[MappingDesk]:
+    """A desk that knows the blocks of an armed drive."""
+    monitor = Monitor(here.session)
+    monitor.start(period=0.1)
+    desk = MappingDesk(here.session, monitor, here.journal)
+    desk.start()
+    for _ in range(400):
+        if len(desk.views) == 2:
+            break
+        await asyncio.sleep(0.02)
+    here.permit()
+    yield desk
+    desk.stop()
+    monitor.stop()
+
+
+async def test_what_a_stop_cuts_short_is_said_to_stay() -> None:
+    with bench("atv71") as here:
+        async with at_desk(here) as desk:
+            here.after_writes(2, lambda: here.session.work.stop("F12"))
+            desk.propose(plan_of(here, "read", EXAMPLE_IN))
+            desk.write()
+            assert await settled(desk) == "Ended by a stop. What was written stays."
+            assert len(here.writes()) == 2
+
+
+async def test_where_nothing_was_written_nothing_is_said_to_stay() -> None:
+    with bench("atv71", run_hz=20.0) as here:
+        async with at_desk(here) as desk:
+            desk.propose(plan_of(here, "read", EXAMPLE_IN))
+            desk.write()
+            assert (await settled(desk)).endswith("Nothing was written.")
+            assert here.writes() == []
 
 
 async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
     with bench("atv21", sets=EXAMPLE_21) as here:
-        here.session.monitor.start(period=0.1)
-        desk = MappingDesk(here.session, here.journal)
+        monitor = Monitor(here.session)
+        monitor.start(period=0.1)
+        desk = MappingDesk(here.session, monitor, here.journal)
         desk.start()
         for _ in range(400):
-            if len(desk.views) == 2 and state_known(here.session):
+            if len(desk.views) == 2 and state_known(monitor):
                 break
             await asyncio.sleep(0.02)
         # disarmed as soon as one slot is another
         desk.propose(plan_of(here, "write", ["FA50", "FA51"]))
-        desk.write(lambda: here.drive.raw("F870") == 1)
+        here.permit()
+        disarm = here.session.arming.disarm
+        here.after_writes(1, lambda: disarm("No key for a minute: no longer armed."))
+        desk.write()
         assert "no longer armed" in await settled(desk)
         assert (here.drive.raw("F870"), here.drive.raw("F871")) == (4, 3)
         with pytest.raises(MappingError, match="F870: in force after the drive's next reset"):
             desk.meant("FA50=0x0000")
         desk.stop()
-        here.session.close()
+        monitor.stop()
 
 
 # What a person agrees to

@@ -8,9 +8,8 @@ from .test_command import Bench, bench
 
 
 def watched(made: Bench) -> Recorder:
-    session = made.commander.session
-    recorder = Recorder(session, made.commander._writer.journal)
-    session.monitor.listen(recorder.take)
+    recorder = Recorder(made.session, made.console.journal)
+    made.console.monitor.listen(recorder.take)
     return recorder
 
 
@@ -46,11 +45,11 @@ async def test_a_trip_freezes_values_and_writes_of_the_seconds_before() -> None:
 async def test_a_drive_found_in_fault_has_not_tripped_now() -> None:
     async with bench("atv71", armed=False) as made:
         made.drive.provoke("ObF")
-        session = made.commander.session
-        await made.until(lambda: session.monitor.latest.state.kind == "fault")  # type: ignore[union-attr]
+        monitor = made.console.monitor
+        await made.until(lambda: monitor.latest.state.kind == "fault")  # type: ignore[union-attr]
         recorder = watched(made)
-        first = session.monitor.latest
-        await made.until(lambda: session.monitor.latest is not first)
+        first = monitor.latest
+        await made.until(lambda: monitor.latest is not first)
         assert recorder.latest is None
         assert recorder.seen
 
@@ -63,7 +62,7 @@ async def test_the_record_as_a_text() -> None:
         made.drive.provoke(17)
         await made.until(lambda: recorder.latest is not None)
         assert recorder.latest is not None
-        session = made.commander.session
+        session = made.session
         text = record_text(session, recorder.latest, [("FE00", "Output frequency", "12.34 Hz")])
         for part in ("E (17) Emergency stop", "| FE00 | Output frequency | 12.34 Hz |", "Run forw"):
             assert part in text

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import json
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -18,10 +19,11 @@ from tui.drive.mapping import Assignment, empty, factory, pick
 from tui.drive.mapping_wire import frame, span
 from tui.drive.schema import Block
 from tui.drive.user_words import COUNT, UserWord
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.lines import open_line
 from tui.session.mapping import Force, Mapper, wire_timing
 from tui.session.mapping_write import AssignmentRefused, write_assignment
+from tui.session.reader import Reader
 from tui.session.user_words import load_words, read_words, save_words
 from tui.session.verdict import Verdict
 from tui.simulator import DriveSpec, LineTiming, Simulation
@@ -54,8 +56,17 @@ def sent(here: Bench, function: int) -> list[str]:
 
 
 async def write(here: Bench, plan: Assignment, **how: object) -> str:
+    how.setdefault("permit", here.permit())
     done = await write_assignment(here.session, here.journal, plan, **how)  # type: ignore[arg-type]
     return done.text
+
+
+def disarmed(here: Bench) -> None:
+    here.session.arming.disarm("No key for a minute: no longer armed.")
+
+
+def stopped(here: Bench) -> None:
+    here.session.work.stop("the stop key")
 
 
 # Looking
@@ -263,12 +274,17 @@ async def test_nothing_is_written_while_the_motor_turns(family: str) -> None:
         assert here.writes() == []
 
 
-async def test_nothing_is_written_once_the_drive_is_no_longer_armed() -> None:
+@pytest.mark.parametrize(
+    ("ended", "says"), [(disarmed, "no longer armed"), (stopped, "a stop came after it")]
+)
+async def test_nothing_is_written_once_the_drive_is_disarmed_or_stopped(
+    ended: Callable[[Bench], None], says: str
+) -> None:
     with bench("atv71") as here:
-        left = iter([True, True])
+        here.after_writes(2, lambda: ended(here))
         plan = plan_of(here, "read", ["RFRD", "ETA", "LCR"])
-        with pytest.raises(AssignmentRefused, match=r"no longer armed.*Written before: NMA1, NMA2"):
-            await write(here, plan, allowed=lambda: next(left, False))
+        with pytest.raises(AssignmentRefused, match=rf"{says}.*Written before: NMA1, NMA2"):
+            await write(here, plan)
         assert len(here.writes()) == 2
 
 
@@ -349,7 +365,7 @@ async def test_a_drive_that_meets_the_unknown_with_silence_is_not_asked_for_it()
 
 async def test_the_timing_is_that_of_the_line() -> None:
     with bench("atv71") as here:
-        await here.session.read(["ETA"])
+        await Reader(here.session).read(["ETA"])
         timing = wire_timing(here.session)
         assert timing.character == pytest.approx(10 / 19200, rel=0.11)
         assert 0 < timing.turnaround < 1

@@ -11,8 +11,9 @@ from typing import Any, cast
 import pytest
 
 from tui.bus.errors import LineLost, NoAnswer
-from tui.bus.line import Line, LineState, LineStatus, Priority, Reply, Worker
+from tui.bus.line import LineState, LineStatus, Priority, Reply, Worker
 from tui.bus.pace import Pace
+from tui.session.drive import DriveSession
 from tui.session.due import Due
 from tui.session.monitor import FORGOTTEN_AFTER, Monitor, Snapshot
 
@@ -83,7 +84,7 @@ class Bench:
 
     def __init__(self) -> None:
         self.line = FaultyLine()
-        self.monitor = Monitor(cast("Line", self.line), 1, PROFILE)
+        self.monitor = Monitor(DriveSession(self.line.as_line(), 1, PROFILE))
         self.cycles: Cycles = []
         self.monitor.listen(self._take)
 

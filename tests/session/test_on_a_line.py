@@ -27,11 +27,12 @@ from tui.bus.line import Identification, Line, Priority
 from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.session.addresses import parse_addresses
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.identify import ScanResult, identify, scan
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, check_line, demo_line, open_line
-from tui.session.monitor import Snapshot
+from tui.session.monitor import Monitor, Snapshot
+from tui.session.reader import Reader
 from tui.session.readings import Quality
 from tui.session.state import recent_lines, remember_line, state_folder
 from tui.simulator import DriveSpec, Simulation
@@ -163,9 +164,10 @@ async def test_nobody_there(five: OpenLine) -> None:
 @pytest.mark.parametrize("profile", DRIVES)
 async def test_the_monitor_tells_what_the_motor_does(five: OpenLine, profile: str) -> None:
     drive = session(five, profile)
-    drive.monitor.start(period=0.1)
-    await until(lambda: drive.monitor.latest is not None and drive.monitor.latest.cycle > 2)
-    latest = drive.monitor.latest
+    monitor = Monitor(drive)
+    monitor.start(period=0.1)
+    await until(lambda: monitor.latest is not None and monitor.latest.cycle > 2)
+    latest = monitor.latest
     assert latest is not None
     assert latest.error == ""
     assert latest.state.kind == "running"
@@ -175,25 +177,26 @@ async def test_the_monitor_tells_what_the_motor_does(five: OpenLine, profile: st
         first = latest.readings[code].number or 0.0
 
         def faster() -> bool:
-            now = drive.monitor.latest
+            now = monitor.latest
             return now is not None and (now.readings[code].number or 0.0) > first + 1
 
         await until(faster)
         assert latest.readings[code].quality is Quality.GOOD
         assert latest.readings[code].unit == "Hz"
-    drive.close()
-    assert not drive.monitor.running
+    monitor.stop()
+    assert not monitor.running
 
 
 async def test_a_lost_line_makes_values_old_and_comes_back(five: OpenLine) -> None:
     drive = session(five, "atv71")
-    drive.monitor.start(period=0.1)
-    await until(lambda: drive.monitor.latest is not None and not drive.monitor.latest.error)
+    monitor = Monitor(drive)
+    monitor.start(period=0.1)
+    await until(lambda: monitor.latest is not None and not monitor.latest.error)
     assert five.simulation is not None
     five.simulation.unplug()
 
     def all_old() -> bool:
-        latest = drive.monitor.latest
+        latest = monitor.latest
         if latest is None or not latest.error:
             return False
         # the words of one cycle come a moment after one another, and so they grow old
@@ -201,51 +204,54 @@ async def test_a_lost_line_makes_values_old_and_comes_back(five: OpenLine) -> No
         return stale and latest.state.kind == "unknown"
 
     await until(all_old)
-    latest = drive.monitor.latest
+    latest = monitor.latest
     assert latest is not None
     assert latest.rate == 0.0
-    assert drive.monitor.trend[-1].values == (None, None)
+    assert monitor.trend[-1].values == (None, None)
     with pytest.raises(LineLost):
-        await drive.read(["ACC"])
+        await Reader(drive).read(["ACC"])
     five.simulation.replug()
-    await until(lambda: drive.monitor.latest is not None and not drive.monitor.latest.error)
-    drive.close()
+    await until(lambda: monitor.latest is not None and not monitor.latest.error)
+    monitor.stop()
 
 
 async def test_polling_goes_on_while_the_screen_stands_still(five: OpenLine) -> None:
     drive = session(five, "atv71")
-    drive.monitor.start(period=0.1)
-    await until(lambda: drive.monitor.latest is not None)
-    assert drive.monitor.latest is not None
-    before = drive.monitor.latest.cycle
+    monitor = Monitor(drive)
+    monitor.start(period=0.1)
+    await until(lambda: monitor.latest is not None)
+    assert monitor.latest is not None
+    before = monitor.latest.cycle
     time.sleep(2.0)  # noqa: ASYNC251 - this loop stands still, as a stalled terminal makes it
-    assert drive.monitor.latest.cycle - before >= 10
-    drive.close()
+    assert monitor.latest.cycle - before >= 10
+    monitor.stop()
 
 
 async def test_listeners_hear_every_cycle_until_they_leave(five: OpenLine) -> None:
     drive = session(five, "atv312")
+    monitor = Monitor(drive)
     heard: list[Snapshot] = []
-    leave = drive.monitor.listen(heard.append)
-    drive.monitor.start(["LCr"], 0.05)
+    leave = monitor.listen(heard.append)
+    monitor.start(["LCr"], 0.05)
     await until(lambda: len(heard) >= 5)
     leave()
     count = len(heard)
     assert [s.cycle for s in heard] == list(range(1, count + 1))
     assert list(heard[-1].readings) == ["LCr"]
-    drive.close()
+    monitor.stop()
 
 
 async def test_a_drive_left_alone_trips_and_a_kept_one_does_not() -> None:
     """The Altivar 21 watches the line from the first request on, for 3 s."""
     alone, kept = demo_line({"atv21": 35.0}), demo_line({"atv21": 35.0})
     keeper = Keeper(kept.line)
-    keeper.keep(session(kept, "atv21"))
-    await session(alone, "atv21").read(["FD01"])
+    kept_drive = session(kept, "atv21")
+    keeper.keep(kept_drive, Monitor(kept_drive))
+    await Reader(session(alone, "atv21")).read(["FD01"])
     await asyncio.sleep(5.0)
     try:
-        assert (await session(alone, "atv21").read(["FC90"]))["FC90"].raw == 24
-        assert (await session(kept, "atv21").read(["FC90"]))["FC90"].raw == 0
+        assert (await Reader(session(alone, "atv21")).read(["FC90"]))["FC90"].raw == 24
+        assert (await Reader(kept_drive).read(["FC90"]))["FC90"].raw == 0
         look = keeper.looks[1]
         assert look.timeout == 3.0
         assert look.state is not None
@@ -260,14 +266,22 @@ async def test_a_drive_watched_from_the_start_is_judged_by_its_monitor() -> None
     """The keeper learns the time-out though a monitor is at work, and takes its newer state."""
     opened = demo_line({"atv21": 35.0})
     drive = session(opened, "atv21")
-    drive.monitor.start(period=0.2)
+    monitor = Monitor(drive)
+    monitor.start(period=0.2)
     keeper = Keeper(opened.line)
-    keeper.keep(drive)
+    keeper.keep(drive, monitor)
+
+    def left_alone() -> dict[int, float]:
+        return {device: watch.timeout for device, watch in keeper.left_alone().items()}
+
     try:
-        await until(lambda: keeper.left_alone() == {1: 3.0})
+        await until(lambda: left_alone() == {1: 3.0} and keeper.runs(1))
+        assert keeper.looks == {}, "the monitor's states counted"
         assert opened.simulation is not None
         opened.simulation.drive(1).halt()
-        await until(lambda: keeper.left_alone() == {})
+        await until(lambda: not keeper.runs(1))
+        # it trips at rest, too
+        assert left_alone() == {1: 3.0}
     finally:
         keeper.stop()
         opened.close()
@@ -277,7 +291,8 @@ async def test_a_drive_is_fed_whatever_else_the_line_does() -> None:
     """A flood of polls and of operator's reads leaves the keeper its place before them."""
     opened = demo_line({"atv21": 35.0, "atv71": 50.0})
     keeper = Keeper(opened.line)
-    keeper.keep(session(opened, "atv21"))
+    drive = session(opened, "atv21")
+    keeper.keep(drive, Monitor(drive))
     await until(lambda: keeper.watch(1) is not None)
     gaps: list[float] = []
 
@@ -310,7 +325,8 @@ async def test_who_cannot_be_fed_is_told_of_before_it_acts(tmp_path: Path) -> No
     opened = open_line(f"serial:{simulation.serve_pty(str(tmp_path / 'line'))},19200,8N1", wait=5.0)
     opened.simulation = simulation
     keeper = Keeper(opened.line)
-    keeper.keep(session(opened, "atv21"))
+    drive = session(opened, "atv21")
+    keeper.keep(drive, Monitor(drive))
     try:
         await until(lambda: keeper.watch(1) is not None)
         assert not keeper.hungry()
@@ -333,7 +349,7 @@ async def test_a_watch_that_begins_with_a_command_is_not_told_of_before() -> Non
     opened = demo_line({"atv71": 50.0})
     keeper = Keeper(opened.line)
     drive = DriveSession(opened.line, 1, library.load("atv71"))
-    keeper.keep(drive)
+    keeper.keep(drive, Monitor(drive))
     try:
         await until(lambda: keeper.watch(1) is not None)
         watch = keeper.watch(1)
@@ -346,19 +362,19 @@ async def test_a_watch_that_begins_with_a_command_is_not_told_of_before() -> Non
 
 
 async def test_an_overloaded_line_lowers_all_rates_evenly(five: OpenLine) -> None:
-    drives = [session(five, profile) for profile in DRIVES]
+    monitors = [Monitor(session(five, profile)) for profile in DRIVES]
     slow = Line(SerialLink("/dev/null", baud=9600))
-    for drive in drives:
+    for monitor in monitors:
         # as if the line were that slow: its time is shared out by what the plans cost there
-        drive.monitor.reader.line.link = slow.link
-        drive.monitor.start(period=0.1)
+        monitor.line.link = slow.link
+        monitor.start(period=0.1)
     await asyncio.sleep(8.0)
-    rates = [drive.monitor.latest.rate for drive in drives if drive.monitor.latest]
-    assert len(rates) == len(drives)
+    rates = [monitor.latest.rate for monitor in monitors if monitor.latest]
+    assert len(rates) == len(monitors)
     assert max(rates) / min(rates) < 1.1
     assert 0.5 < max(rates) < 2.0
-    for drive in drives:
-        drive.close()
+    for monitor in monitors:
+        monitor.stop()
 
 
 @pytest.mark.parametrize(
@@ -389,7 +405,7 @@ async def test_silence_at_an_unconfirmed_word_is_no_dead_drive() -> None:
     with simulation:
         opened = open_line(f"serial:{simulation.serve_pty()}", wait=3)
         drive = DriveSession(opened.line, 1, library.load("powerdrive"))
-        readings = await drive.read(["10.40", "5.01"])
+        readings = await Reader(drive).read(["10.40", "5.01"])
         assert readings["10.40"].quality is Quality.GOOD
         assert readings["5.01"].quality is Quality.BAD
         assert "no such word" in readings["5.01"].error

@@ -8,8 +8,9 @@ import pytest
 
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Priority
-from tui.session.reader import PLANS_KEPT, Rating, Reader
-from tui.session.readings import Quality
+from tui.session.drive import DriveSession
+from tui.session.reader import PLANS_KEPT, Reader
+from tui.session.readings import Quality, Rating
 
 from .fakes import FakeLine, parameter, profile_of
 
@@ -22,7 +23,7 @@ async def test_neighbours_come_in_one_request_with_their_units() -> None:
         parameter("OTR", 3205, unit="%", scale="0.1", type="int16"),
     )
     line = FakeLine({3204: 53, 3205: 0x10000 - 725})
-    readings = await Reader(line.as_line(), 1, profile).read(["OTR", "LCR"])
+    readings = await Reader(DriveSession(line.as_line(), 1, profile)).read(["OTR", "LCR"])
     assert line.requests == [(3204, 2)]
     assert list(readings) == ["OTR", "LCR"]
     assert [r.value.display for r in readings.values() if r.value] == ["-72.5 %", "5.3 A"]
@@ -32,7 +33,7 @@ async def test_neighbours_come_in_one_request_with_their_units() -> None:
 async def test_one_refused_word_does_not_hurt_its_neighbours() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
     line = FakeLine({10: 1, 12: 3})
-    reader = Reader(line.as_line(), 1, profile)
+    reader = Reader(DriveSession(line.as_line(), 1, profile))
     readings = await reader.read(["P10", "P11", "P12"])
     assert {c: r.raw for c, r in readings.items()} == {"P10": 1, "P11": None, "P12": 3}
     assert readings["P11"].quality is Quality.BAD
@@ -43,7 +44,7 @@ async def test_one_refused_word_does_not_hurt_its_neighbours() -> None:
 async def test_a_poll_does_not_ask_again_for_what_was_refused() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
     line = FakeLine({10: 1, 12: 3})
-    reader = Reader(line.as_line(), 1, profile)
+    reader = Reader(DriveSession(line.as_line(), 1, profile))
     await reader.read(["P10", "P11", "P12"], priority=Priority.POLL)
     line.requests.clear()
     readings = await reader.read(["P10", "P11", "P12"], priority=Priority.POLL)
@@ -61,7 +62,9 @@ async def test_the_word_for_no_value_is_asked_for_alone() -> None:
         reading={"unknown_word": 0x8000, "unknown_exception": 2},
     )
     line = FakeLine({8401: 3, 8402: 0x8000}, unknown_word=0x8000)
-    readings = await Reader(line.as_line(), 12, profile).read(["P8400", "P8401", "P8402"])
+    readings = await Reader(DriveSession(line.as_line(), 12, profile)).read(
+        ["P8400", "P8401", "P8402"]
+    )
     assert {c: r.raw for c, r in readings.items()} == {
         "P8400": None,
         "P8401": 3,
@@ -75,7 +78,7 @@ async def test_a_ramp_is_read_with_its_increment() -> None:
         parameter("INR", 9020, values={"0": "0.01 s", "1": "0.1 s", "2": "1 s"}),
     )
     line = FakeLine({9001: 30, 9020: 0})
-    reader = Reader(line.as_line(), 1, profile)
+    reader = Reader(DriveSession(line.as_line(), 1, profile))
     assert (await reader.read(["ACC"]))["ACC"].text == "0.30"
     line.registers[9020] = 2
     assert (await reader.read(["ACC"]))["ACC"].text == "30"
@@ -86,7 +89,7 @@ async def test_a_ramp_without_its_increment_is_shown_raw() -> None:
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR), parameter("INR", 9020)
     )
     line = FakeLine({9001: 30})
-    reading = (await Reader(line.as_line(), 1, profile).read(["ACC"]))["ACC"]
+    reading = (await Reader(DriveSession(line.as_line(), 1, profile)).read(["ACC"]))["ACC"]
     assert (reading.text, reading.unit) == ("30", "raw")
 
 
@@ -96,7 +99,7 @@ async def test_a_drive_without_the_increment_has_the_older_scale() -> None:
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=older), parameter("INR", 9020)
     )
     line = FakeLine({9001: 30})
-    reading = (await Reader(line.as_line(), 1, profile).read(["ACC"]))["ACC"]
+    reading = (await Reader(DriveSession(line.as_line(), 1, profile)).read(["ACC"]))["ACC"]
     assert (reading.text, reading.unit) == ("3.0", "s")
 
 
@@ -106,12 +109,12 @@ async def test_a_percentage_in_amperes_once_the_rating_is_known() -> None:
         parameter("OWN", 10, unit="%", scale="1", rating="NCR"),
         parameter("NCR", 11, unit="A", scale="0.1"),
     )
-    reader = Reader(FakeLine({65027: 5000, 10: 50, 11: 84}).as_line(), 1, profile)
+    reader = Reader(DriveSession(FakeLine({65027: 5000, 10: 50, 11: 84}).as_line(), 1, profile))
     readings = await reader.read(["FE03", "OWN"])
     assert readings["FE03"].physical is None
     assert readings["OWN"].physical is not None
     assert readings["OWN"].physical.display == "4.2 A"
-    reader.ratings["FE03"] = Rating(Decimal("9.1"), "A")
+    reader.session.ratings["FE03"] = Rating(Decimal("9.1"), "A")
     again = (await reader.read(["FE03"]))["FE03"]
     assert again.physical is not None
     assert (again.text, again.physical.display) == ("50.00", "4.6 A")
@@ -121,7 +124,7 @@ async def test_silence_is_an_error_not_a_value() -> None:
     line = FakeLine({1: 1})
     line.silent = True
     with pytest.raises(NoAnswer):
-        await Reader(line.as_line(), 1, profile_of(parameter("P1", 1))).read(["P1"])
+        await Reader(DriveSession(line.as_line(), 1, profile_of(parameter("P1", 1)))).read(["P1"])
 
 
 def test_the_line_learns_the_limits_of_the_profile() -> None:
@@ -135,7 +138,7 @@ def test_the_line_learns_the_limits_of_the_profile() -> None:
             {"code": 23, "name": "Both", "max_read": 20, "max_write": 10},
         ],
     )
-    Reader(line.as_line(), 7, profile)
+    Reader(DriveSession(line.as_line(), 7, profile))
     limits = line.limits[7]
     assert limits.functions == {3, 6, 16, 23}
     assert (limits.max_read, limits.max_write) == (20, 12)
@@ -146,7 +149,7 @@ def test_the_line_learns_the_limits_of_the_profile() -> None:
 async def test_plans_do_not_pile_up_without_end() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in range(10, 120)))
     line = FakeLine({a: a for a in range(10, 120)})
-    reader = Reader(line.as_line(), 1, profile)
+    reader = Reader(DriveSession(line.as_line(), 1, profile))
     for a in range(10, 118):
         await reader.read([f"P{a}", f"P{a + 1}"])
     assert len(reader._plans) <= PLANS_KEPT

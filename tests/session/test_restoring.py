@@ -60,7 +60,7 @@ async def backed_up(made: Bench) -> ParameterSet:
 async def to_factory(made: Bench) -> None:
     """Factory settings, by the line where the family's order is known, else at the keypad."""
     if made.profile.data.memory.factory is not None:
-        await factory_reset(made.session, made.journal, confirmed={"CMI"})
+        await factory_reset(made.session, made.journal, made.permit(), confirmed={"CMI"})
         return
     line = {s.parameter for s in made.profile.data.link.settings}
     made.drive.registers.to_factory(frozenset(line))
@@ -72,7 +72,7 @@ def skipped(plan: RestorePlan) -> dict[str, str]:
 
 async def restored(made: Bench, values: ParameterSet, options: Options) -> Restored:
     source = library.load(values.head.profile)
-    return await restore(made.session, made.journal, values, source, options)
+    return await restore(made.session, made.journal, values, source, options, permit=made.permit())
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -111,9 +111,15 @@ async def test_killed_half_way_and_resumed(family: str) -> None:
 
         work = asyncio.create_task(
             restore(
-                made.session, made.journal, values, made.profile, options, progress=progress
+                made.session,
+                made.journal,
+                values,
+                made.profile,
+                options,
+                permit=made.permit(),
+                progress=progress,
             )
-        )  # fmt: skip
+        )
         await half.wait()
         work.cancel()
         with pytest.raises(asyncio.CancelledError):
@@ -138,7 +144,14 @@ async def test_a_lost_line_keeps_the_rest_and_the_mark() -> None:
             if done == 2:
                 made.lose_line()
 
-        done = await restore(made.session, made.journal, values, made.profile, progress=progress)
+        done = await restore(
+            made.session,
+            made.journal,
+            values,
+            made.profile,
+            permit=made.permit(),
+            progress=progress,
+        )
         assert done.stopped
         assert not done.complete
         assert len(done.left) > 0
@@ -160,8 +173,13 @@ async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
                 made.lose_line()
 
         done = await restore(
-            made.session, made.journal, values, made.profile, reading=reading
-        )  # fmt: skip
+            made.session,
+            made.journal,
+            values,
+            made.profile,
+            permit=made.permit(),
+            reading=reading,
+        )
         assert done.stopped
         assert any(result.done for result in done.results)
         assert Mark.of(made.session).interrupted

@@ -11,9 +11,9 @@ from typing import Protocol
 import pytest
 
 from tui.drive import library
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.lines import OpenLine, open_line
-from tui.session.monitor import Snapshot
+from tui.session.monitor import Monitor, Snapshot
 from tui.session.readings import Quality
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
@@ -89,30 +89,30 @@ def wrong(snapshots: list[Snapshot], expected: Mapping[str, int]) -> list[tuple[
 async def test_the_scanner_is_used_as_soon_as_it_saves_time(start: Start) -> None:
     words = scattered(6)
     simulation, opened = start(DriveSpec("atv71", 1, sets=words))
-    drive = DriveSession(opened.line, 1, library.load("atv71"))
-    drive.monitor.start(list(words), period=0.1)
+    monitor = Monitor(DriveSession(opened.line, 1, library.load("atv71")))
+    monitor.start(list(words), period=0.1)
     snapshots: list[Snapshot] = []
-    drive.monitor.listen(snapshots.append)
+    monitor.listen(snapshots.append)
     await until(lambda: len(snapshots) > 3)
     assert snapshots[-1].block == ""
-    before = drive.monitor.reader.seconds(words)
+    before = monitor.reader.seconds(words)
     for slot, address in assignment(list(words)).items():
         simulation.drive(1).set(slot, address)
     await until(lambda: bool(snapshots[-1].block))
     assert snapshots[-1].block == "Scanner inputs"
-    assert drive.monitor.reader.seconds(words) < before / 2
+    assert monitor.reader.seconds(words) < before / 2
     assert not wrong(snapshots, words)
-    drive.close()
+    monitor.stop()
 
 
 async def test_a_scanner_changed_under_way_never_shows_one_value_as_another(start: Start) -> None:
     words = scattered(6)
     codes = list(words)
     simulation, opened = start(DriveSpec("atv71", 1, sets=words | assignment(codes)))
-    drive = DriveSession(opened.line, 1, library.load("atv71"))
+    monitor = Monitor(DriveSession(opened.line, 1, library.load("atv71")))
     snapshots: list[Snapshot] = []
-    drive.monitor.listen(snapshots.append)
-    drive.monitor.start(codes, period=0.05)
+    monitor.listen(snapshots.append)
+    monitor.start(codes, period=0.05)
     await until(lambda: bool(snapshots and snapshots[-1].block))
     orders = itertools.cycle(itertools.permutations(codes))
     end = time.monotonic() + 6.0
@@ -125,7 +125,7 @@ async def test_a_scanner_changed_under_way_never_shows_one_value_as_another(star
     assert changes > 50
     assert sum(bool(snapshot.block) for snapshot in snapshots) > 5
     assert not wrong(snapshots, words)
-    drive.close()
+    monitor.stop()
 
 
 BLOCK_CODES = ["FD01", "FD00", "FE03", "FE05", "FE90"]
@@ -134,28 +134,28 @@ BLOCK = {"F875": 1, "F876": 2, "F877": 3, "F878": 4, "F879": 11}
 
 async def test_a_fault_ends_the_trust_in_what_counts_until_a_reset(start: Start) -> None:
     simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
-    drive = DriveSession(opened.line, 1, library.load("atv21"))
-    drive.monitor.start(period=0.1)
-    await until(lambda: bool(drive.monitor.latest and drive.monitor.latest.block))
+    monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
+    monitor.start(period=0.1)
+    await until(lambda: bool(monitor.latest and monitor.latest.block))
     simulation.drive(1).provoke("OC1")
-    await until(lambda: bool(drive.monitor.latest and not drive.monitor.latest.block))
-    assert drive.monitor.latest is not None
-    assert drive.monitor.latest.state.kind == "fault"
-    drive.close()
+    await until(lambda: bool(monitor.latest and not monitor.latest.block))
+    assert monitor.latest is not None
+    assert monitor.latest.state.kind == "fault"
+    monitor.stop()
 
 
 async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None:
     simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
-    drive = DriveSession(opened.line, 1, library.load("atv21"))
+    monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
     snapshots: list[Snapshot] = []
-    drive.monitor.listen(snapshots.append)
-    drive.monitor.start(period=0.1)
+    monitor.listen(snapshots.append)
+    monitor.start(period=0.1)
     await until(lambda: bool(snapshots and snapshots[-1].block == "Read block"))
-    assert drive.monitor.reader.seconds(["FD01", "FD00", "FE03", "FE05", "FE90"]) > 0
+    assert monitor.reader.seconds(["FD01", "FD00", "FE03", "FE05", "FE90"]) > 0
     # what is chosen now counts from the next reset on: the block goes on bringing the same
     for slot, raw in {"F875": 2, "F876": 1}.items():
-        await opened.line.write(1, drive.profile[slot].address, [raw])
-    await until(lambda: not {"F875", "F876"} & drive.monitor.reader.in_force.keys())
+        await opened.line.write(1, monitor.profile[slot].address, [raw])
+    await until(lambda: not {"F875", "F876"} & monitor.reader.in_force.keys())
     assert simulation.drive(1).raw("F875") == 2
     simulation.drive(1).power_cycle()
     await asyncio.sleep(3.0)
@@ -165,30 +165,30 @@ async def test_an_indirect_block_is_used_once_it_is_proved(start: Start) -> None
             # a frequency of 35.00 Hz or on its way there is no status word of this drive
             assert status.raw is not None
             assert status.raw & 0x6000 or snapshot.state.kind in ("starting", "fault", "blocked")
-    drive.close()
+    monitor.stop()
 
 
 async def test_on_a_slow_line_every_place_is_proved_while_values_move(start: Start) -> None:
     _, opened = start(
         DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0), LineTiming(19200, "8N1", True)
     )
-    drive = DriveSession(opened.line, 1, library.load("atv21"))
-    drive.monitor.start(period=0.05)
-    await until(lambda: drive.monitor.reader.in_force == BLOCK, 60.0)
+    monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
+    monitor.start(period=0.05)
+    await until(lambda: monitor.reader.in_force == BLOCK, 60.0)
     # all five in one request, in little more than the time of two words
-    assert drive.monitor.reader.seconds(BLOCK_CODES) < 2 * drive.monitor.reader.seconds(["FE22"])
-    drive.close()
+    assert monitor.reader.seconds(BLOCK_CODES) < 2 * monitor.reader.seconds(["FE22"])
+    monitor.stop()
 
 
 async def test_a_pending_choice_is_never_proved(start: Start) -> None:
     simulation, opened = start(DriveSpec("atv21", 1, sets=BLOCK, run_hz=35.0))
-    drive = DriveSession(opened.line, 1, library.load("atv21"))
+    monitor = Monitor(DriveSession(opened.line, 1, library.load("atv21")))
     # chosen since the last reset: the block brings what it brought before
     for slot, raw in {"F876": 3, "F877": 2}.items():
-        await opened.line.write(1, drive.profile[slot].address, [raw])
+        await opened.line.write(1, monitor.profile[slot].address, [raw])
     assert simulation.drive(1).raw("F876") == 3
-    drive.monitor.start(period=0.05)
-    await until(lambda: {"F875", "F878", "F879"} <= drive.monitor.reader.in_force.keys(), 60.0)
+    monitor.start(period=0.05)
+    await until(lambda: {"F875", "F878", "F879"} <= monitor.reader.in_force.keys(), 60.0)
     await asyncio.sleep(3.0)
-    assert not {"F876", "F877"} & drive.monitor.reader.in_force.keys()
-    drive.close()
+    assert not {"F876", "F877"} & monitor.reader.in_force.keys()
+    monitor.stop()

@@ -54,9 +54,7 @@ def test_the_time_is_told_in_the_zone_of_now() -> None:
 
 def test_a_motor_that_was_left_running_is_told_so() -> None:
     text = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW)
-    assert text == (
-        "runs since 17:34 by a command from here, left running on purpose, that program ended"
-    )
+    assert text == ("runs since 17:34, left running on purpose by a program that ended")
 
 
 def test_a_time_that_is_none_is_left_out() -> None:

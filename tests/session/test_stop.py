@@ -12,8 +12,9 @@ from tui.bus.line import Line, Priority
 from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.journal import Journal
+from tui.session.reader import Reader
 from tui.session.stop import Phase, Stopper, StopReport
 from tui.simulator import DriveSpec, Simulation
 
@@ -135,7 +136,7 @@ async def test_with_dotd_at_freewheel_the_drive_is_halted_instead(
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0, sets={"DOTD": 0}))
     await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
     session = DriveSession(line, 1, library.load("atv71"))
-    session.monitor.known.note(await session.read(["CHCF", "DOTD", "ETA"]))
+    await Reader(session).read(["CHCF", "DOTD", "ETA"])
     stopper = Stopper(line, journal)
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
@@ -199,7 +200,7 @@ async def test_all_are_stopped_and_a_broadcast_starts_none(start: Start, journal
 async def test_a_stop_goes_before_all_that_waits(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
     session = DriveSession(line, 1, library.load("atv71"))
-    session.monitor.known.note(await session.read(["CHCF", "DOTD", "ETA"]))
+    await Reader(session).read(["CHCF", "DOTD", "ETA"])
     crowd = [
         asyncio.create_task(line.read(1, 3201, priority=priority))
         for priority in (Priority.OPERATOR_READ, Priority.POLL) * 20

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar, cast
+from typing import Any, cast
 
 from tui.app import DrivePanelApp
 from tui.bus.line import Counters, DeviceState, Frame, Line, LineState, LineStatus
@@ -13,14 +13,16 @@ from tui.bus.link import SerialLink
 from tui.drive import library
 from tui.drive.profile import Profile
 from tui.drive.values import decode
-from tui.session.drive_session import DriveSession
+from tui.session.arming import Arming
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
+from tui.session.fleet import Fleet, FoundDrive
 from tui.session.identify import DriveIdentity
-from tui.session.keeper import Keeper, Watch
-from tui.session.known import Known
+from tui.session.journal import Journal
+from tui.session.keeper import Keeper, Look, Watch
 from tui.session.lines import OpenLine
-from tui.session.monitor import Snapshot, TrendPoint
-from tui.session.order_queue import OrderQueue
+from tui.session.monitor import Monitor, Snapshot, TrendPoint
 from tui.session.readings import Quality, Reading
 from tui.widgets.clock import Clock
 
@@ -100,28 +102,37 @@ def snapshot_of(
     )
 
 
-@dataclass
-class FakeMonitor:
-    """A monitor whose latest snapshot is given."""
+class StillMonitor(Monitor):
+    """A monitor that has brought one snapshot, or none, and brings no other."""
 
-    latest: Snapshot | None
-    trend: tuple[TrendPoint, ...] = ()
-    period: float = 0.5
-    running: bool = False
-    known: Known = field(default_factory=Known)
+    def __init__(
+        self, session: DriveSession, latest: Snapshot | None, trend: Iterable[TrendPoint] = ()
+    ) -> None:
+        super().__init__(session)
+        self._latest = latest
+        self._trend.extend(trend)
 
-    def __post_init__(self) -> None:
-        if self.latest is not None:
-            self.known.note(self.latest.readings)
-
-    def start(self, *_: Any, **__: Any) -> None:
+    def start(
+        self,
+        codes: Sequence[str] | None = None,
+        period: float = 0.5,
+        *,
+        extra: Sequence[str] = (),
+    ) -> None:
         """Nothing to start."""
 
-    def stop(self) -> None:
-        """Nothing to stop."""
 
-    def listen(self, _: Any) -> None:
-        """Nothing will come."""
+class StillArming(Arming):
+    """A drive that is armed for so many seconds, or not at all."""
+
+    def __init__(self, line: Line, seconds: float | None) -> None:
+        super().__init__(line)
+        self._seconds = seconds
+
+    @property
+    def armed_for(self) -> float | None:
+        """The countdown of a picture stands still."""
+        return self._seconds
 
 
 @dataclass
@@ -164,39 +175,37 @@ class FakeLine:
         """Nothing to close."""
 
 
+@dataclass
 class FakeKeeper:
-    """A keeper that has looked at no drive."""
+    """A keeper that has seen what the test gives, and no more."""
 
-    looks: ClassVar[dict[int, Any]] = {}
-
-    def __init__(self, watch: Watch | None = None) -> None:
-        self._watch = watch
+    given: Watch | None = None
+    alone: dict[int, Watch] = field(default_factory=dict)
+    commanded: list[DriveSession] = field(default_factory=list)
+    looks: dict[int, Look] = field(default_factory=dict)
 
     def watch(self, _device: int) -> Watch | None:
         """The watch that the test gives."""
-        return self._watch
+        return self.given
 
     def hungry(self) -> list[Any]:
         """No drive is about to trip."""
         return []
 
-    def under_command(self) -> list[Any]:
-        """No motor runs by an order from here."""
+    def under_command(self) -> list[DriveSession]:
+        """The motors that run by an order from here."""
+        return self.commanded
+
+    def unread(self) -> list[DriveSession]:
+        """Every time-out is known."""
         return []
 
-    def left_alone(self) -> dict[int, float]:
-        """No drive trips."""
-        return {}
+    def left_alone(self) -> dict[int, Watch]:
+        """The drives that trip."""
+        return self.alone
 
     def stop(self) -> None:
         """Nothing to stop."""
-
-
-def keeper_of(timeouts: dict[int, float]) -> Keeper:
-    """A keeper of running drives that watch the line."""
-    keeper = FakeKeeper()
-    keeper.left_alone = lambda: timeouts  # type: ignore[method-assign]
-    return cast("Keeper", keeper)
 
 
 ATV71 = DriveIdentity(2, "Telemecanique", "ATV71HU15M3", "0201", "MACHINE 4", "atv71", ("atv71",))
@@ -207,19 +216,52 @@ def opened(state: LineState = CONNECTED) -> OpenLine:
     return OpenLine("serial:/dev/ttyUSB0,19200,8E1", cast("Line", FakeLine(state)))
 
 
-def session_of(snapshot: Snapshot | None, line: LineState = CONNECTED) -> DriveSession:
+def console_of(
+    snapshot: Snapshot | None,
+    line: LineState = CONNECTED,
+    *,
+    device: int = 2,
+    family: str = "atv71",
+    armed: float | None = None,
+) -> DriveConsole:
     """A drive whose monitor has brought this snapshot, with a trend of a start and a run."""
-    profile = library.load("atv71")
-    session = DriveSession.__new__(DriveSession)
-    session.line = cast("Line", FakeLine(line))
-    session.device, session.profile, session.identity = 2, profile, ATV71
-    session.orders, session.commanded_at = OrderQueue(session.line, 2), None
+    session = DriveSession(cast("Line", FakeLine(line)), device, library.load(family), ATV71)
+    session.arming = session.work.arming = StillArming(session.line, armed)
     trend = tuple(
         TrendPoint(NOW - 60 + i / 2, (min(50.0, max(0.0, i - 20) * 0.8), 2.0 + (i % 30) * 0.1))
         for i in range(120)
     )
-    session.monitor = cast("Any", FakeMonitor(snapshot, trend if snapshot else ()))
-    return session
+    console = DriveConsole(session, Journal())
+    console.monitor = StillMonitor(session, snapshot, trend if snapshot else ())
+    for code, reading in snapshot.readings.items() if snapshot else ():
+        if reading.raw is not None:
+            session.image.confirm(code, reading.raw, reading.time)
+    return console
+
+
+def look_of(raws: Mapping[str, int]) -> Look:
+    """What a look at an Altivar 71 that holds this has brought."""
+    profile = library.load("atv71")
+    return Look(drive_state(profile, readings_of(profile, raws, NOW)), "", NOW, None)
+
+
+class StillFleet(Fleet):
+    """Drives that were found, looked after by a keeper that has seen what the test gives."""
+
+    def __init__(
+        self,
+        *drives: FoundDrive,
+        keeper: FakeKeeper | None = None,
+        line: LineState = CONNECTED,
+    ) -> None:
+        super().__init__(cast("Line", FakeLine(line)), Journal())
+        self.keeper = cast("Keeper", keeper or FakeKeeper())
+        for drive in drives:
+            self.hold(drive)
+
+    def hold(self, drive: FoundDrive) -> None:
+        """One more drive, or another in its place."""
+        self._put(drive)
 
 
 def app_of(open_line: Callable[..., OpenLine] | None = None) -> DrivePanelApp:

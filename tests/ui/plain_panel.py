@@ -15,8 +15,9 @@ from textual.widgets import DataTable, Digits, Footer, Sparkline
 
 from tui.drive import library
 from tui.screens.monitor import REFRESH
-from tui.session.drive_session import DriveSession
+from tui.session.drive import DriveSession
 from tui.session.lines import OpenLine, demo_line
+from tui.session.monitor import Monitor
 
 LARGE = ("RFR", "LCR", "RFRD", "OTR")
 
@@ -31,6 +32,7 @@ class PlainPanel(App[None]):
         super().__init__()
         self._opened = opened
         self._session = DriveSession(opened.line, device, library.load("atv71"))
+        self._monitor = Monitor(self._session)
 
     def compose(self) -> ComposeResult:
         """Digits above, a sparkline below them, all values in a table."""
@@ -51,12 +53,12 @@ class PlainPanel(App[None]):
             parameter = profile[value.parameter]
             row = (parameter.code, parameter.name, "-----", parameter.unit, "")
             table.add_row(*row, key=parameter.code)
-        self._session.monitor.start()
+        self._monitor.start()
         self.set_interval(REFRESH, self.look)
 
     def look(self) -> None:
         """Set everything from the latest snapshot."""
-        monitor = self._session.monitor
+        monitor = self._monitor
         if (snapshot := monitor.latest) is None:
             return
         now = asyncio.get_running_loop().time()

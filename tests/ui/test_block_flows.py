@@ -14,6 +14,7 @@ from tui.screens.connection import ConnectionScreen
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
 from tui.screens.pick_parameter import PickParameter
+from tui.session.mapping_desk import MappingDesk
 
 from .test_command_flows import Bench, bench
 from .test_flows import shown, until
@@ -35,6 +36,12 @@ async def message(made: Bench, *parts: str) -> None:
         return " ".join(shown(made.app, "message").split())
 
     await until(made.pilot, lambda: all(part in said() for part in parts))
+
+
+def desk(made: Bench) -> MappingDesk:
+    screen = made.app.screen
+    assert isinstance(screen, BlocksScreen)
+    return screen.desk
 
 
 async def pick(made: Bench, typed: str) -> None:
@@ -110,7 +117,7 @@ async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
         assert made.drive().raw("NMA1") == 9001
         # now that it was told, it may be overwritten
         await until(made.pilot, lambda: "→ ETA" in shown(made.app, "first"))
-        await until(made.pilot, lambda: not made.app.desks[1].busy)
+        await until(made.pilot, lambda: not desk(made).busy)
         await write(made)
         await message(made, "Written and read back: NMA1, NMA3")
 
@@ -194,10 +201,9 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
         await until(made.pilot, lambda: "reset it first" in str(fault.render()))
         await made.pilot.press("escape")
         made.drive().power_off()
-        desk = made.app.mapping_desk(made.app.screen.session)  # type: ignore[attr-defined]
-        await until(made.pilot, lambda: not desk.mapper.written)
+        await until(made.pilot, lambda: not desk(made).mapper.written)
         made.drive().power_on()
-        await until(made.pilot, lambda: not desk.trouble)
+        await until(made.pilot, lambda: not desk(made).trouble)
         await until(made.pilot, lambda: "pending" not in shown(made.app, "second"))
         await answer(made, "x", "FA51=500")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))

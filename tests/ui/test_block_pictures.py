@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any, cast
+from typing import Any
 
 import pytest
 from textual.pilot import Pilot
@@ -13,16 +13,14 @@ from tui.drive.mapping import target
 from tui.drive.schema import Block
 from tui.drive.user_words import UserWord
 from tui.screens.blocks import BlocksScreen
-from tui.session.command import Commander
-from tui.session.drive_session import DriveSession
-from tui.session.journal import Journal
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
 from tui.session.mapping import BlockView, Force, Slot
 from tui.session.mapping_desk import MappingDesk
-from tui.session.said import Said
 from tui.session.verdict import Verdict
+from tui.session.work import Kind, Outcome
 
 from . import fakes
-from .test_command_pictures import FakeCommander
 from .test_pictures import SIZES, Compare
 
 INPUTS = (3201, 8604, 3204, 3205, 3207, 3209, 9630, 0)
@@ -40,15 +38,22 @@ class StillDesk(MappingDesk):
     def stop(self) -> None:
         """Nothing was read."""
 
-    def _say(self, text: str, kind: str) -> None:
+    def _say(self, text: str, kind: Kind) -> None:
         """Said at the moment of every fake."""
-        self.said = Said(text, kind, fakes.NOW)
+        self.session.work.outcome = Outcome(kind, text, fakes.NOW)
 
 
-def session_on(family: str) -> DriveSession:
-    session = fakes.session_of(fakes.snapshot_of(library.load("atv71"), fakes.READY))
-    session.profile = library.load(family)
-    return session
+def desk_on(family: str) -> StillDesk:
+    """The desk of a drive that is ready, where the family is the one whose words are held."""
+    held = fakes.snapshot_of(library.load("atv71"), fakes.READY) if family == "atv71" else None
+    console = fakes.console_of(held, family=family)
+    return StillDesk(console.session, console.monitor, console.journal)
+
+
+def hold(session: DriveSession, raws: Mapping[str, int]) -> None:
+    """The drive was read and holds this."""
+    for code, raw in raws.items():
+        session.image.confirm(code, raw, fakes.NOW)
 
 
 def view_of(
@@ -56,6 +61,7 @@ def view_of(
 ) -> BlockView:
     """Slots that all bring what they stand for."""
     profile = session.profile
+    hold(session, dict(zip(block.slots, raws, strict=True)))
     slots = []
     for code, raw in zip(block.slots, raws, strict=True):
         parameter = target(profile, block, raw)
@@ -73,9 +79,9 @@ def view_of(
 
 
 def scanner() -> MappingDesk:
-    session = session_on("atv71")
-    desk = StillDesk(session, Journal())
-    session.monitor.known.put("INR", 1)
+    desk = desk_on("atv71")
+    session = desk.session
+    hold(session, {"INR": 1})
     first, second = desk.blocks
     desk.views = {
         first.id: view_of(session, first, INPUTS, HELD),
@@ -104,17 +110,14 @@ def differs(desk: MappingDesk) -> None:
     bad = Slot("NMA1", 3201, view.slots[0].parameter, 1480, "raw 1480", view.slots[0].direct,
                Verdict.DIFFERS, Force.ACTIVE)  # fmt: skip
     unknown = Slot("NMA2", 3199, None, None, verdict=Verdict.NONE)
+    hold(desk.session, {"NMA2": 3199})
     desk.views[block.id] = BlockView(block, (bad, unknown, *view.slots[2:]))
-    desk.said = Said(
-        "NMA1 differs; NMA2 no value. 5 slots bring the same as direct reads.",
-        "refused",
-        fakes.NOW,
-    )
+    desk.refuse("NMA1 differs; NMA2 no value. 5 slots bring the same as direct reads.")
 
 
 def indirect() -> MappingDesk:
-    session = session_on("atv21")
-    desk = StillDesk(session, Journal())
+    desk = desk_on("atv21")
+    session = desk.session
     first, second = desk.blocks
     view = view_of(session, first, (1, 2, 3, 4, 11), ATV21)
     active = tuple(
@@ -138,11 +141,11 @@ def indirect() -> MappingDesk:
 
 
 def empty() -> MappingDesk:
-    return StillDesk(session_on("atv71"), Journal())
+    return desk_on("atv71")
 
 
 def without(family: str) -> Callable[[], MappingDesk]:
-    return lambda: StillDesk(session_on(family), Journal())
+    return lambda: desk_on(family)
 
 
 def nothing(_: MappingDesk) -> None:
@@ -183,12 +186,12 @@ def test_blocks(
     prepare(desk)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    app.desks[2] = desk
-    app._commanders[2] = cast("Commander", FakeCommander(armed))
-    app._commanders[2].session = desk.session
+    desk.session.arming = desk.session.work.arming = fakes.StillArming(desk.session.line, armed)
+    console = DriveConsole(desk.session, desk.journal)
+    console.blocks = desk
 
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(BlocksScreen(desk.session))
+        await app.push_screen(BlocksScreen(console))
         await pilot.pause()
         await pilot.press(*keys)
         await pilot.pause()

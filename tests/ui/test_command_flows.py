@@ -69,19 +69,19 @@ class Bench(NamedTuple):
     async def commanded(self) -> None:
         """Wait until it is known that the motor runs by an order from here."""
         app = self.app
-        await until(self.pilot, lambda: bool(app.keeper and app.keeper.under_command()))
+        await until(self.pilot, lambda: bool(app.fleet and app.fleet.keeper.under_command()))
 
     async def stopped(self, device: int = 1) -> None:
         await until(self.pilot, lambda: self.speed(device) == 0)
-        stopper = self.app.stopper
-        assert stopper is not None
+        assert self.app.fleet is not None
+        stopper = self.app.fleet.stopper
         await until(self.pilot, lambda: stopper.reports[device].phase is Phase.STOPPED)
 
 
 def knows_the_state(app: DrivePanelApp) -> bool:
     """Whether Monitor shows a state that was read: until then nothing can be armed."""
     screen = app.screen
-    latest = screen.session.monitor.latest if isinstance(screen, MonitorScreen) else None
+    latest = screen.console.latest if isinstance(screen, MonitorScreen) else None
     known = latest is not None and not latest.error and latest.state.kind != "unknown"
     return known and bool(shown(app, "state"))
 
@@ -138,6 +138,7 @@ async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
         await made.pilot.press("space")
         await made.stopped()
         await made.message("STOPPED")
+        assert "NOT ARMED" in shown(made.app, "status")
         code = (
             next(f.raw for f in made.drive().profile.data.faults.codes if f.raw)
             if (made.drive().profile.data.faults.codes)
@@ -145,6 +146,7 @@ async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
         )
         made.drive().provoke(code)
         await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
+        await made.armed()
         await made.pilot.press("x")
         await until(made.pilot, lambda: made.drive().fault is None)
         await until(made.pilot, lambda: "FAULT" not in shown(made.app, "state"))
@@ -212,7 +214,7 @@ async def test_stop_works_on_every_screen(screen: str) -> None:
         await made.pilot.press("f12")
         await made.stopped()
         assert isinstance(made.app.screen, kind)
-        if "session" not in vars(made.app.screen):
+        if "console" not in vars(made.app.screen):
             # nothing of this screen tells of the drive, so the panel does
             await until(made.pilot, lambda: "STOPPED" in told(made.app))
 
@@ -229,7 +231,7 @@ async def test_space_stops_outside_texts_only() -> None:
         field = made.app.screen.query_one(Input)
         assert field.value == "3 0"
         assert made.speed() > 2
-        assert not (made.app.stopper and made.app.stopper.reports)
+        assert not (made.app.fleet and made.app.fleet.stopper.reports)
         await made.pilot.press("escape", "space")
         await made.stopped()
 
@@ -248,8 +250,9 @@ async def test_one_key_stops_every_drive() -> None:
             made.drive(device).run(30.0)
         await made.running()
         await made.pilot.press("f9")
-        assert made.app.stopper is not None
-        await until(made.pilot, lambda: len(made.app.stopper.reports) == 3)  # type: ignore[union-attr]
+        assert made.app.fleet is not None
+        stopper = made.app.fleet.stopper
+        await until(made.pilot, lambda: len(stopper.reports) == 3)
         await made.stopped(1)
 
 

@@ -11,34 +11,24 @@ from textual.pilot import Pilot
 
 from tui.drive import library
 from tui.screens.monitor import MonitorScreen
-from tui.session.command import Commander, Kind, Outcome
 from tui.session.fault_record import FaultRecord, Moment, Recorder
+from tui.session.fleet import FoundDrive
 from tui.session.journal import Entry
-from tui.session.keeper import Keeper
 from tui.session.stop import Phase, Stopper, StopReport, StopSummary
+from tui.session.work import Kind, Outcome
 
 from . import fakes
 from .test_pictures import SIZES, WATCH, Compare
 
 
 @dataclass
-class FakeCommander:
-    """A commander in a given state."""
+class Given:
+    """How a drive is commanded from here: armed for so many seconds, and what came of it."""
 
     armed_for: float | None = None
     outcome: Outcome | None = None
-    why_disarmed: str = ""
-    lost: str = ""
-
-    def lost_orders(self) -> str:
-        """What the drive no longer holds."""
-        return self.lost
-
-    def touch(self) -> None:
-        """The countdown of a picture stands still."""
-
-    def disarm(self) -> None:
-        """The screen closes."""
+    lost: bool = False
+    """Whether the drive no longer holds the command word that was written."""
 
 
 @dataclass
@@ -65,39 +55,35 @@ def outcome(kind: Kind, text: str) -> Outcome:
 
 REMOTE = {**fakes.READY, "CCC": 1, "CRC": 1}
 RUNNING = {"raws": fakes.RUNNING}
-STATES: dict[str, tuple[dict[str, Any], FakeCommander, StopReport | None, bool]] = {
-    "armed": ({"raws": fakes.READY}, FakeCommander(57), None, False),
+STATES: dict[str, tuple[dict[str, Any], Given, StopReport | None, bool]] = {
+    "armed": ({"raws": fakes.READY}, Given(57), None, False),
     "done": (
         RUNNING,
-        FakeCommander(59, outcome(Kind.DONE, "Run forward: Operation enabled")),
+        Given(59, outcome(Kind.DONE, "Run forward: Operation enabled")),
         None,
         False,
     ),
     "refused": (
         {"raws": fakes.READY},
-        FakeCommander(
-            41, outcome(Kind.REFUSED, "LFR: 80.0 Hz is above the high speed HSP, 60.0 Hz.")
-        ),
+        Given(41, outcome(Kind.REFUSED, "LFR: 80.0 Hz is above the high speed HSP, 60.0 Hz.")),
         None,
         False,
     ),
-    "no-effect": ({"raws": REMOTE}, FakeCommander(57), None, False),
-    "stopping": (RUNNING, FakeCommander(57), stop(Phase.STOPPING, "Ramp stop, 31.5 Hz"), False),
+    "no-effect": ({"raws": REMOTE}, Given(57), None, False),
+    "stopping": (RUNNING, Given(57), stop(Phase.STOPPING, "Ramp stop, 31.5 Hz"), False),
     "not-stopped": (
         RUNNING,
-        FakeCommander(),
+        Given(),
         stop(Phase.FAILED, "NOT STOPPED: Device 2 did not answer. Stop it at the machine."),
         False,
     ),
     "lost-orders": (
         {"raws": fakes.READY},
-        FakeCommander(
-            lost="Reset, switched off or commanded by others: CMD 16#000F is now 16#0000."
-        ),
+        Given(lost=True),
         None,
         False,
     ),
-    "tripped": ({"raws": fakes.FAULT}, FakeCommander(31), None, True),
+    "tripped": ({"raws": fakes.FAULT}, Given(31), None, True),
 }
 
 
@@ -122,16 +108,21 @@ def trip() -> FaultRecord:
 
 def panel(name: str) -> tuple[Any, MonitorScreen]:
     """The panel on a drive in that state."""
-    how, commander, report, unseen = STATES[name]
-    session = fakes.session_of(fakes.snapshot_of(library.load("atv71"), **how))
+    how, given, report, unseen = STATES[name]
+    snapshot = fakes.snapshot_of(library.load("atv71"), **how)
+    console = fakes.console_of(snapshot, armed=given.armed_for)
+    console.session.work.outcome = given.outcome
+    if given.lost:
+        console.commander.note_command("CMD", 0x000F)
+        console.session.image.confirm("CMD", 0, fakes.NOW)
+    record = trip() if unseen else None
+    console.recorder = Recorder(console.session, console.journal, record, not unseen)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    app.keeper = cast("Keeper", fakes.FakeKeeper(WATCH))
-    app.stopper = cast("Stopper", FakeStopper({2: report} if report else {}))
-    app._commanders[2] = cast("Commander", commander)
-    commander.session = session  # type: ignore[attr-defined]
-    app._recorders[2] = Recorder(session, app.journal, trip() if unseen else None, not unseen)
-    return app, MonitorScreen(session)
+    found = FoundDrive(fakes.ATV71, console)
+    app.fleet = fakes.StillFleet(found, keeper=fakes.FakeKeeper(WATCH))
+    app.fleet.stopper = cast("Stopper", FakeStopper({2: report} if report else {}))
+    return app, MonitorScreen(console)
 
 
 @SIZES
@@ -179,9 +170,9 @@ def test_screens_of_commanding(
         profile = monitor.session.profile
         return fakes.readings_of(profile, {code: held.get(code, 0) for code in codes}, fakes.NOW)
 
-    monitor.session.read = read  # type: ignore[method-assign, assignment]
+    monkeypatch.setattr(monitor.console, "read", read)
     if screen == "leave-running":
-        app.keeper.under_command = lambda: [monitor.session]
+        app.fleet.keeper.commanded = [monitor.session]
     monkeypatch.setattr("tui.screens.faults.state_folder", lambda: fakes.FOLDER)
 
     async def show(pilot: Pilot[None]) -> None:

@@ -18,6 +18,7 @@ from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
 
 from . import fakes
+from .test_flows import alone
 
 
 class Opener:
@@ -167,7 +168,7 @@ async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int,
     app.opened = fakes.opened()
     async with app.run_test(size=size) as pilot:
         snapshot = fakes.snapshot_of(library.load("atv71"), fakes.FAULT)
-        await app.push_screen(MonitorScreen(fakes.session_of(snapshot)))
+        await app.push_screen(MonitorScreen(fakes.console_of(snapshot)))
         await pilot.pause(0.4)
         await pilot.press("w", "l", "escape", "question_mark", "escape")
         await pilot.resize_terminal(80, 24)
@@ -178,7 +179,7 @@ async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int,
 async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:
     app = DrivePanelApp(open_line=lambda *_, **__: demo_line({"atv21": 35.0}), start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
-        await until(pilot, lambda: app.keeper is not None and app.keeper.left_alone() == {1: 3.0})
+        await until(pilot, lambda: app.fleet is not None and alone(app.fleet.keeper) == {1: 3.0})
         for answer in ("escape", "y"):
             assert app.opened is not None
             await pilot.press("x")

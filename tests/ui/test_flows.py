@@ -22,6 +22,7 @@ from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
+from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
 
@@ -71,10 +72,10 @@ async def test_choose_a_drive_watch_it_and_come_back() -> None:
         await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
         assert "ATV71HU15M3" in shown(app, "header")
         await until(pilot, lambda: "Hz" in shown(app, "motor"))
-        assert screen.session.monitor.running
+        assert screen.console.monitor.running
         await pilot.press("escape")
         await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
-        await until(pilot, lambda: not screen.session.monitor.running)
+        await until(pilot, lambda: not screen.console.monitor.running)
 
 
 async def test_next_and_previous_drive() -> None:
@@ -83,7 +84,7 @@ async def test_next_and_previous_drive() -> None:
         first = await to_monitor(app, pilot, 1)
         await pilot.press("right_square_bracket")
         await until(pilot, lambda: "device 2" in shown(app, "header"))
-        assert not first.session.monitor.running
+        assert not first.console.monitor.running
         await pilot.press("left_square_bracket")
         await until(pilot, lambda: "device 1" in shown(app, "header"))
         await until(pilot, lambda: "RUNNING" in shown(app, "state"))
@@ -112,7 +113,8 @@ async def test_a_drive_that_watches_the_line_is_asked_on() -> None:
         await pilot.press("escape")
         await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
         await pilot.pause(1.0)
-        assert app.connection.found[1].state == "running forward"
+        state = app.connection.drives.get_option_at_index(0).prompt
+        assert str(state).endswith("running forward")
 
 
 async def test_frames_help_and_palette_open_and_close() -> None:
@@ -159,19 +161,24 @@ async def test_percent_becomes_amperes_once_the_rating_is_told() -> None:
         await until(pilot, in_amperes)
 
 
+def alone(keeper: Keeper) -> dict[int, float]:
+    """Seconds after which drives act once they are left alone, by device."""
+    return {device: watch.timeout for device, watch in keeper.left_alone().items()}
+
+
 async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)
-        keeper = app.keeper
-        assert keeper is not None
-        await until(pilot, lambda: keeper.left_alone() == {1: 3.0})
+        assert app.fleet is not None
+        keeper = app.fleet.keeper
+        await until(pilot, lambda: alone(keeper) == {1: 3.0})
         await pilot.press("q")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
         await pilot.press("escape")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         assert app.is_running
-        await pilot.press("q", "q")
+        await pilot.press("q", "y")
         await until(pilot, lambda: not app.is_running)
 
 
@@ -233,10 +240,10 @@ async def test_nothing_is_drawn_below_the_help_and_it_is_told_that_values_stand_
         await pilot.press("question_mark")
         await until(pilot, lambda: isinstance(app.screen, HelpScreen))
         await pilot.pause()
-        before, latest = motor.redrawn, screen.session.monitor.latest
+        before, latest = motor.redrawn, screen.console.monitor.latest
         await until(pilot, lambda: "as of" in header.lines[0].plain)
         # the drive is watched all the same
-        await until(pilot, lambda: screen.session.monitor.latest is not latest)
+        await until(pilot, lambda: screen.console.monitor.latest is not latest)
         assert motor.redrawn == before
         await pilot.press("escape")
         await until(pilot, lambda: "as of" not in shown(app, "header"))

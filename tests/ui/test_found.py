@@ -8,9 +8,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.drive import library
 from tui.screens.drive_list import DriveList
-from tui.screens.found import FoundDrive, about_drive, drive_line, next_step
+from tui.screens.found import about_drive, drive_line, next_step
+from tui.session.fleet import FoundDrive
 from tui.session.identify import DriveIdentity
 
 from . import fakes
@@ -19,27 +19,29 @@ from .test_flows import shown
 NAMELESS = DriveIdentity(7, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
 
 
+READY = ("ready", "ready")
+
+
 def found(identity: DriveIdentity, profile: str | None = "atv71", *, guessed: bool) -> FoundDrive:
-    session = fakes.session_of(None)
-    if profile is not None:
-        session.profile = library.load(profile)
-    return FoundDrive(identity, session if profile else None, guessed=guessed)
+    console = None if profile is None else fakes.console_of(None, family=profile)
+    return FoundDrive(identity, console, guessed)
 
 
 @given(st.integers(44, 120), st.text("abcABC123 ", max_size=40), st.text("abc ", max_size=16))
 def test_a_drive_fills_its_line_and_its_state_stands_at_the_end(
     width: int, name: str, state: str
 ) -> None:
-    drive = FoundDrive(replace(fakes.ATV71, name=name), None, state or "ready")
-    line = drive_line(drive, width)
+    drive = FoundDrive(replace(fakes.ATV71, name=name))
+    state = state or "ready"
+    line = drive_line(drive, (state, "ready"), width)
     assert line.cell_len == width
-    assert line.plain.endswith(f" {drive.state}")
+    assert line.plain.endswith(f" {state}")
     assert "ATV71HU15M3" in line.plain
 
 
 def test_a_profile_that_is_a_guess_says_so_and_names_the_others() -> None:
     drive = found(NAMELESS, "powerdrive", guessed=True)
-    assert "Powerdrive ?" in drive_line(drive, 48).plain
+    assert "Powerdrive ?" in drive_line(drive, READY, 48).plain
     assert "profile Powerdrive ?" in about_drive(drive)
     assert "proxidrive or varmeca" in next_step(drive)
 
@@ -47,7 +49,7 @@ def test_a_profile_that_is_a_guess_says_so_and_names_the_others() -> None:
 @pytest.mark.parametrize("width", [48, 80])
 def test_a_drive_that_named_itself_has_no_sign(width: int) -> None:
     drive = found(fakes.ATV71, guessed=False)
-    assert "?" not in drive_line(drive, width).plain + about_drive(drive)
+    assert "?" not in drive_line(drive, READY, width).plain + about_drive(drive)
     assert next_step(drive) == "Enter watches it."
 
 
@@ -60,9 +62,13 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         screen, drives = app.connection, app.connection.query_one(DriveList)
+        keeper, overheated = fakes.FakeKeeper(), fakes.look_of({**fakes.FAULT, "LFT": 16})
+        app.opened = fakes.opened()
+        app.fleet = fakes.StillFleet(keeper=keeper)
         for device in range(1, 33):
             identity = replace(fakes.ATV71, device=device)
-            screen.found[device] = FoundDrive(identity, None, "ready")
+            app.fleet.hold(FoundDrive(identity, fakes.console_of(None, device=device)))
+            keeper.looks[device] = fakes.look_of(fakes.READY)
         screen.show_drives()
         drives.focus()
         drives.highlighted = 31
@@ -72,7 +78,7 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives() -> None:
         screen.say("What was said last.", "")
         before = drives.scroll_offset
         assert before.y > 0
-        screen.found[5].state = screen.found[26].state = "fault OHF"
+        keeper.looks[5] = keeper.looks[26] = overheated
         screen.show_drives()
         await pilot.pause()
         assert (drives.scroll_offset, drives.highlighted) == (before, 25)

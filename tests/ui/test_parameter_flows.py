@@ -85,7 +85,7 @@ async def test_find_edit_write_and_read_back() -> None:
 
 async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:
     async with bench("atv71") as made:
-        await to_parameters(made)
+        screen = await to_parameters(made)
         await find(made, "STT")
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, PickValue))
@@ -93,9 +93,7 @@ async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:
         await until(made.pilot, lambda: "→ Fast stop" in shown(made.app, "table"))
         await made.pilot.press("u")
         await until(made.pilot, lambda: "0 staged" in shown(made.app, "status"))
-        made.app.push_screen(
-            EditBits(made.app.editor(made.app.session_at(1)), made.drive().profile["CMI"])  # type: ignore[arg-type]
-        )
+        made.app.push_screen(EditBits(screen.editor, made.drive().profile["CMI"]))
         await until(made.pilot, lambda: isinstance(made.app.screen, EditBits))
         await made.pilot.press("enter", "escape")
 

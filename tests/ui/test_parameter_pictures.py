@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, cast
+from typing import Any
 
 import pytest
 from rich.text import Text
@@ -11,15 +11,15 @@ from textual.pilot import Pilot
 from tui.drive import library
 from tui.screens.parameters import ParametersScreen
 from tui.session.applying import Outcome, Result
-from tui.session.command import Commander
+from tui.session.console import DriveConsole
 from tui.session.editor import Editor
 from tui.session.favourites import Marks
-from tui.session.journal import Journal
-from tui.session.said import Said
+from tui.session.image import Raw
+from tui.session.work import Kind
+from tui.session.work import Outcome as WorkOutcome
 from tui.widgets.parameter_view import news_lines
 
 from . import fakes
-from .test_command_pictures import FakeCommander
 from .test_pictures import SIZES, Compare
 
 HELD = {
@@ -40,16 +40,27 @@ class StillEditor(Editor):
         """Nothing was read."""
 
 
-def editor_of(state: dict[str, int], *, reading: bool = False) -> Editor:
-    """An editor that stands still on an Altivar 71."""
+def editor_of(
+    state: dict[str, int], *, armed: float | None = None, reading: bool = False
+) -> DriveConsole:
+    """An Altivar 71 with an editor that stands still."""
     profile = library.load("atv71")
-    session = fakes.session_of(fakes.snapshot_of(profile, state))
-    editor = StillEditor(session, Journal())
+    snapshot = fakes.snapshot_of(profile, state)
+    console = fakes.console_of(snapshot, armed=armed)
+    editor = StillEditor(console.session, console.journal, lambda: snapshot.state)
     editor.marks = Marks(favourites=("ACC", "HSP"))
     rest = {} if reading else {p.code: 0 for p in profile.parameters if p.access != "w"}
-    editor.raws = {**rest, **state, **HELD}
-    editor.absent = {} if reading else {"SPAT": "exception 2"}
-    return editor
+    image = console.session.image
+    image.take({code: Raw(fakes.NOW, raw) for code, raw in {**rest, **state, **HELD}.items()})
+    if not reading:
+        image.take({"SPAT": Raw(fakes.NOW, None, "exception 2")})
+    console.editor = editor
+    return console
+
+
+def say(editor: Editor, kind: Kind, text: str) -> None:
+    """Said at the moment of every fake."""
+    editor.session.work.outcome = WorkOutcome(kind, text, fakes.NOW)
 
 
 def plain(_: Editor) -> None:
@@ -71,19 +82,18 @@ def refused(editor: Editor) -> None:
         " Stop the motor and write again."
     )
     editor.results = {"HSP": Result(edit, Outcome.DRIVE_REFUSED, text, 500)}
-    editor.said = Said("2 written and read back; 1 still staged: HSP", "refused", fakes.NOW)
+    say(editor, Kind.REFUSED, "2 written and read back; 1 still staged: HSP")
 
 
 def elsewhere(editor: Editor) -> None:
     staged(editor)
-    editor.raws["HSP"] = 300
-    editor.changed_elsewhere = {"HSP": 500}
+    editor.session.image.confirm("HSP", 300, fakes.NOW)
 
 
 def done(editor: Editor) -> None:
     editor.unsaved = {"ACC", "DEC"}
     editor.waits_for_reset = {"ADD"}
-    editor.said = Said("3 written and read back", "done", fakes.NOW)
+    say(editor, Kind.DONE, "3 written and read back")
 
 
 def compared(editor: Editor) -> None:
@@ -120,16 +130,13 @@ def test_parameters(
 ) -> None:
     prepare, drive, armed, keys = STATES[state]
     monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
-    editor = editor_of(drive)
-    prepare(editor)
+    console = editor_of(drive, armed=armed)
+    prepare(console.editor)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    app.editors[2] = editor
-    app._commanders[2] = cast("Commander", FakeCommander(armed))
-    app._commanders[2].session = editor.session
 
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(ParametersScreen(editor.session))
+        await app.push_screen(ParametersScreen(console))
         await pilot.pause()
         await pilot.press(*keys)
         await pilot.pause()
@@ -140,15 +147,12 @@ def test_parameters(
 
 @SIZES
 def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
-    editor = editor_of(fakes.READY, reading=True)
+    console = editor_of(fakes.READY, reading=True)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    app.editors[2] = editor
-    app._commanders[2] = cast("Commander", FakeCommander())
-    app._commanders[2].session = editor.session
 
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(ParametersScreen(editor.session))
+        await app.push_screen(ParametersScreen(console))
         await pilot.pause()
         await pilot.press("right_square_bracket", "right_square_bracket")
         await pilot.pause()
@@ -158,9 +162,11 @@ def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
 
 def test_another_hands_value_is_told_as_the_drive_counts_it() -> None:
     """An Altivar 31 without a ramp increment counts in tenths; that is not an unknown scale."""
-    editor = StillEditor(fakes.session_of(None), Journal())
-    editor.session.profile = library.load("atv31")
-    editor.raws, editor.lacking = {"ACC": 30}, frozenset({"Inr"})
-    editor.changed_elsewhere = {"ACC": 50}
+    console = fakes.console_of(None, family="atv31")
+    editor = StillEditor(console.session, console.journal, lambda: None)
+    image = console.session.image
+    image.take({"ACC": Raw(1.0, 50), "Inr": Raw(1.0, None, "exception 2", absent=True)})
+    editor.stage("ACC", "7 s")
+    image.confirm("ACC", 30, 2.0)
     said = "\n".join(line.plain for line in news_lines(editor, "ACC", Text(""), 100))
     assert "it was 5.0 s" in said

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, cast
+from dataclasses import replace
+from typing import Any
 
 import pytest
 from textual.pilot import Pilot
@@ -13,10 +14,11 @@ from tui.bus.errors import PortBusy
 from tui.bus.line import LineState
 from tui.drive import library
 from tui.screens.connection import ConnectionScreen
-from tui.screens.found import FoundDrive
 from tui.screens.monitor import MonitorScreen
+from tui.session.console import DriveConsole
+from tui.session.fleet import FoundDrive
 from tui.session.identify import DriveIdentity
-from tui.session.keeper import Keeper, Watch
+from tui.session.keeper import Watch
 
 from . import fakes
 
@@ -54,7 +56,7 @@ def test_monitor(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
     app.opened = fakes.opened(line)
 
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(MonitorScreen(fakes.session_of(snapshot, line)))
+        await app.push_screen(MonitorScreen(fakes.console_of(snapshot, line)))
         await pilot.pause()
         app.screen.look()  # type: ignore[attr-defined]
         await pilot.pause()
@@ -84,12 +86,13 @@ def test_watched(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
     snapshot = fakes.snapshot_of(library.load("atv71"), line=line, **how)
     app = fakes.app_of()
     app.opened, app.low_bandwidth = fakes.opened(line), low
-    session = fakes.session_of(snapshot, line)
-    session.line.heard = fakes.NOW - age  # type: ignore[attr-defined]
+    console = fakes.console_of(snapshot, line)
+    console.session.line.heard = fakes.NOW - age  # type: ignore[attr-defined]
+    found = FoundDrive(fakes.ATV71, console)
+    app.fleet = fakes.StillFleet(found, keeper=fakes.FakeKeeper(WATCH), line=line)
 
     async def show(pilot: Pilot[None]) -> None:
-        app.keeper = cast("Keeper", fakes.FakeKeeper(WATCH))
-        await app.push_screen(MonitorScreen(session))
+        await app.push_screen(MonitorScreen(console))
         await pilot.pause()
         app.screen.look()  # type: ignore[attr-defined]
         await pilot.pause()
@@ -97,18 +100,18 @@ def test_watched(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
     assert snap_compare(app, terminal_size=size, run_before=show)
 
 
-def found_drives() -> dict[int, FoundDrive]:
-    profile = library.load("atv71")
-    named = FoundDrive(fakes.ATV71, fakes.session_of(None), "running forward", "running")
-    assert named.session is not None
-    assert named.session.profile is profile
+def found_drives(line: LineState = fakes.CONNECTED) -> fakes.StillFleet:
+    """A drive that runs, one without a profile, and one in fault."""
     unknown = DriveIdentity(5, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
     faulty = DriveIdentity(7, "Telemecanique", "ATV71HU22N4", "0304", "", "atv71", ("atv71",))
-    return {
-        2: named,
-        5: FoundDrive(unknown, None, "no profile", "unknown"),
-        7: FoundDrive(faulty, fakes.session_of(None), "fault ObF", "fault"),
-    }
+    looks = {2: fakes.look_of(fakes.RUNNING), 7: fakes.look_of(fakes.FAULT)}
+    return fakes.StillFleet(
+        FoundDrive(fakes.ATV71, fakes.console_of(None)),
+        FoundDrive(unknown),
+        FoundDrive(faulty, fakes.console_of(None)),
+        keeper=fakes.FakeKeeper(looks=looks),
+        line=line,
+    )
 
 
 def connection(app: Any) -> ConnectionScreen:
@@ -130,8 +133,8 @@ async def scanning(app: Any, pilot: Pilot[None]) -> None:
 
 async def drives_found(app: Any, pilot: Pilot[None]) -> None:
     app.opened = fakes.opened()
+    app.fleet = found_drives()
     screen = connection(app)
-    screen.found = found_drives()
     screen.show_drives()
     screen.show_heads()
     screen._sum_up(range(1, 11))
@@ -154,9 +157,8 @@ async def no_answer(app: Any, pilot: Pilot[None]) -> None:
 
 async def line_lost(app: Any, pilot: Pilot[None]) -> None:
     app.opened = fakes.opened(fakes.LOST)
+    app.fleet = found_drives(fakes.LOST)
     screen = connection(app)
-    screen.found = found_drives()
-    app.keeper = fakes.FakeKeeper()
     screen.look()
     screen.show_heads()
     await pilot.pause()
@@ -191,6 +193,18 @@ def test_connection(snap_compare: Compare, state: str, size: tuple[int, int]) ->
     assert snap_compare(app, terminal_size=size, run_before=show)
 
 
+def that_trip(shown: DriveConsole) -> fakes.StillFleet:
+    """Beside the drive that is shown two that watch the line."""
+    drives, alone = [FoundDrive(fakes.ATV71, shown)], {}
+    for device, family, seconds, chosen in ((1, "atv21", 3.0, 0), (3, "atv71", 10.0, 1)):
+        console = fakes.console_of(None, device=device, family=family)
+        rules = console.session.profile.data.communication_fault
+        assert rules is not None
+        alone[device] = Watch(seconds, rules.reactions[chosen])
+        drives.append(FoundDrive(replace(fakes.ATV71, device=device), console))
+    return fakes.StillFleet(*drives, keeper=fakes.FakeKeeper(alone=alone))
+
+
 OVER_MONITOR = {"help": "question_mark", "frames": "l", "leave": "q"}
 
 
@@ -200,10 +214,11 @@ def test_over_monitor(snap_compare: Compare, screen: str, size: tuple[int, int])
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    app.keeper = fakes.keeper_of({1: 3.0, 3: 10.0})
+    console = fakes.console_of(snapshot)
+    app.fleet = that_trip(console)
 
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(MonitorScreen(fakes.session_of(snapshot)))
+        await app.push_screen(MonitorScreen(console))
         await pilot.pause()
         app.screen.look()  # type: ignore[attr-defined]
         await pilot.press(OVER_MONITOR[screen])

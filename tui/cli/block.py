@@ -19,12 +19,12 @@ from .options import (
     read_only_option,
     settings_options,
 )
-from .orders import arm_option, need_arming
+from .orders import arm_option, need_arming, permit_of
 from .sets import dry_run_option, write_down
 
 if TYPE_CHECKING:
     from tui.drive.mapping import Assignment
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
     from tui.session.mapping import BlockView
 
@@ -121,9 +121,11 @@ async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> i
 
 async def _measure_answer(session: DriveSession) -> None:
     """One read, after which it is known how long this drive takes to answer."""
+    from tui.session.reader import Reader
+
     status = session.profile.quantity("status_word")
     if status is not None:
-        await session.read([status.code])
+        await Reader(session).read([status.code])
 
 
 async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
@@ -190,7 +192,9 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     journal = Journal()
     try:
         for plan in plans:
-            done = await write_assignment(session, journal, plan, expected=held)
+            done = await write_assignment(
+                session, journal, plan, permit=permit_of(session), expected=held
+            )
             click.echo(f"{plan.block.name}: {done.text}", err=wanted.as_json)
     except AssignmentRefused as error:
         by_drive = isinstance(error.__cause__, DeviceException | NotTaken)

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tui.drive.mapping_wire import Stretch
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.mapping import BlockView, Slot
 
 HEADINGS = ("Slot", "Stands for", "Name", "Number", "Wire address", "Brings", "Direct", "", "")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.identify import DriveIdentity
     from tui.session.lines import OpenLine
 
@@ -123,7 +123,7 @@ async def connect(opened: OpenLine, target: Target) -> DriveSession:
     Raises UnidentifiedDrive with what to type where the drive does not say who it is.
     """
     from tui.drive import library
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.identify import identify
 
     identity: DriveIdentity | None = None
@@ -144,9 +144,9 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
         return
     from decimal import Decimal
 
-    from tui.session.reader import Rating
+    from tui.session.readings import Rating
 
-    session.rate(current.code, Rating(Decimal(str(rated_current)), "A"))
+    session.ratings[current.code] = Rating(Decimal(str(rated_current)), "A")
 
 
 def unidentified(identity: DriveIdentity) -> click.UsageError:

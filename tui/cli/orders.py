@@ -3,25 +3,30 @@
 from __future__ import annotations
 
 import asyncio
+import math
 from collections.abc import AsyncIterator, Callable, Coroutine
 from contextlib import asynccontextmanager, suppress
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from tui.session.command import Commander, Kind, Outcome
+from tui.drive.orders import OrderRefused
+from tui.session.work import Kind, Outcome
 
 from .errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
 from .options import Target, connect, drive_options, line_argument, on_line, read_only_option
 
 if TYPE_CHECKING:
-    from tui.session.drive_session import DriveSession
+    from tui.session.command import Commander
+    from tui.session.console import DriveConsole
+    from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.keeper import Keeper, Watch
+    from tui.session.keeper import Watch
     from tui.session.lines import OpenLine
     from tui.session.monitor import Snapshot
-    from tui.session.stop import Stopper
+    from tui.session.recording import StartKeeper
+    from tui.session.work import Permit
 
 LOOK = 0.02
 """Seconds between two looks at what the line's thread has come to."""
@@ -45,69 +50,72 @@ def complain(text: str) -> None:
         click.echo(f"drivepanel: {text}", err=True)
 
 
-@dataclass(frozen=True, slots=True)
-class Desk:
-    """One drive with all that commands it and looks after it."""
+def moved(journal: Journal) -> bool:
+    """Whether a command was sent, answered or not; a reference alone moves nothing."""
+    return any(not entry.why.startswith("reference") for entry in journal.recent)
 
-    session: DriveSession
-    commander: Commander
-    stopper: Stopper
-    keeper: Keeper
-    journal: Journal
 
-    @property
-    def moved(self) -> bool:
-        """Whether an order was sent, answered or not; a reference alone moves nothing."""
-        return any(not entry.why.startswith("reference") for entry in self.journal.recent)
-
-    @property
-    def latest(self) -> Snapshot:
-        """The last cycle of the monitor."""
-        latest = self.session.monitor.latest
-        assert latest is not None, "a desk is handed out after the first cycle"
-        return latest
+def latest_of(console: DriveConsole) -> Snapshot:
+    """The last cycle of a drive that is watched."""
+    latest = console.latest
+    assert latest is not None, "a console is handed out after the first cycle"
+    return latest
 
 
 @asynccontextmanager
-async def desk_of(opened: OpenLine, target: Target) -> AsyncIterator[Desk]:
-    """The wanted drive, watched and fed, its state known.
+async def watched(
+    opened: OpenLine, target: Target, starts: StartKeeper | None = None
+) -> AsyncIterator[tuple[Fleet, DriveConsole]]:
+    """The wanted drive, watched and fed, its state known; `starts` records those of its motor.
 
     Raises Failure where it does not answer, and what `connect` raises.
     """
+    from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.keeper import Keeper
-    from tui.session.stop import Stopper
 
     from .status import shown_codes
 
     session = await connect(opened, target)
-    journal, keeper = Journal(), Keeper(opened.line)
-    desk = Desk(
-        session,
-        Commander(session, journal),
-        Stopper(opened.line, journal),
-        keeper,
-        journal,
-    )
-    session.monitor.start(period=PERIOD, extra=shown_codes(session.profile))
-    keeper.keep(session)
+    journal = Journal()
+    # the motors of a simulated line end with it
+    fleet = Fleet(opened.line, journal, None if opened.simulation else starts)
+    console = fleet.take(session)
+    console.monitor.start(period=PERIOD, extra=shown_codes(session.profile))
     try:
-        await _first_look(session)
-        yield desk
+        await _first_look(console)
+        yield fleet, console
     finally:
-        keeper.stop()
-        session.close()
+        fleet.forget()
         journal.close()
+        if starts is not None:
+            starts.close()
 
 
-async def _first_look(session: DriveSession) -> None:
+async def _first_look(console: DriveConsole) -> None:
     while True:
-        latest = session.monitor.latest
+        latest = console.latest
         if latest is not None and not latest.error:
             return
         if latest is not None and latest.cycle >= FIRST_TRIES:
             raise Failure(latest.error, LINE_TROUBLE)
         await asyncio.sleep(LOOK)
+
+
+def permit_of(session: DriveSession) -> Permit:
+    """The right to write to a drive for as long as this command lasts; --arm was given.
+
+    Raises OrderRefused on a read-only line.
+    """
+    session.arming.arm(seconds=math.inf)
+    return session.work.permit()
+
+
+def arm_drive(console: DriveConsole) -> None:
+    """Let commands to a drive through for as long as this command lasts. Raises OrderRefused."""
+    latest = console.latest
+    if latest is None or latest.error or latest.state.kind == "unknown":
+        raise OrderRefused("The state of the drive is not known; nothing is commanded.")
+    console.session.arming.arm(seconds=math.inf)
 
 
 async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome:
@@ -116,16 +124,24 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     Raises OrderRefused where it is not even begun; Failure where it is refused, with the status
     of who refused it: 5 here, 4 the drive, 3 no answer.
     """
-    commander.outcome = None
+    work = commander.session.work
+    before = work.outcome
     give()
-    orders = commander.session.orders
-    await _until(lambda: commander.outcome is not None or not orders.busy)
-    outcome = commander.outcome
+    await _until(lambda: work.outcome is not before or not work.busy_for(commander))
+    outcome = work.outcome if work.outcome is not before else None
     if outcome is None:
         raise Failure("The order was not sent: a newer one took its place.", REFUSED_HERE)
     if outcome.kind is Kind.REFUSED:
-        raise Failure(outcome.text, _status(outcome.error))
+        raise Failure(outcome.text + _way_on(outcome.error), _status(outcome.error))
     return outcome
+
+
+def _way_on(error: Exception | None) -> str:
+    """What lets a command through that was refused, where something does."""
+    from tui.session.starts import StartNotRecorded, StartOvertaken
+
+    refused = isinstance(error, StartNotRecorded) and not isinstance(error, StartOvertaken)
+    return " --unrecorded runs it all the same." if refused else ""
 
 
 async def _until(holds: Callable[[], bool]) -> None:
@@ -150,47 +166,37 @@ def need_arming(arm: bool, does: str) -> None:
         )
 
 
-async def watch_of(desk_session: DriveSession, keeper: Keeper) -> Watch | None:
+async def watch_of(fleet: Fleet, console: DriveConsole) -> Watch | None:
     """A kept drive's watch over the line; None where it has none, or it is off.
 
     Raises Failure where it could not be learnt.
     """
-    rules = desk_session.profile.data.communication_fault
+    rules = console.session.profile.data.communication_fault
     if rules is None or not rules.timeout:
         return None
-    readings = await desk_session.read([rules.timeout])
+    readings = await console.read([rules.timeout])
     raw = readings[rules.timeout].raw
     if raw is None or raw in (rules.off, 0):
         return None
     end = asyncio.get_running_loop().time() + LEARNT_WITHIN
-    while (watch := keeper.watch(desk_session.device)) is None:
+    while (watch := fleet.keeper.watch(console.device)) is None:
         if asyncio.get_running_loop().time() > end:
             raise Failure(f"{rules.timeout} is set and could not be learnt.", LINE_TROUBLE)
         await asyncio.sleep(LOOK)
     return watch
 
 
-def left_alone(session: DriveSession, watch: Watch | None) -> str:
-    """What the drive does when nobody asks it any more, in a sentence."""
-    does = "goes on running: it does not watch the line"
-    if watch is not None:
-        reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
-        does = f"acts {watch.timeout:g} s after the last request: {reaction}"
-    who = f"Device {session.device}, {session.profile.name}"
-    return f"{who}: left alone it {does.rstrip('.')}."
-
-
 def _ordered(
-    target: Target, read_only: bool, work: Callable[[Desk], Coroutine[Any, Any, str]]
+    target: Target, read_only: bool, work: Callable[[DriveConsole], Coroutine[Any, Any, str]]
 ) -> None:
     """Do the work at the armed drive and print what it came to."""
 
-    async def at_desk(opened: OpenLine) -> str:
-        async with desk_of(opened, target) as desk:
-            desk.commander.arm()
-            return await work(desk)
+    async def at_console(opened: OpenLine) -> str:
+        async with watched(opened, target) as (_, console):
+            arm_drive(console)
+            return await work(console)
 
-    click.echo(on_line(target.line_text, at_desk, read_only=read_only))
+    click.echo(on_line(target.line_text, at_console, read_only=read_only))
 
 
 @click.command()
@@ -209,8 +215,8 @@ def reference(
     """Give a drive its reference: 30, 30.5Hz, 900rpm. Starts no motor."""
     need_arming(arm, "reference writes the drive's reference; a running motor follows it")
 
-    async def work(desk: Desk) -> str:
-        commander = desk.commander
+    async def work(console: DriveConsole) -> str:
+        commander = console.commander
         return (await carried_out(commander, lambda: commander.refer(text))).text
 
     _ordered(target, read_only, work)
@@ -230,19 +236,19 @@ def reset(
     """Reset a drive's fault. Its cause must be gone; starts no motor."""
     need_arming(arm, "reset writes the drive's command word and ends its fault")
 
-    async def work(desk: Desk) -> str:
-        outcome = await carried_out(desk.commander, lambda: desk.commander.order("reset"))
-        await _out_of_fault(desk, outcome)
-        return f"{outcome.text.partition(':')[0]}: {desk.latest.state.headline}"
+    async def work(console: DriveConsole) -> str:
+        outcome = await carried_out(console.commander, lambda: console.commander.order("reset"))
+        await _out_of_fault(console, outcome)
+        return f"{outcome.text.partition(':')[0]}: {latest_of(console).state.headline}"
 
     _ordered(target, read_only, work)
 
 
-async def _out_of_fault(desk: Desk, outcome: Outcome) -> None:
+async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
     """Wait until the drive shows no fault any more; raises Failure where it stays in it."""
     end = outcome.time + FAULT_GONE_WITHIN
     while True:
-        latest = desk.latest
+        latest = latest_of(console)
         fresh = latest.time > outcome.time and not latest.error
         if fresh and latest.state.kind not in ("fault", "unknown", "starting"):
             return

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.readings import Reading
 
 COLUMNS = {

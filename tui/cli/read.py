@@ -18,7 +18,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
     from tui.session.readings import Reading
 
@@ -41,12 +41,14 @@ def read(
     A CODE is the drive's own (ACC, 1.05, F875), the manual's number (W9001, 16#FD00) or a wire
     address (9001), in any case.
     """
+    from tui.session.reader import Reader
+
     from .output import print_json, print_readings, readings_json
 
     async def work(opened: OpenLine) -> tuple[DriveSession, dict[str, Reading]]:
         session = await connect(opened, target)
         wanted = [session.profile.find(code).code for code in codes]
-        return session, await session.read(wanted)
+        return session, await Reader(session).read(wanted)
 
     session, readings = on_line(target.line_text, work, read_only=read_only)
     if as_json:

@@ -18,7 +18,7 @@ from .options import (
     profile_option,
     read_only_option,
 )
-from .orders import arm_option, need_arming
+from .orders import arm_option, need_arming, permit_of
 from .sets import (
     codes_of,
     confirm_option,
@@ -35,7 +35,7 @@ from .sets import (
 if TYPE_CHECKING:
     from tui.drive.parameter_set import ParameterSet
     from tui.drive.restore_plan import Options, RestorePlan
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
 
 NAMED = 12
@@ -172,10 +172,10 @@ async def _restore(
     source = library.load(values.head.profile)
     if told_before := Mark.of(session).interrupted:
         click.echo(told_before)
-    journal = Journal()
+    journal, permit = Journal(), permit_of(session)
     try:
         done = await bring_back(
-            session, journal, values, source, options,
+            session, journal, values, source, options, permit=permit,
             progress=say_result, reading=counter("Read"),
         )  # fmt: skip
         say_plan_left_out(done.plan)
@@ -183,7 +183,7 @@ async def _restore(
             click.echo(link.text)
         saved = save and done.complete
         if saved:
-            click.echo(await save_to_eeprom(session, journal))
+            click.echo(await save_to_eeprom(session, journal, permit))
         say_afterwards(done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
         click.echo(f"{written} written and read back, {len(done.left)} not.")

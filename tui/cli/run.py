@@ -18,6 +18,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tui.session.keeper import left_alone_text
+from tui.session.recording import StartKeeper
+
 from .errors import DRIVE_REFUSED, Failure, told
 from .options import (
     Target,
@@ -28,19 +31,22 @@ from .options import (
     read_only_option,
 )
 from .orders import (
-    Desk,
+    arm_drive,
     arm_option,
     carried_out,
     complain,
-    desk_of,
-    left_alone,
+    latest_of,
+    moved,
     need_arming,
     watch_of,
+    watched,
 )
 from .status import fault_text, shown_values, values_json
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
+    from tui.session.console import DriveConsole
+    from tui.session.fleet import Fleet
     from tui.session.keeper import Watch
     from tui.session.lines import OpenLine
     from tui.session.monitor import Snapshot
@@ -155,6 +161,7 @@ class Wish:
     reference: str | None
     seconds: float | None
     leave_running: bool
+    unrecorded: bool
     as_json: bool
 
 
@@ -162,7 +169,8 @@ class Wish:
 class Run:
     """One motor from its run order to its stop."""
 
-    desk: Desk
+    fleet: Fleet
+    console: DriveConsole
     wish: Wish
     voice: Voice
     ending: Ending
@@ -181,10 +189,10 @@ class Run:
                 await self._follow()
                 left = self.wish.leave_running
         finally:
-            if (self.desk.moved or self.ordering) and not left:
+            if (moved(self.fleet.journal) or self.ordering) and not left:
                 await self._bring_to_rest()
         if left:
-            self._tell("left-running", left_alone(self.desk.session, self.watch))
+            self._tell("left-running", left_alone_text(self.console.session, watch=self.watch))
 
     async def _started(self) -> bool:
         """Give reference and run order; False where the end came first."""
@@ -200,13 +208,13 @@ class Run:
             end.cancel()
 
     async def _start(self) -> None:
-        commander, wish = self.desk.commander, self.wish
-        commander.arm()
+        commander, wish = self.console.commander, self.wish
+        arm_drive(self.console)
         if wish.reference is not None:
             text = wish.reference
             outcome = await carried_out(commander, lambda: commander.refer(text))
             self._tell("reference", outcome.text)
-        self.watch = await watch_of(self.desk.session, self.desk.keeper)
+        self.watch = await watch_of(self.fleet, self.console)
         self.ordering = True
         try:
             outcome = await carried_out(commander, lambda: commander.order(wish.order))
@@ -221,7 +229,7 @@ class Run:
         begun = time.monotonic()
         seen, rest = 0, 0
         while not self.ending.event.is_set():
-            latest = self.desk.latest
+            latest = latest_of(self.console)
             if latest.cycle != seen and latest.time > begun:
                 seen = latest.cycle
                 self._show(latest)
@@ -240,7 +248,7 @@ class Run:
         return not latest.error and latest.state.kind in ("fault", "stopped", "ready", "blocked")
 
     def _stopped_by_itself(self, latest: Snapshot) -> str:
-        who = f"Device {self.desk.session.device}"
+        who = f"Device {self.console.session.device}"
         if fault := fault_text(latest.state):
             return f"{who} tripped: {fault}. Look at the machine; reset it when its cause is gone."
         return (
@@ -252,7 +260,7 @@ class Run:
         """A line about the motor once a second; trouble on the line when it begins and ends."""
         if latest.error:
             if not self.trouble:
-                alone = left_alone(self.desk.session, self.watch)
+                alone = left_alone_text(self.console.session, watch=self.watch)
                 complain(f"{latest.error}\n{alone} It is tried on.")
             self.trouble = latest.time
         elif self.trouble:
@@ -266,7 +274,7 @@ class Run:
     def _state_line(self, latest: Snapshot) -> str:
         if latest.error:
             return f"no answer: {latest.error}"
-        values = shown_values(self.desk.session.profile, latest.readings)
+        values = shown_values(self.console.session.profile, latest.readings)
         return "  ".join([latest.state.headline, *(f"{k} {v}" for k, v in values.items())])
 
     def _tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
@@ -276,7 +284,7 @@ class Run:
         if not self.wish.as_json:
             self.voice.say(f"{time.strftime('%H:%M:%S', time.localtime(now))}  {text}")
             return
-        data: dict[str, Any] = {"time": iso_time(now), "device": self.desk.session.device}
+        data: dict[str, Any] = {"time": iso_time(now), "device": self.console.session.device}
         data |= {"event": event, "text": text}
         if latest is not None:
             state = latest.state
@@ -284,7 +292,7 @@ class Run:
                 "state": None if latest.error else state.kind,
                 "direction": None if latest.error else state.direction,
                 "fault": state.fault.code if state.fault and not latest.error else None,
-                "values": values_json(self.desk.session.profile, latest.readings),
+                "values": values_json(self.console.session.profile, latest.readings),
                 "error": latest.error or None,
             }
         self.voice.say(json.dumps(data, ensure_ascii=False))
@@ -298,26 +306,26 @@ class Run:
 
         from .stop import ended
 
-        desk, failed = self.desk, 0
+        session, stopper, failed = self.console.session, self.fleet.stopper, 0
         self._tell("stopping", f"stopping ({self.ending.why or 'the run has ended'})")
         while True:
             ordered = time.monotonic()
-            desk.stopper.stop([desk.session])
-            report = await ended(desk.stopper, desk.session.device)
+            stopper.stop([session], by="drivepanel run")
+            report = await ended(stopper, session.device)
             if report.phase is Phase.STOPPED:
-                return self._tell("stopped", f"Device {desk.session.device}: stopped.")
+                return self._tell("stopped", f"Device {session.device}: stopped.")
             bad = await self._line_was_bad(ordered)
             if self._stands():
-                return self._tell("stopped", f"Device {desk.session.device}: it stands.")
+                return self._tell("stopped", f"Device {session.device}: it stands.")
             # a ramp may be longer than a stop is followed
-            if not bad and desk.latest.state.kind != "stopping":
+            if not bad and latest_of(self.console).state.kind != "stopping":
                 failed += 1
             if failed == STOPS:
-                raise Failure(f"Device {desk.session.device}: {report.text}", DRIVE_REFUSED)
+                raise Failure(f"Device {session.device}: {report.text}", DRIVE_REFUSED)
 
     def _stands(self) -> bool:
         """Whether the motor is seen at rest, though the drive did not take the stop."""
-        latest, session = self.desk.latest, self.desk.session
+        latest, session = latest_of(self.console), self.console.session
         frequency = session.profile.quantity("output_frequency")
         reading = latest.readings.get(frequency.code) if frequency else None
         return self._at_rest(latest) and reading is not None and reading.number == 0
@@ -326,12 +334,12 @@ class Run:
         """Wait until the drive answers; whether it failed to at any time since."""
         asked, bad, told = time.monotonic(), False, False
         while True:
-            latest = self.desk.latest
+            latest = latest_of(self.console)
             if latest.error and latest.time > since:
                 bad = True
                 if not told:
                     told = True
-                    alone = left_alone(self.desk.session, self.watch)
+                    alone = left_alone_text(self.console.session, watch=self.watch)
                     complain(
                         f"NOT STOPPED yet: {latest.error}\n{alone} It is stopped as soon as it"
                         " answers; until then stop it at the machine."
@@ -350,10 +358,12 @@ async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
             loop.call_soon_threadsafe(ending.end, "nobody reads the output any more")
 
     voice = Voice(gone)
+    starts = StartKeeper("run")
+    starts.unrecorded, starts.left_running = wish.unrecorded, wish.leave_running
     with ending.by_signals():
         try:
-            async with desk_of(opened, target) as desk:
-                await Run(desk, wish, voice, ending).carry_out()
+            async with watched(opened, target, starts) as (fleet, console):
+                await Run(fleet, console, wish, voice, ending).carry_out()
         finally:
             voice.finish()
 
@@ -374,6 +384,11 @@ async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
 @click.option(
     "--leave-running", is_flag=True, help="Do not stop the motor at the end of this command."
 )
+@click.option(
+    "--unrecorded",
+    is_flag=True,
+    help="Run even where the start cannot be put on record in the state folder.",
+)
 @read_only_option
 @json_option
 @told
@@ -384,6 +399,7 @@ def run(
     seconds: float | None,
     arm: bool,
     leave_running: bool,
+    unrecorded: bool,
     read_only: bool,
     as_json: bool,
 ) -> None:
@@ -392,5 +408,7 @@ def run(
     So do SIGTERM, SIGHUP, a closed standard output and the end of --for.
     """
     need_arming(arm, "run starts the motor")
-    wish = Wish("reverse" if reverse else "forward", reference, seconds, leave_running, as_json)
+    wish = Wish(
+        "reverse" if reverse else "forward", reference, seconds, leave_running, unrecorded, as_json
+    )
     on_line(target.line_text, lambda opened: run_motor(opened, target, wish), read_only=read_only)

@@ -17,7 +17,7 @@ from .options import Target, connect, on_line
 if TYPE_CHECKING:
     from tui.drive.parameter_set import ParameterSet
     from tui.session.applying import Result
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
     from tui.session.upload import Upload
 

@@ -22,7 +22,7 @@ from .options import (
 if TYPE_CHECKING:
     from tui.drive.profile import Profile
     from tui.drive.schema import Quantity
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.keeper import Watch
     from tui.session.lines import OpenLine
@@ -83,19 +83,19 @@ def fault_text(state: DriveState) -> str:
 async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     """Read all that `status` tells. Raises the line's errors."""
     from tui.session.drive_state import drive_state
-    from tui.session.keeper import Keeper
+    from tui.session.fleet import Fleet
+    from tui.session.journal import Journal
 
     from .orders import watch_of
 
     profile = session.profile
-    readings = await session.read(_codes(profile))
-    session.monitor.known.note(readings)
-    keeper = Keeper(opened.line)
-    keeper.keep(session)
+    fleet = Fleet(opened.line, Journal())
+    console = fleet.take(session)
     try:
-        watch = await watch_of(session, keeper)
+        readings = await console.read(_codes(profile))
+        watch = await watch_of(fleet, console)
     finally:
-        keeper.stop()
+        fleet.forget()
     state = drive_state(profile, readings)
     channels = _channels(profile, readings, state)
     return Status(session, state, readings, channels, _refused(session), watch)
@@ -131,7 +131,7 @@ def _channels(
 def _refused(session: DriveSession) -> str:
     from tui.drive.orders import chart_in_force, interlock
 
-    raws = session.monitor.known.raws()
+    raws = session.image.raws
     chart = chart_in_force(session.profile, raws)
     if chart is None:
         return "What decides about its commands could not be read."

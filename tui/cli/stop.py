@@ -24,7 +24,7 @@ from .orders import complain
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.identify import DriveIdentity
     from tui.session.lines import OpenLine
     from tui.session.stop import Stopper, StopReport
@@ -143,7 +143,7 @@ async def _seen_through(stopper: Stopper, found: Found, order: OrderId) -> int:
     from tui.session.stop import Phase
 
     session = found.session
-    stopper.stop([session], order)
+    stopper.stop([session], order, by="drivepanel stop")
     report = await ended(stopper, session.device)
     who = f"Device {session.device}, {found.name}"
     if report.phase is Phase.STOPPED:
@@ -158,9 +158,10 @@ async def _why(session: DriveSession) -> int:
     """The status of a stop that failed: whether the drive answers at all."""
     from tui.bus.errors import DeviceException, LineError
     from tui.drive.chart import watched_codes
+    from tui.session.reader import Reader
 
     try:
-        await session.read(watched_codes(session.profile)[:1])
+        await Reader(session).read(watched_codes(session.profile)[:1])
     except DeviceException:
         return DRIVE_REFUSED
     except LineError:
@@ -247,7 +248,7 @@ def _session(opened: OpenLine, identity: DriveIdentity, profile_id: str | None) 
     """
     from tui.drive import library
     from tui.drive.orders import stop_alike
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
 
     named = identity.profile or profile_id
     profiles = [library.load(one) for one in ([named] if named else identity.candidates)]

@@ -25,7 +25,7 @@ from .options import (
 from .watch_outputs import JsonOutput, Output, csv_output, text_output
 
 if TYPE_CHECKING:
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
     from tui.session.monitor import Snapshot
 
@@ -102,6 +102,8 @@ async def _follow(
 
     Raises Failure where `count` cycles passed and the drive never answered.
     """
+    from tui.session.monitor import Monitor
+
     loop = asyncio.get_running_loop()
     cycles: asyncio.Queue[Snapshot] = asyncio.Queue(WAITING_LONGEST)
 
@@ -113,8 +115,9 @@ async def _follow(
     def hand_over(snapshot: Snapshot) -> None:
         loop.call_soon_threadsafe(put, snapshot)
 
-    leave = session.monitor.listen(hand_over)
-    session.monitor.start(codes, every)
+    monitor = Monitor(session)
+    leave = monitor.listen(hand_over)
+    monitor.start(codes, every)
     first_error = ""
     answered = False
     try:
@@ -126,7 +129,7 @@ async def _follow(
                 output.take(_complete(session, snapshot, shown))
     finally:
         leave()
-        session.close()
+        monitor.stop()
     if not answered:
         raise Failure(first_error, LINE_TROUBLE)
 

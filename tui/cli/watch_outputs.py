@@ -17,7 +17,7 @@ from .output import console, iso_time, print_json, readings_json, readings_table
 if TYPE_CHECKING:
     from rich.live import Live
 
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.monitor import Snapshot
     from tui.session.readings import Reading
 

@@ -8,7 +8,7 @@ import click
 
 from .errors import DONE, told
 from .options import Target, connect, line_argument, on_line, read_only_option, settings_options
-from .orders import arm_option, need_arming
+from .orders import arm_option, need_arming, permit_of
 from .sets import (
     codes_of,
     confirm_option,
@@ -21,7 +21,7 @@ from .sets import (
 
 if TYPE_CHECKING:
     from tui.drive.edits import Edits
-    from tui.session.drive_session import DriveSession
+    from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
 
 
@@ -113,16 +113,21 @@ async def _write(
 
     if not len(edits):
         click.echo("The drive holds these values already.")
-    journal = Journal()
+    journal, permit = Journal(), permit_of(session)
     try:
         done = await apply_edits(
-            session, journal, edits, confirmed=codes_of(session, confirmed), progress=say_result
+            session,
+            journal,
+            edits,
+            permit=permit,
+            confirmed=codes_of(session, confirmed),
+            progress=say_result,
         )
         for link in done.links:
             click.echo(link.text)
         saved = save and len(done.written) == len(done.results) and not done.stopped
         if saved:
-            click.echo(await save_to_eeprom(session, journal))
+            click.echo(await save_to_eeprom(session, journal, permit))
         say_afterwards(done.after_reset, done.unsaved, saved=saved)
         return status_of_results(done.results)
     finally:

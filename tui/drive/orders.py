@@ -10,6 +10,8 @@ from .errors import DriveError
 from .profile import Profile
 from .schema import Chart, Order, OrderId, Parameter
 
+GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
+"""Ways to stop that trip no drive, the gentlest first."""
 WAYS_TO_STOP = frozenset[OrderId]({"stop", "quick-stop", "freewheel", "emergency-stop"})
 
 
@@ -49,6 +51,61 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Order:
     allowed = ", ".join(dict.fromkeys(names[s] for order in same for s in order.states))
     now = state.name if state else "not known"
     raise OrderRefused(f"{same[0].name} is possible in the states: {allowed}. It is now: {now}.")
+
+
+def stop_conditions(chart: Chart, id: OrderId) -> list[str]:
+    """Codes of the words on which it depends by which word a chart stops."""
+    same = [order for order in chart.orders if order.id == id]
+    codes = [when.parameter for order in same for when in order.when]
+    if any(order.states for order in same):
+        codes.append(chart.status)
+    return list(dict.fromkeys(codes))
+
+
+def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order]:
+    """The order that stops in every chart that the drive could be in, given what is known.
+
+    On its ramp where one word does that in all of them, else faster, else coasting. Raises
+    OrderRefused where no word stops in all.
+    """
+    charts = [chart for chart in profile.data.charts if chart.orders and _may_hold(chart, raws)]
+    for id in GENTLE_FIRST:
+        for chart in charts:
+            for order in chart.orders:
+                if order.id != id or order.states or order.when:
+                    continue
+                if all(
+                    _stops(profile, other, target(profile, chart, order), order.words)
+                    for other in charts
+                ):
+                    return chart, order
+    raise OrderRefused("How this drive is commanded is not known.")
+
+
+def _may_hold(chart: Chart, raws: Mapping[str, int]) -> bool:
+    """Whether a chart may be the one in force."""
+    if chart.when is None:
+        return True
+    raw = raws.get(chart.when.parameter)
+    return raw is None or raw in chart.when.values
+
+
+def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int]) -> bool:
+    """Whether words at a place stop a motor in a chart, in whichever state it is."""
+    return any(
+        order.id in GENTLE_FIRST
+        and not order.when
+        and not order.states
+        and list(order.words) == list(words)
+        and target(profile, chart, order) is where
+        for order in chart.orders
+    )
+
+
+def last_word(chart: Chart, order: Order) -> Order | None:
+    """What ends operation once an order that leaves it enabled has brought the motor to 0 Hz."""
+    same = (one for one in chart.orders if one.id == order.id and not one.states and not one.when)
+    return next((one for one in same if one is not order), None) if order.states else None
 
 
 def stop_alike(profiles: Sequence[Profile]) -> bool:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from tui.drive.orders import OrderRefused
 from tui.session.command import Commander
-from tui.session.drive_session import DriveSession
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
+from tui.session.work import Outcome
 
 from .base import PanelScreen
 
@@ -14,12 +16,15 @@ NOT_ARMED = "Not armed: a arms this drive."
 class Arming(PanelScreen):
     """Knows whether the drive is armed; where a refusal is told is up to the screen."""
 
+    console: DriveConsole
     session: DriveSession
+    passed: Outcome | None = None
+    """What work had come to when a key led on from it: no longer shown."""
 
     @property
     def commander(self) -> Commander:
         """What arms and commands this drive."""
-        return self.app.commander(self.session)
+        return self.console.commander
 
     def _refuse(self, text: str) -> None:
         """Tell on this screen why something was not done."""

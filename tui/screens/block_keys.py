@@ -20,12 +20,12 @@ class BlockKeys(Arming):
     @property
     def desk(self) -> MappingDesk:
         """What is known and proposed."""
-        return self.app.mapping_desk(self.session)
+        return self.console.blocks
 
     def _try(self, work: Callable[[], None]) -> None:
+        self.passed = self.desk.said
         try:
             work()
-            self.desk.said = None
         except DriveError as refused:
             self.desk.refuse(str(refused))
         self.look()
@@ -68,7 +68,7 @@ class BlockKeys(Arming):
 
             def told(sure: bool | None) -> None:
                 if sure:
-                    desk.exchange(agreed, self._armed)
+                    desk.exchange(agreed)
                 self.look()
 
             keys = "y or Enter writes, read back   Esc writes nothing"

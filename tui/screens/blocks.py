@@ -10,7 +10,7 @@ from textual.containers import Horizontal
 
 from tui.drive.mapping import describe, no_blocks, refusing
 from tui.drive.schema import Block
-from tui.session.drive_session import DriveSession
+from tui.session.console import DriveConsole
 from tui.widgets.block_view import (
     WIDE,
     cost_lines,
@@ -40,9 +40,10 @@ class BlocksScreen(BlockKeys):
     LOOK = 0.25
     AUTO_FOCUS = ""
 
-    def __init__(self, session: DriveSession) -> None:
+    def __init__(self, console: DriveConsole) -> None:
         super().__init__()
-        self.session = session
+        self.console = console
+        self.session = console.session
         self._side = 0
         self._at = 0
 
@@ -114,13 +115,13 @@ class BlocksScreen(BlockKeys):
     def _message(self, width: int) -> list[Text]:
         desk, now = self.desk, self.app.clock.monotonic()
         text, style = "", FAINT
-        if told := news(desk.said, now, busy=desk.busy):
+        if told := news(desk.said, now, busy=desk.busy, passed=self.passed):
             text, style = told
         elif desk.trouble:
             text, style = desk.trouble, ALARM
         elif count := sum(len(desk.changes(block)) for block in desk.blocks):
             text, style = f"{count} slots proposed otherwise: w writes them, u drops.", ATTENTION
-        elif why := self.commander.why_disarmed:
+        elif why := self.session.arming.why_disarmed:
             text = why
         lines = [Text(f" {line}", style) for line in wrapped(text, width - 2, 2)]
         return [*lines, Text(""), Text("")][:2]
@@ -210,7 +211,7 @@ class BlocksScreen(BlockKeys):
 
         def told(sure: bool | None) -> None:
             if sure:
-                desk.write(self._armed)
+                desk.write()
             self.look()
 
         keys = "y or Enter writes, each slot read back   Esc writes nothing"

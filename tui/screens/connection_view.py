@@ -19,12 +19,13 @@ from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
 
 from .base import PanelScreen
 from .drive_list import DriveList
-from .found import FoundDrive
+from .found import State
 from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
 
 if TYPE_CHECKING:
+    from tui.session.fleet import FoundDrive
     from tui.session.keeper import Look
 
 log = logging.getLogger(__name__)
@@ -43,7 +44,6 @@ class ConnectionView(PanelScreen):
 
     def __init__(self) -> None:
         super().__init__()
-        self.found: dict[int, FoundDrive] = {}
         self.warned: set[int] = set()
         """Devices of which it was said that they trip when they are left alone."""
         self._happened: tuple[str, str, str] = ("", "", "")
@@ -64,6 +64,11 @@ class ConnectionView(PanelScreen):
                 yield DriveList(id="drives")
         yield Lines(id="message")
         yield Lines(id="keys")
+
+    @property
+    def found(self) -> Mapping[int, FoundDrive]:
+        """The drives that answered on the open line, by device."""
+        return self.app.fleet.found if self.app.fleet else {}
 
     @property
     def lines(self) -> LineList:
@@ -120,7 +125,11 @@ class ConnectionView(PanelScreen):
 
     def show_drives(self) -> None:
         """The drives that answered, as they are now."""
-        self.drives.fill(self.found)
+        found = self.found
+        looks = self.app.fleet.keeper.looks if self.app.fleet else {}
+        connected = self._connected()
+        states = {d: _state(drive, looks.get(d), connected) for d, drive in found.items()}
+        self.drives.fill(found, states)
 
     # The titles
 
@@ -188,27 +197,17 @@ class ConnectionView(PanelScreen):
     def draw(self, width: int) -> None:
         """The states that the keeper of the line has seen."""
         super().draw(width)
-        keeper = self.app.keeper
-        if keeper is None:
-            return
-        looks = keeper.looks
-        before = {device: drive.state for device, drive in self.found.items()}
-        connected = self._connected()
-        for device, drive in self.found.items():
-            if not connected:
-                drive.state, drive.kind = "not known", "unknown"
-            elif look := looks.get(device):
-                drive.state = look.state.headline if look.state else "no answer"
-                drive.kind = look.state.kind if look.state else "unknown"
-        if before != {device: drive.state for device, drive in self.found.items()}:
-            self.show_drives()
-        self._warn(looks)
+        self.show_drives()
+        if self.app.fleet is not None:
+            self._warn(self.app.fleet.keeper.looks)
 
     def _connected(self) -> bool:
+        opened = self.app.opened
+        if opened is None:  # the first picture waits for no import
+            return False
         from tui.bus.line import LineStatus
 
-        opened = self.app.opened
-        return opened is not None and opened.line.state.status is LineStatus.CONNECTED
+        return opened.line.state.status is LineStatus.CONNECTED
 
     def _warn(self, looks: Mapping[int, Look]) -> None:
         """Say once of a drive that it trips when it is left alone."""
@@ -222,3 +221,14 @@ class ConnectionView(PanelScreen):
             "The panel asks them on while the line is open. Enter on a drive watches it.",
             ALARM_KIND,
         )
+
+
+def _state(drive: FoundDrive, look: Look | None, connected: bool) -> State:
+    """What a drive does, by the last look at it, and the kind of that."""
+    if not connected:
+        return "not known", "unknown"
+    if drive.session is None:
+        return "no profile", ""
+    if look is None:
+        return "asking", ""
+    return (look.state.headline, look.state.kind) if look.state else ("no answer", "unknown")

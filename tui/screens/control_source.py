@@ -12,7 +12,7 @@ from textual.widgets.option_list import Option
 from tui.bus.errors import LineError
 from tui.drive.control_source import changes, source_codes, source_in_force
 from tui.drive.schema import ControlSource
-from tui.session.drive_session import DriveSession
+from tui.session.console import DriveConsole
 from tui.widgets.control_source import change_lines, diagram, note_lines
 from tui.widgets.drawing import armed_text, rule
 from tui.widgets.lines import Lines
@@ -31,10 +31,11 @@ class ControlSourceScreen(OrderKeys):
     TITLE = "Control source"
     LOOK = 0.5
 
-    def __init__(self, session: DriveSession) -> None:
+    def __init__(self, console: DriveConsole) -> None:
         super().__init__()
-        self.session = session
-        self._sources = session.profile.data.control_sources
+        self.console = console
+        self.session = console.session
+        self._sources = self.session.profile.data.control_sources
         self._raws: dict[str, int] = {}
         self._trouble = "reading today's configuration"
         self._seen: object = None
@@ -55,7 +56,7 @@ class ControlSourceScreen(OrderKeys):
 
     async def _read(self) -> None:
         try:
-            readings = await self.session.read(source_codes(self.session.profile))
+            readings = await self.console.read(source_codes(self.session.profile))
         except LineError as error:
             self._trouble = str(error)
         else:

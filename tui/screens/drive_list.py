@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import TYPE_CHECKING
 
 from rich.text import Text
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
-from .found import FoundDrive, drive_line
+from .found import State, drive_line
+
+if TYPE_CHECKING:
+    from tui.session.fleet import FoundDrive
 
 
 class DriveList(OptionList):
@@ -18,10 +22,12 @@ class DriveList(OptionList):
         super().__init__(id=id, compact=True)
         self._drawn: dict[str, Text] = {}
 
-    def fill(self, found: Mapping[int, FoundDrive]) -> None:
+    def fill(self, found: Mapping[int, FoundDrive], states: Mapping[int, State]) -> None:
         """Show these drives; the cursor stays at its place, and the list where it was scrolled."""
         width = max(20, self.size.width - 1)
-        lines = {str(device): drive_line(drive, width) for device, drive in sorted(found.items())}
+        lines = {
+            str(device): drive_line(drive, states[device], width) for device, drive in found.items()
+        }
         before, self._drawn = self._drawn, lines
         if lines.keys() == before.keys():
             for id in [id for id in lines if lines[id] != before[id]]:

@@ -12,7 +12,7 @@ from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from tui.bus.errors import LineError
-from tui.session.drive_session import DriveSession
+from tui.session.console import DriveConsole
 from tui.session.fault_record import FaultRecord, Recorder, record_name, record_text
 from tui.session.readings import Reading
 from tui.session.state import state_folder
@@ -40,9 +40,10 @@ class FaultsScreen(PanelScreen):
     TITLE = "Faults"
     LOOK = 0.5
 
-    def __init__(self, session: DriveSession) -> None:
+    def __init__(self, console: DriveConsole) -> None:
         super().__init__()
-        self.session = session
+        self.console = console
+        self.session = console.session
         self._readings: dict[str, Reading] = {}
         self._shown: FaultRecord | None = None
         self._message = Text(" reading the history", STRONG)
@@ -50,7 +51,7 @@ class FaultsScreen(PanelScreen):
 
     @property
     def _recorder(self) -> Recorder:
-        return self.app.recorder(self.session)
+        return self.console.recorder
 
     def compose(self) -> ComposeResult:
         """The fault, the history beside what was stored, the record."""
@@ -78,7 +79,7 @@ class FaultsScreen(PanelScreen):
         faults = self.session.profile.data.faults
         codes = [*faults.history, *(code for stored in faults.stored for code in stored)]
         try:
-            self._readings = await self.session.read(list(dict.fromkeys(codes)))
+            self._readings = await self.console.read(list(dict.fromkeys(codes)))
         except LineError as error:
             self._message = Text(f" {error}", ALARM)
         else:
@@ -112,7 +113,7 @@ class FaultsScreen(PanelScreen):
             self._shown, self._offset = record, 0
             self._recorder.acknowledge()
             self._read_again()
-        latest = self.session.monitor.latest
+        latest = self.console.monitor.latest
         present = latest is not None and latest.state.kind == "fault"
         fault = latest.state.fault if latest and present else record.fault if record else None
         who = f"Faults · {self.session.profile.name} · device {self.session.device}"

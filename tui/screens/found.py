@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from rich.text import Text
@@ -11,8 +10,7 @@ from tui.widgets.drawing import cut
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, RUNNING, STRONG
 
 if TYPE_CHECKING:
-    from tui.session.drive_session import DriveSession
-    from tui.session.identify import DriveIdentity
+    from tui.session.fleet import FoundDrive
 
 STATE_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
 WHO_WIDTH, VERSION_WIDTH, PROFILE_WIDTH = 16, 4, 13
@@ -20,30 +18,22 @@ ROOM_FOR_PROFILE = 60
 """Columns of the list from which it names the profile beside the reference."""
 
 
-@dataclass(slots=True)
-class FoundDrive:
-    """A drive that answered, with what is known of it."""
+State = tuple[str, str]
+"""What a drive does in words, and the kind of that."""
 
-    identity: DriveIdentity
-    session: DriveSession | None = None
-    state: str = "no profile"
-    kind: str = ""
-    guessed: bool = False
-    """Whether its profile is one of several that may fit, and nobody has said which."""
 
-    @property
-    def profile(self) -> str:
-        """The name of its profile, with a sign where it is a guess; empty without one."""
-        if self.session is None:
-            return ""
-        return self.session.profile.name + (" ?" if self.guessed else "")
+def profile_text(drive: FoundDrive) -> str:
+    """The name of its profile, with a sign where it is a guess; empty without one."""
+    if drive.session is None:
+        return ""
+    return drive.session.profile.name + (" ?" if drive.guessed else "")
 
 
 def about_drive(drive: FoundDrive) -> str:
     """Vendor, reference, version, name and profile of a drive."""
     identity = drive.identity
     version = f"version {identity.version_text}" if identity.version else ""
-    profile = f"profile {drive.profile}" if drive.session else "no profile"
+    profile = f"profile {profile_text(drive)}" if drive.session else "no profile"
     parts = (identity.vendor, identity.reference, version, identity.name, profile)
     return f"Device {identity.device}: " + ", ".join(part for part in parts if part)
 
@@ -61,18 +51,20 @@ def next_step(drive: FoundDrive) -> str:
     return "Enter watches it."
 
 
-def drive_line(drive: FoundDrive, width: int) -> Text:
+def drive_line(drive: FoundDrive, state: State, width: int) -> Text:
     """A drive in one line: address, reference, version, name, profile, state."""
     identity = drive.identity
     text = Text(no_wrap=True, overflow="ellipsis")
     text.append(f" {identity.device:>3} ", FAINT)
-    text.append(cut(identity.reference or drive.profile or "unknown drive", WHO_WIDTH), STRONG)
+    text.append(
+        cut(identity.reference or profile_text(drive) or "unknown drive", WHO_WIDTH), STRONG
+    )
     about, name = " ", identity.name or identity.version_text
     if width >= ROOM_FOR_PROFILE:
-        profile = drive.profile if identity.reference else ""
+        profile = profile_text(drive) if identity.reference else ""
         about, name = f" {cut(profile, PROFILE_WIDTH)} ", identity.name
         about += f"{cut(identity.version_text, VERSION_WIDTH)} "
-    room = max(0, width - text.cell_len - len(about) - len(drive.state) - 1)
+    room = max(0, width - text.cell_len - len(about) - len(state[0]) - 1)
     text.append(about + (cut(name, room) if room > 1 else " " * room) + " ", FAINT)
-    text.append(drive.state, STATE_STYLES.get(drive.kind, PLAIN))
+    text.append(state[0], STATE_STYLES.get(state[1], PLAIN))
     return text

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from .confirm import Confirm
@@ -10,8 +12,8 @@ from .leave import Choice, Leave
 from .panel import Panel
 
 if TYPE_CHECKING:
-    from tui.session.drive_session import DriveSession
-    from tui.session.editor import Editor
+    from tui.session.drive import DriveSession
+    from tui.session.keeper import Watch
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
@@ -20,44 +22,73 @@ STOPPED_WITHIN = 60.0
 class Leaving(Panel):
     """What the app does before it lets drives go."""
 
-    editors: dict[int, Editor]
-    """By device, the work on parameters that has begun."""
     settled: bool
     """Whether it was decided what becomes of motors that run by an order from here."""
 
     async def action_quit(self) -> None:
-        """Leave; where a motor runs by an order from here, or is tripped by that, not unasked."""
-        if isinstance(self.screen, Leave):
-            return
-        if running := self.keeper.under_command() if self.keeper else []:
-            follows = [self._left_running(running), *self._unfinished()]
+        """Leave; where a motor runs by a command from here, or a drive trips, not unasked."""
+        if isinstance(self.screen, Leave | Confirm):
+            return  # one question at a time
+        if running := self._motors():
+            follows = [self._left_running(running), *self._tripping(running), *self._unfinished()]
             self.push_screen(Leave("\n".join(follows)), self._leave_motors)
             return
-        asked = self._question("Leave the panel?", "q or Enter leaves   Esc stays")
-        if asked is None or isinstance(self.screen, Confirm):
+        asked = self._question("Leave the panel?", "y leaves   Esc stays")
+        if asked is None:
             self.exit()
         else:
             self.push_screen(asked, self._leave)
 
+    def _motors(self) -> list[DriveSession]:
+        """Drives commanded from here whose motors do not surely stand."""
+        return self.fleet.keeper.under_command() if self.fleet else []
+
     def _left_running(self, sessions: list[DriveSession]) -> str:
         """Which motors run, and what each drive does when nobody asks it any more."""
-        lines = []
-        for session in sessions:
-            watch = self.keeper.watch(session.device) if self.keeper else None
-            does = "goes on running: it does not watch the line"
-            if watch is not None:
-                reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
-                does = f"acts {watch.timeout:g} s after the last request: {reaction}"
-            who = f"Device {session.device}, {session.profile.name}"
-            lines.append(f"{who}: left alone it {does.rstrip('.')}.")
-        return "\n".join(lines)
+        from tui.session.keeper import left_alone_text
+
+        assert self.fleet is not None
+        keeper = self.fleet.keeper
+        return "\n".join(left_alone_text(one, watch=keeper.watch(one.device)) for one in sessions)
+
+    def _tripping(self, but: Sequence[DriveSession] = ()) -> list[str]:
+        """Which drives act on their communication time-out once they are left, and when."""
+        if self.fleet is None:
+            return []
+        from tui.session.keeper import left_alone_text, names_of
+
+        told = {session.device for session in but}
+        keeper = self.fleet.keeper
+        alike: dict[tuple[str, Watch], list[DriveSession]] = {}
+        for console in self.fleet.consoles:
+            watch = keeper.left_alone().get(console.device)
+            if watch is not None and console.device not in told:
+                alike.setdefault((console.session.profile.id, watch), []).append(console.session)
+        found = [left_alone_text(*same, watch=watch) for (_, watch), same in alike.items()]
+        found += [
+            f"{names_of([one])}: what it does left alone was not read yet."
+            for one in keeper.unread()
+            if one.device not in told
+        ]
+        head = "Once nobody asks them any more, drives act on their time-out, at rest too:"
+        return [head, *found] if found else []
 
     def _leave_motors(self, choice: Choice | None) -> None:
         if choice == "leave":
-            self.settled = True
-            self.exit()
+            self.run_worker(self._leave_running(), exclusive=True, group="leave")
         elif choice == "stop":
             self.run_worker(self._stop_and_leave(), exclusive=True, group="leave")
+
+    async def _leave_running(self) -> None:
+        """Leave motors running, on record for whoever comes next."""
+        from tui.session.starts import StartNotRecorded
+
+        self.settled = True
+        for session in self._motors():
+            if session.starts is not None:
+                with suppress(StartNotRecorded):
+                    await asyncio.to_thread(session.starts.leave, session)
+        self.exit()
 
     async def _stop_and_leave(self) -> None:
         """Stop what runs by an order from here, then leave; stay where one does not stop."""
@@ -77,17 +108,16 @@ class Leaving(Panel):
 
         Waits for it; may be called in any thread but the loop's.
         """
-        keeper, stopper = self.keeper, self.stopper
-        running = keeper.under_command() if keeper else []
-        if not running or stopper is None:
+        fleet, running = self.fleet, self._motors()
+        if not running or fleet is None:
             return True
         from tui.bus.errors import LineClosed
 
         try:
-            stopper.stop(running)
+            fleet.stop(running, by="leaving the panel")
         except LineClosed:
             return False
-        return not stopper.wait(running, STOPPED_WITHIN).failed
+        return not fleet.stopper.wait(running, STOPPED_WITHIN).failed
 
     def _leave(self, sure: bool | None) -> None:
         if sure:
@@ -112,22 +142,19 @@ class Leaving(Panel):
 
     def _question(self, question: str, keys: str) -> Confirm | None:
         """What to ask before the drives are left alone; None where that trips none."""
-        alone = self.keeper.left_alone() if self.keeper else {}
-        told = self._unfinished()
-        if running := self.keeper.under_command() if self.keeper else []:
+        running = self._motors()
+        told = [*self._tripping(running), *self._unfinished()]
+        if running:
             told.insert(0, self._left_running(running))
-        if alone:
-            which = ", ".join(f"device {device} after {time:g} s" for device, time in alone.items())
-            told.append(
-                "These motors run, and their drives watch the line. Once nobody asks them any"
-                f" more, they act on their communication time-out: {which}."
-            )
         return Confirm(question, "\n".join(told), keys) if told else None
 
     def _unfinished(self) -> list[str]:
         """What would be lost of the work on parameters."""
         told = []
-        for device, editor in sorted(self.editors.items()):
+        for console in self.fleet.consoles if self.fleet else ():
+            device, editor = console.device, console.begun_editor
+            if editor is None:
+                continue
             if len(editor.edits):
                 told.append(f"Device {device}: {len(editor.edits)} staged edits are not written.")
             if editor.unsaved:

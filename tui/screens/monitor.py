@@ -13,8 +13,8 @@ from textual.events import Resize
 from textual.timer import Timer
 
 from tui.drive.schema import Parameter
-from tui.session.drive_session import DriveSession
-from tui.session.reader import Rating
+from tui.session.console import DriveConsole
+from tui.session.readings import Rating
 from tui.session.stop import Phase, StopReport
 from tui.widgets.lines import Lines
 from tui.widgets.monitor_motor import motor_lines
@@ -58,9 +58,10 @@ class MonitorScreen(OrderKeys):
     BINDINGS: ClassVar = bindings(MONITOR)
     TITLE = "Monitor"
 
-    def __init__(self, session: DriveSession) -> None:
+    def __init__(self, console: DriveConsole) -> None:
         super().__init__()
-        self.session = session
+        self.console = console
+        self.session = console.session
         self._word = 0
         self._timer: Timer | None = None
         self._still: Timer | None = None
@@ -88,8 +89,7 @@ class MonitorScreen(OrderKeys):
 
     def on_mount(self) -> None:
         """Start watching."""
-        self.app.recorder(self.session)
-        self.session.monitor.start(period=self.app.period, extra=self._extras())
+        self.console.monitor.start(period=self.app.period, extra=self._extras())
         self._timer = self.set_interval(
             LOW_BANDWIDTH_REFRESH if self.app.low_bandwidth else REFRESH, self.look
         )
@@ -97,7 +97,7 @@ class MonitorScreen(OrderKeys):
     def on_unmount(self) -> None:
         """Stop watching; nobody looks any more, and nothing is commanded any more."""
         self.commander.disarm()
-        self.session.monitor.stop()
+        self.console.monitor.stop()
 
     def on_resize(self, event: Resize) -> None:
         """More room, more words."""
@@ -135,6 +135,7 @@ class MonitorScreen(OrderKeys):
     def draw(self, width: int) -> None:
         """Show the latest snapshot; which keys work now depends on it."""
         self._put_all(self._parts(self._view(), width))
+        self.ask_unrecorded()
 
     def _put_all(self, parts: dict[str, list[Text]]) -> None:
         for place, lines in parts.items():
@@ -142,7 +143,7 @@ class MonitorScreen(OrderKeys):
 
     def _view(self) -> View:
         now = self.app.clock.monotonic()
-        monitor = self.session.monitor
+        monitor = self.console.monitor
         counters = self.session.line.counters
         self._measure_load(now, counters.busy_seconds)
         snapshot = monitor.latest
@@ -163,18 +164,18 @@ class MonitorScreen(OrderKeys):
             clock=self.app.clock.time_of_day(),
             read_only=self.app.read_only,
             low_bandwidth=self.app.low_bandwidth,
-            watch=self.app.keeper.watch(self.session.device) if self.app.keeper else None,
+            watch=self.app.fleet.keeper.watch(self.session.device) if self.app.fleet else None,
             heard=self.session.line.device_state(self.session.device).heard,
             control=self.control(now),
             stop=self._stop(now),
             was=self._was,
-            unseen=not self.app.recorder(self.session).seen,
+            unseen=not self.console.recorder.seen,
         )
 
     def _stop(self, now: float) -> StopReport | None:
         """What a stop of this drive has come to; a good end is told for a while only."""
-        stopper = self.app.stopper
-        report = stopper.reports.get(self.session.device) if stopper else None
+        fleet = self.app.fleet
+        report = fleet.stopper.reports.get(self.session.device) if fleet else None
         if report is None:
             return None
         return report if now - report.since < STOP_TOLD.get(report.phase, now) else None
@@ -263,7 +264,7 @@ class MonitorScreen(OrderKeys):
         """A faster or slower poll, out of a fixed row of rates."""
         now = PERIODS.index(min(PERIODS, key=lambda p: abs(p - self.app.period)))
         self.app.period = PERIODS[max(0, min(len(PERIODS) - 1, now - step))]
-        self.session.monitor.period = self.app.period
+        self.console.monitor.period = self.app.period
         self.look()
 
     def action_next_word(self) -> None:
@@ -287,7 +288,8 @@ class MonitorScreen(OrderKeys):
 
         def told(text: str | None) -> None:
             if text:
-                self.session.rate(current.code, Rating(Decimal(text.replace(",", ".")), "A"))
+                rated = Rating(Decimal(text.replace(",", ".")), "A")
+                self.session.ratings[current.code] = rated
                 self.look()
 
         about = f"100 % of {current.code}, from the nameplate of the drive; base: " + (
@@ -299,19 +301,19 @@ class MonitorScreen(OrderKeys):
         """The last trip and the drive's history."""
         from .faults import FaultsScreen
 
-        self.app.push_screen(FaultsScreen(self.session))
+        self.app.push_screen(FaultsScreen(self.console))
 
     def action_parameters(self) -> None:
         """Every parameter of the drive."""
         from .parameters import ParametersScreen
 
-        self.app.push_screen(ParametersScreen(self.session))
+        self.app.push_screen(ParametersScreen(self.console))
 
     def action_blocks(self) -> None:
         """The indirect blocks or the communication scanner of the drive."""
         from .blocks import BlocksScreen
 
-        self.app.push_screen(BlocksScreen(self.session))
+        self.app.push_screen(BlocksScreen(self.console))
 
     def action_control_source(self) -> None:
         """Who commands the drive, and how that is changed."""
@@ -323,7 +325,7 @@ class MonitorScreen(OrderKeys):
                 " g gives it back, where it has a word for that."
             )
             return
-        self.app.push_screen(ControlSourceScreen(self.session))
+        self.app.push_screen(ControlSourceScreen(self.console))
 
     def action_frames(self) -> None:
         """The frames on the line."""

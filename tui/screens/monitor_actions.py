@@ -7,6 +7,7 @@ from .action import MONITOR, on
 HAND_BACK = "Give the control back to the terminals; a run order waiting there counts then."
 EMERGENCY = "Emergency stop with a fault (Altivar 21); needs no arming."
 BRAKE = "Brake by direct current, where the drive has an order for it."
+TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
 TAKE = "Take the control from the terminals (Leroy-Somer 6.43), locked only."
 
 ORDER_ACTIONS = on(
@@ -26,6 +27,7 @@ ORDER_ACTIONS = on(
     ("order('dc-braking')", "b", "", BRAKE),
     ("order('take-control')", "t", "", TAKE),
     ("hand_back", "g", "", HAND_BACK),
+    ("take_over", "T", "", TAKE_OVER),
     ("control_source", "c", "", "See and set up who commands the drive."),
 )
 WATCH_ACTIONS = on(

@@ -9,6 +9,7 @@ from tui.drive.errors import ValueRefused
 from tui.drive.orders import OrderRefused, chart_in_force, interlock
 from tui.drive.schema import CommandOption, OrderId
 from tui.session.reference import parse_reference
+from tui.session.work import Outcome
 from tui.widgets.monitor_view import Control
 
 from .arming import Arming
@@ -21,9 +22,12 @@ SHOWN_REFUSED = 20.0
 class OrderKeys(Arming):
     """The actions of the keys; everything else is the commander's."""
 
+    _asked: Outcome | None = None
+    """The refusal that a person was asked about last."""
+
     def control(self, now: float) -> Control:
         """Whether and how the drive is commanded from here, for the screen."""
-        commander, raws = self.commander, self.session.monitor.known.raws()
+        commander, raws = self.commander, self.session.image.raws
         chart = chart_in_force(self.session.profile, raws)
         outcome = commander.outcome
         if outcome is not None:
@@ -31,11 +35,48 @@ class OrderKeys(Arming):
             outcome = outcome if now - outcome.time < shown else None
         return Control(
             armed_for=commander.armed_for,
-            why_disarmed=commander.why_disarmed,
+            why_disarmed=self.session.arming.why_disarmed,
             outcome=outcome,
             no_effect=interlock(chart, "forward", raws) if chart else "",
+            offer=self._offer(),
             lost=commander.lost_orders(),
         )
+
+    def _offer(self) -> str:
+        """A motor that runs by a command of an earlier program, and the key that takes it over."""
+        starts, latest = self.session.starts, self.console.latest
+        if starts is None or latest is None or latest.error:
+            return ""
+        said = starts.offered(self.session, runs=latest.state.kind == "running")
+        return f"{said[0].upper()}{said[1:]}. T takes over." if said else ""
+
+    def action_take_over(self) -> None:
+        """Look after a motor that an earlier program has started."""
+        self._give(self.commander.take_over)
+
+    def ask_unrecorded(self) -> None:
+        """Where a start could not be put on record, ask once whether to run all the same."""
+        from tui.session.starts import StartNotRecorded, StartOvertaken
+
+        outcome, starts = self.commander.outcome, self.session.starts
+        if outcome is None or outcome is self._asked or starts is None:
+            return
+        refused = isinstance(outcome.error, StartNotRecorded)
+        if not refused or isinstance(outcome.error, StartOvertaken):
+            return
+        self._asked = outcome
+        order = self.commander.last_order
+        if order not in ("forward", "reverse"):
+            return
+        from .confirm import Confirm
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                starts.unrecorded = True
+                self._give(lambda: self.commander.order(order))
+
+        keys = "y runs it without a record   Esc does not run it"
+        self.app.push_screen(Confirm(f"Run {order} unrecorded?", str(outcome.error), keys), told)
 
     def _refuse(self, text: str) -> None:
         self.commander.refuse(text)
@@ -66,7 +107,7 @@ class OrderKeys(Arming):
 
     def action_stop_as(self, id: OrderId) -> None:
         """Stop the drive in another way than on its ramp; needs no arming."""
-        self.app.stop_drive(self.session, id)
+        self.app.stop_drive(self.console, id)
         self.look()
 
     def action_reference(self) -> None:
@@ -77,7 +118,7 @@ class OrderKeys(Arming):
             if text:
                 self._give(lambda: self.commander.refer(text))
 
-        profile, latest = self.session.profile, self.session.monitor.latest
+        profile, latest = self.session.profile, self.console.latest
         about = "In Hz or rpm: 30, 30.5Hz, 900rpm.\nUp and Down on Monitor change it by 1 Hz."
 
         def wrong(text: str) -> str:
@@ -94,7 +135,7 @@ class OrderKeys(Arming):
         """Choose a ramp, a preset speed, a motor, an output."""
         from .options import OptionsScreen
 
-        raws = self.session.monitor.known.raws()
+        raws = self.session.image.raws
         chart = chart_in_force(self.session.profile, raws)
         if chart is None or not chart.options:
             self._refuse("This drive has no options of its commands.")

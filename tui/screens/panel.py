@@ -9,14 +9,9 @@ from textual.app import App
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
-    from tui.session.command import Commander
-    from tui.session.drive_session import DriveSession
-    from tui.session.editor import Editor
-    from tui.session.fault_record import Recorder
-    from tui.session.keeper import Keeper
+    from tui.session.console import DriveConsole
+    from tui.session.fleet import Fleet
     from tui.session.lines import OpenLine
-    from tui.session.mapping_desk import MappingDesk
-    from tui.session.stop import Stopper
     from tui.widgets.clock import Clock
 
 
@@ -30,35 +25,15 @@ class Panel(App[None]):
     period: float
     """Wished time of a monitoring cycle in seconds, the same for every drive."""
     opened: OpenLine | None
-    keeper: Keeper | None
-    stopper: Stopper | None
-
-    @abstractmethod
-    def commander(self, session: DriveSession) -> Commander:
-        """What commands a drive of the open line."""
+    fleet: Fleet | None
+    """The drives of the open line."""
 
     @abstractmethod
     def follow(self, line: str, device: int) -> None:
         """Open the line anew as a drive now wants it, and watch that drive."""
 
     @abstractmethod
-    def session_at(self, device: int) -> DriveSession | None:
-        """The drive found at an address of the open line, or None."""
-
-    @abstractmethod
-    def editor(self, session: DriveSession) -> Editor:
-        """What edits the parameters of a drive of the open line."""
-
-    @abstractmethod
-    def mapping_desk(self, session: DriveSession) -> MappingDesk:
-        """What proposes and writes the blocks of a drive of the open line."""
-
-    @abstractmethod
-    def recorder(self, session: DriveSession) -> Recorder:
-        """What keeps the seconds before a trip of a drive of the open line."""
-
-    @abstractmethod
-    def stop_drive(self, session: DriveSession, order: OrderId) -> None:
+    def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
         """Stop one drive, in its own way."""
 
     @property
@@ -87,7 +62,7 @@ class Panel(App[None]):
         """
 
     @abstractmethod
-    def show_monitor(self, session: DriveSession) -> None:
+    def show_monitor(self, console: DriveConsole) -> None:
         """Show Monitor on a drive."""
 
     @abstractmethod

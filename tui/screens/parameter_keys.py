@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from textual.widgets import Input
 
-from tui.session.drive_session import DriveSession
+from tui.session.console import DriveConsole
 from tui.session.editor import Editor
 
 from .arming import Arming
@@ -14,9 +14,10 @@ from .parameter_list import ParameterList
 class ParameterKeys(Arming):
     """The base of the keys that stage, write and handle parameter sets."""
 
-    def __init__(self, session: DriveSession) -> None:
+    def __init__(self, console: DriveConsole) -> None:
         super().__init__()
-        self.session = session
+        self.console = console
+        self.session = console.session
         self.listed = ParameterList()
         self.remark = ""
         """What a key has come to, until the cursor moves."""
@@ -24,7 +25,7 @@ class ParameterKeys(Arming):
     @property
     def editor(self) -> Editor:
         """What is known and staged; stays with the drive while the panel runs."""
-        return self.app.editor(self.session)
+        return self.console.editor
 
     def list_again(self) -> None:
         """Make the list anew, by what was chosen and what is searched."""
@@ -32,8 +33,8 @@ class ParameterKeys(Arming):
         self.look()
 
     def note(self, text: str) -> None:
-        """Say something in the line of messages."""
-        self.editor.said = None
+        """Say something in the line of messages, in place of what work has come to."""
+        self.passed = self.editor.said
         self.remark = text
         self.look()
 

@@ -105,7 +105,8 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     def _message(self) -> Text:
         editor = self.editor
-        told = news(editor.said, self.app.clock.monotonic(), busy=editor.busy)
+        now = self.app.clock.monotonic()
+        told = news(editor.said, now, busy=editor.busy, passed=self.passed)
         return Text(*told) if told else Text(self.remark or editor.trouble, ALARM)
 
     # Keys that move

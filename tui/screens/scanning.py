@@ -12,10 +12,9 @@ from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
 from .connection_view import ALARM_KIND, ConnectionView
-from .found import FoundDrive
 
 if TYPE_CHECKING:
-    from tui.session.identify import ScanResult
+    from tui.session.identify import DriveIdentity, ScanResult
 
 
 class Scanning(ConnectionView):
@@ -74,33 +73,31 @@ class Scanning(ConnectionView):
         if result.identity is None:
             self.say(result.error, "The address is taken; scan again with s.", ALARM_KIND)
             return
-        drive = FoundDrive(result.identity)
-        self.found[result.device] = drive
-        await self._equip(drive)
+        await self._equip(result.identity)
         self.show_drives()
         self.show_heads()
 
-    async def _equip(self, drive: FoundDrive) -> None:
-        """Give a drive its profile: the typed one, else the one that fits."""
+    async def _equip(self, identity: DriveIdentity) -> None:
+        """Keep a drive that answered with its profile: the typed one, else the one that fits."""
         from tui.drive import library
-        from tui.session.drive_session import DriveSession
+        from tui.session.drive import DriveSession
 
         typed = self.form.profile
-        identity = drive.identity
         wanted = typed or identity.profile or next(iter(identity.candidates), None)
-        opened = self.app.opened
-        if wanted is None or opened is None:
+        fleet = self.app.fleet
+        if fleet is None:
+            return
+        if wanted is None:
+            fleet.note(identity)
             return
         try:
             profile = await asyncio.to_thread(library.load, wanted)
         except DriveError as error:
+            fleet.note(identity)
             self.fail(error)
             return
-        drive.session = DriveSession(opened.line, identity.device, profile, identity)
-        drive.guessed = not typed and identity.profile is None
-        drive.state = "asking"
-        if self.app.keeper is not None:
-            self.app.keeper.keep(drive.session)
+        session = DriveSession(fleet.line, identity.device, profile, identity)
+        fleet.take(session, guessed=not typed and identity.profile is None)
 
     @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:
@@ -108,9 +105,10 @@ class Scanning(ConnectionView):
         drive = self.found.get(device)
         if drive is None:
             return
-        if drive.session is None:
-            await self._equip(drive)
-        if drive.session is None:
+        if drive.console is None:
+            await self._equip(drive.identity)
+            drive = self.found.get(device)
+        if drive is None or drive.console is None:
             from tui.drive import library
 
             known = ", ".join(listing.id for listing in library.listings())
@@ -122,7 +120,7 @@ class Scanning(ConnectionView):
             self.form.ask_for_profile()
             return
         self.action_stop_scan()
-        self.app.show_monitor(drive.session)
+        self.app.show_monitor(drive.console)
 
     def action_stop_scan(self) -> None:
         """Stop looking for drives."""
@@ -135,6 +133,7 @@ class Scanning(ConnectionView):
         """Let go of what was found, and stop looking."""
         self.workers.cancel_group(self, "scan")
         self.workers.cancel_group(self, "open")
-        self.found.clear()
+        if self.app.fleet is not None:
+            self.app.fleet.forget()
         self.warned.clear()
         self.show_drives()

@@ -75,9 +75,9 @@ class SetKeys(ParameterKeys):
         except (LineError, DriveError) as error:
             self.note(f"No file: {error}")
         else:
-            bad = len(upload.asker.absent)
+            bad = len(upload.absent)
             without = f"; {bad} the drive does not tell" if bad else ""
-            self.note(f"{len(upload.asker.raws)} parameters{without}: {path}")
+            self.note(f"{len(upload.raws)} parameters{without}: {path}")
 
     # Compare
 
@@ -99,7 +99,8 @@ class SetKeys(ParameterKeys):
         """What is wrong with what was typed, or nothing."""
         typed = text.strip()
         if typed.isdecimal():
-            return "" if self.app.session_at(int(typed)) else f"No drive was found at {typed}."
+            found = self.app.fleet.console(int(typed)) if self.app.fleet else None
+            return "" if found else f"No drive was found at {typed}."
         if typed.casefold() == "factory" or Path(typed).expanduser().is_file():
             return ""
         return f"There is no file {typed}." if typed else "Type a file, an address, or factory."
@@ -132,9 +133,10 @@ class SetKeys(ParameterKeys):
     async def _compare_drive(self, device: int) -> None:
         from tui.session.upload import Upload, setting_codes
 
-        other = self.app.session_at(device)
-        if other is None:
+        found = self.app.fleet.console(device) if self.app.fleet else None
+        if found is None:
             return
+        other = found.session
 
         def progress(done: int, count: int) -> None:
             self.note(f"Reading device {device}: {done} of {count}")

@@ -23,11 +23,13 @@ from tui.drive.errors import DriveError
 from tui.drive.shown import shown
 from tui.drive.writable import option_code, refusal, waits_for_reset
 
+from .arming import NotArmed
 from .asking import Asker
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Journal
 from .link_change import LinkChange, link_change
 from .refusals import device_refusal
+from .work import Permit, Stopped
 from .writing import NotTaken, Writer
 
 LOST_ANSWERS = (NoAnswer, ChecksumFault, WrongReply)
@@ -92,11 +94,12 @@ async def apply_edits(
     journal: Journal,
     edits: Edits,
     *,
+    permit: Permit,
     confirmed: Collection[str] = (),
     why: str = "setting",
     progress: Progress | None = None,
 ) -> Applied:
-    """Write staged edits one after another, in their order.
+    """Write staged edits one after another, in their order, as long as the permit holds.
 
     `confirmed` are codes of unverified parameters that the user confirmed; `why` goes into the
     journal. Raises RequestRefused on a read-only line, and the line's errors while nothing has
@@ -104,7 +107,7 @@ async def apply_edits(
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
-    work = _Work(session, Writer(session, journal), Asker(session), edits, confirmed, why)
+    work = _Work(session, Writer(session, journal, permit), Asker(session), edits, confirmed, why)
     await work.look_at_all()
     told = problems(session.profile, edits, work.asker.raws)
     order = ordered(session.profile, edits, work.asker.raws)
@@ -158,7 +161,12 @@ class _Work:
             return Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {error}")
         try:
             return await self._write(edit)
+        except (Stopped, NotArmed) as error:
+            self.stopped = str(error)
+            return Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {error}", edit.old)
         except RequestRefused as error:
+            if self.writer.permit is not None and self.writer.permit.refusal():
+                self.stopped = str(error)
             return Result(edit, Outcome.REFUSED, str(error), edit.old)
         except LOST_ANSWERS as error:
             return await self._after_a_lost_answer(edit, error)
@@ -182,7 +190,7 @@ class _Work:
             return Result(edit, Outcome.REFUSED, text, edit.old)
         held = raws.get(edit.code)
         if held is None:
-            said = asker.absent.get(edit.code, "")
+            said = asker.why_absent(edit.code)
             return Result(
                 edit, Outcome.REFUSED, f"{edit.code} cannot be read, so it is not written: {said}"
             )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from tui.bus.errors import ChecksumFault, NoAnswer, WrongReply
@@ -12,7 +12,7 @@ from tui.drive.chart import watched_codes
 from tui.drive.profile import Profile
 from tui.drive.schema import StateKind
 
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .drive_state import drive_state
 from .reader import Reader
 from .readings import Reading
@@ -41,34 +41,33 @@ def neighbours(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
     return parts
 
 
-class OwnReader(Reader):
-    """A reader that tells which parameters the drive said it does not have."""
-
-    def lacks(self, code: str) -> bool:
-        """Whether the drive itself answered that it has no such word."""
-        refused = self._refused.get(code)
-        return refused is not None and refused.absent
-
-
 @dataclass(slots=True)
 class Asker:
-    """Reads of one drive by a reader of its own, so that no other work is disturbed."""
+    """Reads of one drive into its image by a reader of its own, so that no other is disturbed."""
 
     session: DriveSession
     priority: Priority = Priority.OPERATOR_READ
-    raws: dict[str, int] = field(default_factory=dict)
-    """Raw values by code as last read."""
-    absent: dict[str, str] = field(default_factory=dict)
-    """Codes that have no value, and what the drive or the line said instead."""
-    lacking: set[str] = field(default_factory=set)
-    """Codes that the drive itself said it does not have."""
     headline: str = "not known"
     """The drive's state in words, as last read."""
-    reader: OwnReader = field(init=False)
+    reader: Reader = field(init=False)
 
     def __post_init__(self) -> None:
-        session = self.session
-        self.reader = OwnReader(session.line, session.device, session.profile)
+        self.reader = Reader(self.session)
+
+    @property
+    def raws(self) -> Mapping[str, int]:
+        """All raw values known of the drive."""
+        return self.session.image.raws
+
+    @property
+    def lacking(self) -> frozenset[str]:
+        """Codes that the drive itself said it does not have."""
+        return self.session.image.lacking
+
+    def why_absent(self, code: str) -> str:
+        """What the drive or the line said instead of a value; empty where there is one."""
+        refused = self.session.image.refused.get(code)
+        return refused.error if refused is not None else ""
 
     async def ask(self, codes: Iterable[str]) -> dict[str, Reading]:
         """Read, again where a reply was lost; raises the line's errors when that does not help."""
@@ -83,7 +82,6 @@ class Asker:
                 if self.priority >= Priority.POLL and isinstance(error, NoAnswer):
                     await asyncio.sleep(min(error.retry_in or 0.0, LONGEST_REST))
             else:
-                self._note(readings)
                 return readings
         raise AssertionError  # the last try returns or raises
 
@@ -106,15 +104,3 @@ class Asker:
         state = drive_state(profile, await self.ask(code for code in codes if code))
         self.headline = state.headline or state.kind
         return state.kind
-
-    def _note(self, readings: dict[str, Reading]) -> None:
-        self.session.monitor.known.note(readings)
-        for code, reading in readings.items():
-            if reading.raw is None:
-                self.raws.pop(code, None)
-                self.absent[code] = reading.error
-                if self.reader.lacks(code):
-                    self.lacking.add(code)
-            else:
-                self.absent.pop(code, None)
-                self.raws[code] = reading.raw

@@ -12,13 +12,10 @@ import time
 from collections.abc import Callable, Collection, Coroutine, Mapping
 from dataclasses import dataclass
 from decimal import Decimal
-from enum import StrEnum
 from typing import Any
 
-from tui.bus.errors import LineError, Superseded
-from tui.bus.line import LineStatus, Priority
+from tui.bus.line import Priority
 from tui.drive.chart import read_chart, state_of
-from tui.drive.errors import DriveError
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
@@ -33,17 +30,19 @@ from tui.drive.orders import (
 from tui.drive.schema import Chart, CommandOption, ControlSource, Order, OrderId, State
 from tui.drive.values import from_words
 
+from .arming import ARMED_FOR
 from .control_source import configure
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Journal
-from .order_queue import BY_STOP
-from .order_queue import Order as Queued
+from .reader import Reader
 from .readings import Reading
+from .recording import NothingToTakeOver, record_start
 from .reference import Reference, parse_reference, reference_codes
+from .work import Kind, Outcome, Permit, Task
 from .writing import Writer
 
-ARMED_FOR = 60.0
-"""Seconds without a key after which a drive is no longer armed."""
+FRESH = 1.0
+"""Seconds for which a state counts as that of now; an older one is read anew before arming."""
 STEP_TIME = 2.0
 """Seconds that a drive may take for one step of its chart."""
 LOOK = 0.05
@@ -53,94 +52,75 @@ ENABLED = "enabled"
 """The state of the Drivecom charts in which the motor runs."""
 
 
-Work = Callable[[], Coroutine[Any, Any, str]]
-"""An order; it returns what was done."""
-
-
-class Kind(StrEnum):
-    """What an outcome is."""
-
-    WORKING = "working"
-    DONE = "done"
-    REFUSED = "refused"
-
-
-@dataclass(frozen=True, slots=True)
-class Outcome:
-    """What became of the last order; `time` is time.monotonic()."""
-
-    kind: Kind
-    text: str
-    time: float
-    error: Exception | None = None
-    """What was refused, and by whom."""
+Work = Callable[["_Commands"], Coroutine[Any, Any, str]]
+"""A command; it returns what was done."""
 
 
 class Commander:
-    """Gives orders to one drive, once it is armed."""
+    """Gives commands to one drive, once it is armed."""
 
     def __init__(self, session: DriveSession, journal: Journal) -> None:
         self.session = session
-        self.outcome: Outcome | None = None
-        self._writer = Writer(session, journal)
-        self._armed_until: float | None = None
-        self._ended = ""
+        self.journal = journal
+        self.last_order: OrderId | None = None
+        """The command that was given last."""
         self._wanted: Reference | None = None
         self._written: dict[str, int] = {}
         self._lock = threading.Lock()
         self._steps = Decimal(0)
         self._stepping = False
 
+    @property
+    def outcome(self) -> Outcome | None:
+        """What the last work on the drive has come to."""
+        return self.session.work.outcome
+
     # Arming
 
-    def arm(self) -> None:
-        """Let orders through from now on. Raises OrderRefused."""
-        if self.session.line.read_only:
-            raise OrderRefused("The line is read-only: nothing is written.")
-        latest = self.session.monitor.latest
-        if latest is None or latest.error or latest.state.kind == "unknown":
-            raise OrderRefused("The state of the drive is not known; nothing is commanded.")
-        self._armed_until = time.monotonic() + ARMED_FOR
-        self._ended = ""
+    def arm(self, *, seconds: float = ARMED_FOR) -> None:
+        """Let commands through from now on; a state that is not fresh is read first.
+
+        Raises OrderRefused where the line is read-only or lost.
+        """
+        session = self.session
+        if session.line.read_only or session.state(FRESH).kind != "unknown":
+            session.arming.arm(seconds=seconds)
+            return
+        stamp = session.work.stops
+
+        async def work(_permit: Permit) -> str:
+            charts = session.profile.data.charts
+            codes = [*deciding_codes(session.profile), *(chart.status for chart in charts)]
+            await Reader(session).read(dict.fromkeys(codes))
+            if session.state(FRESH).kind == "unknown":
+                raise OrderRefused("The state of the drive is not known; nothing is commanded.")
+            if stamp == session.work.stops:
+                session.arming.arm(seconds=seconds)
+            return ""
+
+        session.work.put(Task(work, owner=self, armed=False))
 
     def disarm(self, why: str = "") -> None:
-        """Let no order through any more."""
-        self._armed_until = None
-        self._ended = why
-
-    def touch(self) -> None:
-        """A key was pressed: an armed drive stays armed."""
-        if self.armed_for is not None:
-            self._armed_until = time.monotonic() + ARMED_FOR
+        """Let no command through any more."""
+        self.session.arming.disarm(why)
 
     @property
     def armed_for(self) -> float | None:
         """Seconds for which the drive is armed yet; None when it is not."""
-        if self._armed_until is None:
-            return None
-        left = self._armed_until - time.monotonic()
-        if left <= 0:
-            self.disarm("No key for a minute: no longer armed.")
-        elif self.session.line.state.status is not LineStatus.CONNECTED:
-            self.disarm("The line was lost: no longer armed.")
-        return left if self._armed_until is not None else None
+        return self.session.arming.armed_for
 
-    @property
-    def why_disarmed(self) -> str:
-        """Why arming ended by itself, or nothing."""
-        return self._ended
+    # Commands; `stamp` is the count of stops when they were typed
 
-    # Orders
+    def order(self, id: OrderId, stamp: int | None = None) -> None:
+        """Give a command. Raises OrderRefused when the drive is not armed."""
+        self.last_order = id
+        self._begin(lambda do: do.carry_out(id), stamp)
 
-    def order(self, id: OrderId) -> None:
-        """Give an order. Raises OrderRefused when the drive is not armed."""
-        self._begin(lambda: self._carry_out(id))
-
-    def refer(self, text: str) -> None:
+    def refer(self, text: str, stamp: int | None = None) -> None:
         """Give a reference as typed: 30, 30Hz, 900rpm. Raises OrderRefused when not armed."""
-        self._begin(lambda: self._refer(text))
+        self._begin(lambda do: do.refer(text), stamp)
 
-    def step(self, hertz: Decimal) -> None:
+    def step(self, hertz: Decimal, stamp: int | None = None) -> None:
         """Raise or lower the reference. Raises OrderRefused when not armed."""
         with self._lock:
             self._steps += hertz
@@ -148,29 +128,45 @@ class Commander:
                 return
             self._stepping = True
         try:
-            self._begin(self._step)
+            self._begin(lambda do: do.step(self.take_steps()), stamp)
         except OrderRefused:
-            self._take_steps()
+            self.take_steps()
             raise
 
-    def choose_option(self, option: CommandOption, bits: int) -> None:
+    def choose_option(self, option: CommandOption, bits: int, stamp: int | None = None) -> None:
         """Set an option. Raises OrderRefused when not armed."""
-        self._begin(lambda: self._option(option, bits))
+        self._begin(lambda do: do.option(option, bits), stamp)
 
-    def configure(self, source: ControlSource) -> None:
+    def take_over(self, stamp: int | None = None) -> None:
+        """Look after a motor that an earlier program has started; no frame is sent.
+
+        Raises OrderRefused when not armed.
+        """
+        session = self.session
+
+        async def work(_do: _Commands) -> str:
+            if session.starts is None:
+                raise NothingToTakeOver("Starts of motors are not put on record here.")
+            await asyncio.to_thread(session.starts.take_over, session)
+            session.note_command()
+            return "Taken over: leaving asks what becomes of the motor."
+
+        self._begin(work, stamp)
+
+    def configure(self, source: ControlSource, stamp: int | None = None) -> None:
         """Set up who commands the drive. Raises OrderRefused when not armed."""
 
-        async def work() -> str:
-            done = await configure(self.session, self._writer, source)
+        async def work(do: _Commands) -> str:
+            done = await configure(self.session, do.writer, source)
             # words of another channel say nothing any more
             self._written = {}
             return done
 
-        self._begin(work)
+        self._begin(work, stamp)
 
     def lost_orders(self) -> str:
         """What the drive no longer holds of what was written from here, or nothing."""
-        known = self.session.monitor.known.raws()
+        known = self.session.image.raws
         lost = [
             f"{code} 16#{raw:04X} is now 16#{known[code] & 0xFFFF:04X}"
             for code, raw in self._written.items()
@@ -180,42 +176,72 @@ class Commander:
             return ""
         return f"Reset, switched off or commanded by others: {', '.join(lost)}."
 
-    def _begin(self, work: Work) -> None:
-        """Carry out an order behind those before it."""
-        if self.armed_for is None:
-            raise OrderRefused("Not armed: a arms this drive.")
-        self.touch()
-        self.session.orders.put(Queued(lambda: self._one(work), self._dropped))
-
-    async def _one(self, work: Work) -> None:
-        """One order; where it fails, those behind it are not carried out."""
-        try:
-            self._say(Kind.DONE, await work())
-        except Superseded:
-            return
-        except (LineError, DriveError) as error:
-            dropped = self.session.orders.drop("an order before it was refused")
-            rest = " The orders behind it were dropped." if dropped else ""
-            self._take_steps()
-            self._say(Kind.REFUSED, f"{error}{rest}", error)
-        except asyncio.CancelledError:
-            self._dropped(BY_STOP)
-            raise
-        finally:
-            self.session.monitor.refresh()
-
-    def _dropped(self, why: str) -> None:
-        self._take_steps()
-        self._say(Kind.REFUSED, why)
-
     def refuse(self, text: str) -> None:
-        """Tell why an order was not given."""
-        self._say(Kind.REFUSED, text)
+        """Tell why a command was not given."""
+        self.session.work.tell(Kind.REFUSED, text)
 
-    def _say(self, kind: Kind, text: str, error: Exception | None = None) -> None:
-        self.outcome = Outcome(kind, text, time.monotonic(), error)
+    def take_steps(self) -> Decimal:
+        """The steps that were ordered and not yet given."""
+        with self._lock:
+            steps, self._steps, self._stepping = self._steps, Decimal(0), False
+        return steps
 
-    async def _carry_out(self, id: OrderId) -> str:
+    def _begin(self, work: Work, stamp: int | None) -> None:
+        """Carry out a command behind those before it."""
+
+        async def carry_out(permit: Permit) -> str:
+            return await work(_Commands(self, permit))
+
+        task = Task(carry_out, owner=self, given_up=self._give_up)
+        self.session.work.put(task, stamp)
+        self.session.arming.touch()
+
+    def _give_up(self) -> None:
+        """Steps that were not given are forgotten."""
+        self.take_steps()
+
+    # What the commands keep from one to the next
+
+    @property
+    def wanted(self) -> Reference | None:
+        """The reference that was given last."""
+        return self._wanted
+
+    def note_reference(self, reference: Reference) -> None:
+        """A reference was given."""
+        self._wanted = reference
+
+    def note_command(self, code: str, word: int) -> None:
+        """A command word was written: it is watched from now on."""
+        self._written = {code: word}
+        self.session.followed = (code,)
+
+    def note_option(self, code: str, word: int) -> None:
+        """Option bits of a command word were written."""
+        if code in self._written:
+            self._written[code] = word
+
+
+@dataclass(slots=True)
+class _Commands:
+    """The commands under one permit."""
+
+    commander: Commander
+    permit: Permit
+    started: bool = False
+    """Whether a run frame went out, or may have."""
+
+    @property
+    def session(self) -> DriveSession:
+        """The drive that is commanded."""
+        return self.commander.session
+
+    @property
+    def writer(self) -> Writer:
+        """Writes as long as the permit holds."""
+        return Writer(self.session, self.commander.journal, self.permit)
+
+    async def carry_out(self, id: OrderId) -> str:
         chart = await self._chart()
         raws = self._raws()
         if refused := interlock(chart, id, raws):
@@ -241,12 +267,10 @@ class Commander:
 
     async def _read(self, codes: list[str]) -> Mapping[str, Reading]:
         session = self.session
-        readings = await session.monitor.reader.read(codes, priority=Priority.OPERATOR_READ)
-        session.monitor.known.note(readings)
-        return readings
+        return await Reader(session).read(codes, priority=Priority.OPERATOR_READ)
 
-    def _raws(self) -> dict[str, int]:
-        return self.session.monitor.known.raws()
+    def _raws(self) -> Mapping[str, int]:
+        return self.session.image.raws
 
     async def _run(self, chart: Chart, id: OrderId) -> str:
         """Reference first, then the way through the chart to the running state."""
@@ -254,12 +278,18 @@ class Commander:
         if not same:
             raise OrderRefused(f"The {chart.name} has no order {id!r}.")
         at_rest = (await self._state(chart)).kind not in ("running", "stopping")
-        await self._write_reference_again()
-        if chart.kind == "drivecom":
-            await self._walk(chart, same[0])
-        else:
-            order = choose(chart, id, self._raws())
-            await self._send(chart, order)
+        await record_start(self.session, "reverse" if id == "reverse" else "forward", self.permit)
+        try:
+            await self._write_reference_again()
+            if chart.kind == "drivecom":
+                await self._walk(chart, same[0])
+            else:
+                order = choose(chart, id, self._raws())
+                self._start_goes_out()
+                await self._send(chart, order)
+        finally:
+            if not self.started and self.session.starts is not None:
+                self.session.starts.never_sent(self.session)
         name = same[0].name
         reached = await self._until_running(chart)
         if at_rest:
@@ -286,15 +316,21 @@ class Commander:
     async def _write_reference_again(self) -> None:
         """Some drives run only once their reference was written, too: it is, as it stands."""
         parameter = self.session.profile.quantity("command_frequency")
-        if self._wanted is not None:
-            parameter = self._wanted.parameter
+        if self.commander.wanted is not None:
+            parameter = self.commander.wanted.parameter
         if parameter is None:
             return
         reading = (await self._read([parameter.code]))[parameter.code]
-        raw = self._wanted.raw if self._wanted is not None else reading.raw
+        raw = self.commander.wanted.raw if self.commander.wanted is not None else reading.raw
         if raw is not None:
-            await self._writer.write(parameter, raw, why="reference before the run order")
+            await self.writer.write(parameter, raw, why="reference before the run order")
             self.session.note_command()
+
+    def _start_goes_out(self) -> None:
+        """From here on a standstill says that the motor was stopped."""
+        self.started = True
+        if self.session.starts is not None:
+            self.session.starts.sent(self.session)
 
     async def _walk(self, chart: Chart, run: Order) -> None:
         """From the state now to the running one, each state seen before the next command."""
@@ -304,6 +340,8 @@ class Commander:
         way = walk(chart, state.id, ENABLED)
         for goal, word in way:
             last = goal == ENABLED
+            if last:
+                self._start_goes_out()
             await self._write_command(chart, run.words[-1] if last else word, run.name)
             reached = await self._wait(chart, {goal, ENABLED})
             if reached.id not in (goal, ENABLED):
@@ -313,6 +351,7 @@ class Commander:
                     f" on 16#{word:04X}."
                 )
         if not way:
+            self._start_goes_out()
             await self._write_command(chart, run.words[-1], run.name)
 
     async def _send(self, chart: Chart, order: Order) -> None:
@@ -321,15 +360,14 @@ class Commander:
             if parameter.code == chart.command:
                 await self._write_command(chart, word, order.name)
             else:
-                await self._writer.write(parameter, from_words(parameter, [word]), why=order.name)
+                await self.writer.write(parameter, from_words(parameter, [word]), why=order.name)
 
     async def _write_command(self, chart: Chart, word: int, why: str) -> None:
         parameter = self.session.profile[chart.command]
         # the state of the drive tells whether it was taken; the word itself is kept on record
-        await self._writer.write(parameter, from_words(parameter, [word]), why=why, check=0)
+        await self.writer.write(parameter, from_words(parameter, [word]), why=why, check=0)
         self.session.note_command()
-        self._written = {parameter.code: word}
-        self.session.monitor.also = (parameter.code,)
+        self.commander.note_command(parameter.code, word)
 
     async def _state(self, chart: Chart) -> State:
         await self._read([chart.status])
@@ -355,18 +393,12 @@ class Commander:
 
     # References and options
 
-    async def _refer(self, text: str) -> str:
+    async def refer(self, text: str) -> str:
         readings = await self._read(reference_codes(self.session.profile))
         return await self._give(parse_reference(self.session.profile, text, readings))
 
-    def _take_steps(self) -> Decimal:
-        """The steps that were ordered and not yet given."""
-        with self._lock:
-            steps, self._steps, self._stepping = self._steps, Decimal(0), False
-        return steps
-
-    async def _step(self) -> str:
-        hertz = self._take_steps()
+    async def step(self, hertz: Decimal) -> str:
+        """The reference so many Hz higher or lower."""
         profile = self.session.profile
         readings = await self._read(reference_codes(profile))
         parameter = profile.quantity("command_frequency")
@@ -377,15 +409,15 @@ class Commander:
         return await self._give(parse_reference(profile, f"{number:f}Hz", readings))
 
     async def _give(self, reference: Reference) -> str:
-        await self._writer.write(
+        await self.writer.write(
             reference.parameter, reference.raw, why="reference", replaceable=True
         )
         self.session.note_command()
-        self._wanted = reference
+        self.commander.note_reference(reference)
         rounded = ", rounded to what the drive can hold" if reference.rounded else ""
         return f"Reference {reference.text} ({reference.parameter.code}){rounded}"
 
-    async def _option(self, option: CommandOption, bits: int) -> str:
+    async def option(self, option: CommandOption, bits: int) -> str:
         parameter = self.session.profile[option.parameter]
         chart = await self._chart()
         reading = (await self._read([parameter.code]))[parameter.code]
@@ -395,11 +427,10 @@ class Commander:
         if option.stopped_only and (await self._state(chart)).id in running:
             raise OrderRefused(f"{option.name} is changed with the motor stopped only.")
         word = reading.raw & 0xFFFF & ~option.mask | bits
-        await self._writer.write(
+        await self.writer.write(
             parameter, from_words(parameter, [word]), why=option.name, check=option.mask
         )
         self.session.note_command()
-        if parameter.code in self._written:
-            self._written[parameter.code] = word
+        self.commander.note_option(parameter.code, word)
         name = next(choice.name for choice in option.choices if choice.bits == bits)
         return f"{option.name}: {name}"

@@ -8,9 +8,10 @@ from tui.drive.orders import OrderRefused
 from tui.drive.schema import ControlSource
 from tui.drive.values import check_raw
 
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .drive_state import drive_state
 from .monitor import monitoring_codes
+from .reader import Reader
 from .writing import Writer
 
 
@@ -44,8 +45,7 @@ async def configure(session: DriveSession, writer: Writer, source: ControlSource
 
 async def _raws(session: DriveSession) -> dict[str, int]:
     codes = source_codes(session.profile)
-    readings = await session.monitor.reader.read(codes, priority=Priority.OPERATOR_READ)
-    session.monitor.known.note(readings)
+    readings = await Reader(session).read(codes, priority=Priority.OPERATOR_READ)
     unread = [code for code, reading in readings.items() if reading.raw is None]
     if unread:
         raise OrderRefused(f"{', '.join(unread)} cannot be read: nothing is changed.")
@@ -53,7 +53,7 @@ async def _raws(session: DriveSession) -> dict[str, int]:
 
 
 async def _at_rest(session: DriveSession) -> None:
-    readings = await session.monitor.reader.read(
+    readings = await Reader(session).read(
         monitoring_codes(session.profile), priority=Priority.OPERATOR_READ
     )
     state = drive_state(session.profile, readings)

@@ -10,13 +10,15 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from tui.bus.errors import LineError, NoAnswer
-from tui.bus.line import LineStatus, Priority, Worker
+from tui.bus.line import Priority, Worker
 from tui.drive.edits import Edits
 from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.orders import OrderRefused
 from tui.drive.parameter_set import ParameterSet
 from tui.drive.restore_plan import RestorePlan
 from tui.drive.rows import Facts
@@ -25,15 +27,16 @@ from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
 from tui.drive.writable import Refusal, refusal
 
-from .applying import Applied, Outcome, Result, apply_edits
+from .applying import Applied, Result, apply_edits
 from .asking import Asker, neighbours
-from .drive_session import DriveSession
+from .drive import DriveSession
+from .drive_state import DriveState
 from .favourites import Marks, load_marks, save_marks
 from .journal import Journal
 from .link_change import LinkChange
 from .memory import factory_reset, save_to_eeprom
-from .said import Said
 from .upload import readable_codes
+from .work import Kind, Outcome, Permit, Task
 
 LOOK = 0.1
 """Seconds between two turns of the reader that has nothing to do."""
@@ -50,18 +53,13 @@ class Editor:
 
     session: DriveSession
     journal: Journal
+    watched: Callable[[], DriveState | None]
+    """The drive's state as it is watched; None while it is not known."""
     edits: Edits = field(default_factory=Edits)
-    raws: dict[str, int] = field(default_factory=dict)
-    """Raw values as last read; replaced as a whole by the line's thread."""
-    absent: dict[str, str] = field(default_factory=dict)
-    lacking: frozenset[str] = frozenset()
     results: dict[str, Result] = field(default_factory=dict)
     """What became of the last writing of each parameter."""
-    changed_elsewhere: dict[str, int] = field(default_factory=dict)
-    """Codes that somebody else changed while they were looked at, with the value before."""
     unsaved: set[str] = field(default_factory=set)
     waits_for_reset: set[str] = field(default_factory=set)
-    said: Said | None = None
     moved: LinkChange | None = None
     """Where the drive answers now, after a setting of the line itself was written."""
     trouble: str = ""
@@ -75,16 +73,48 @@ class Editor:
     version: int = 0
     """Counts every change, so that a screen knows when to look."""
     _reader: Worker | None = None
-    _work: Worker | None = None
     _silent: float | None = None
     """Since when the drive does not answer."""
+    _starting: bool = False
+    """Whether the drive was starting up when it was last looked at."""
     _asked: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.marks = load_marks(self.session.profile.id)
-        self.raws = self.session.monitor.known.raws(longest=AGAIN)
 
     # What is known
+
+    @property
+    def raws(self) -> Mapping[str, int]:
+        """Raw values as last read, by whomever."""
+        return self.session.image.raws
+
+    @property
+    def absent(self) -> dict[str, str]:
+        """Codes without a value, and what the drive or the line said instead."""
+        return {code: one.error for code, one in self.session.image.refused.items()}
+
+    @property
+    def lacking(self) -> frozenset[str]:
+        """Codes that the drive itself said it does not have."""
+        return self.session.image.lacking
+
+    @property
+    def changed_elsewhere(self) -> dict[str, int]:
+        """Staged codes that somebody else has changed since, with the value before."""
+        if self.busy:
+            return {}
+        raws = self.raws
+        return {
+            edit.code: edit.old
+            for edit in self.edits
+            if edit.old is not None and raws.get(edit.code, edit.old) != edit.old
+        }
+
+    @property
+    def said(self) -> Outcome | None:
+        """What the last work on the drive has come to."""
+        return self.session.work.outcome
 
     @property
     def facts(self) -> Facts:
@@ -107,14 +137,14 @@ class Editor:
 
     @property
     def state(self) -> StateKind | None:
-        """The kind of the drive's state as Monitor knows it; None while it is not known."""
-        latest = self.session.monitor.latest
-        return None if latest is None or latest.error else latest.state.kind
+        """The kind of the drive's state as it is watched; None while it is not known."""
+        state = self.watched()
+        return state.kind if state is not None else None
 
     @property
     def busy(self) -> bool:
         """Whether something is being written."""
-        return self._work is not None and not self._work.done()
+        return self.session.work.busy_for(self)
 
     def value(self, code: str, raw: int | None = None) -> Value | None:
         """A parameter's value as a person reads it: the held one, or another raw value's."""
@@ -154,12 +184,15 @@ class Editor:
             try:
                 if due := self._due():
                     await first.ask(due)
-                    self._take(first, due)
+                    self._asked |= dict.fromkeys(due, time.monotonic())
+                    self.version += 1
                 elif waiting:
                     await later.ask(waiting[0])
-                    self._take(later, waiting.pop(0))
+                    self._asked |= dict.fromkeys(waiting.pop(0), time.monotonic())
+                    self.version += 1
                 elif (part := next(parts, None)) is not None:
-                    left = [c for c in part if c not in self.raws and c not in self.absent]
+                    known, absent = self.raws, self.absent
+                    left = [c for c in part if c not in known and c not in absent]
                     waiting = [tuple(group) for group in later.reader.groups(left)]
                 else:
                     await asyncio.sleep(LOOK)
@@ -176,15 +209,17 @@ class Editor:
         """A drive that was silent, or starts, was switched off: what waited for that is over."""
         since, self._silent = self._silent, None
         off = since is not None and time.monotonic() - since > WAS_OFF
-        if not off and self.state != "starting":
+        before, self._starting = self._starting, self.state == "starting"
+        if not off and (before or not self._starting):
             return
         if self.waits_for_reset or self.unsaved:
             lost = ", ".join(sorted(self.unsaved))
             gone = f" Not saved before, so look at: {lost}." if lost else ""
-            self._say(f"The drive was reset or switched off.{gone}", "done")
+            self._say(f"The drive was reset or switched off.{gone}", Kind.DONE)
         self.waits_for_reset, self.unsaved = set(), set()
         # everything may be another value now
-        self._asked, self.raws = {}, {}
+        self._asked = {}
+        self.session.image.forget()
 
     def _due(self) -> list[str]:
         """What is looked at and was not read lately."""
@@ -198,24 +233,6 @@ class Editor:
     def _parameter(self, code: str) -> Parameter | None:
         parameter = self.session.profile.get(code)
         return parameter if parameter is not None and parameter.access != "w" else None
-
-    def _take(self, asker: Asker, codes: list[str] | tuple[str, ...]) -> None:
-        """Keep what was read; note what another has changed meanwhile."""
-        now = time.monotonic()
-        read = {code: asker.raws[code] for code in codes if code in asker.raws}
-        for code, raw in read.items():
-            before = self.raws.get(code)
-            if before is not None and before != raw and not self.busy and code in self.edits:
-                self.changed_elsewhere = {**self.changed_elsewhere, code: before}
-        self._asked |= dict.fromkeys(codes, now)
-        self.absent = {
-            **{c: why for c, why in self.absent.items() if c not in read},
-            **{code: asker.absent[code] for code in codes if code in asker.absent},
-        }
-        self.lacking = self.lacking | asker.lacking
-        if read.items() - self.raws.items():
-            self.raws = {**self.raws, **read}
-        self.version += 1
 
     # Staging
 
@@ -242,18 +259,16 @@ class Editor:
         """Take one edit back."""
         self.edits = self.edits.undo(code, self.session.profile, self.raws, self.lacking)
         self.results.pop(code, None)
-        self.changed_elsewhere = {c: r for c, r in self.changed_elsewhere.items() if c != code}
         self.version += 1
 
     def undo_all(self) -> None:
         """Take every edit back."""
-        self.edits, self.results, self.changed_elsewhere = Edits(), {}, {}
+        self.edits, self.results = Edits(), {}
         self.version += 1
 
     def accept_changes(self) -> None:
         """Take what others wrote for the value before, knowingly."""
         self.edits = self.edits.now(self.session.profile, self.raws, self.lacking)
-        self.changed_elsewhere = {}
         self.version += 1
 
     async def plan(self) -> RestorePlan:
@@ -267,7 +282,6 @@ class Editor:
         profile = library.load(self.source.head.profile)
         options = Options(confirmed=frozenset(self.marks.confirmed))
         held = await held_by(self.session)
-        self.raws = {**self.raws, **held.raws}
         return plan_restore(self.session.profile, held, self.source, profile, options)
 
     def take_plan(self, plan: RestorePlan) -> None:
@@ -293,31 +307,31 @@ class Editor:
 
     # Writing
 
-    def apply(self, codes: tuple[str, ...] = ()) -> None:
+    def apply(self, codes: tuple[str, ...] = (), stamp: int | None = None) -> None:
         """Write what is staged, or only these; returns at once."""
         edits = self.edits
         if codes:
             edits = Edits(tuple(edit for edit in edits.asked if edit.code in codes))
         held_back = tuple(edit for edit in self.edits.asked if codes and edit.code not in codes)
+        self.results = {}
 
-        async def work() -> str:
+        async def work(permit: Permit) -> str:
             applied = await apply_edits(
                 self.session,
                 self.journal,
                 edits,
+                permit=permit,
                 confirmed=self.marks.confirmed,
                 progress=self._progress,
             )
             self._applied(applied, Edits((*applied.left.asked, *held_back)))
             return _summary(applied)
 
-        self._run(work)
+        self._run(work, stamp, self._cut_short)
 
     def _progress(self, done: int, count: int, result: Result) -> None:
         self.results = {**self.results, result.edit.code: result}
-        if result.held is not None:
-            self.raws = {**self.raws, result.edit.code: result.held}
-        self._say(f"{done} of {count}: {result.edit.code} {result.outcome}", "working")
+        self._say(f"{done} of {count}: {result.edit.code} {result.outcome}", Kind.WORKING)
 
     def _applied(self, applied: Applied, left: Edits) -> None:
         self.edits = left
@@ -326,51 +340,69 @@ class Editor:
         self.unsaved |= set(applied.unsaved)
         self.waits_for_reset |= set(applied.after_reset)
         self.moved = next((link for link in applied.links if link.at_once), None)
-        changed = {r.edit.code for r in applied.results if r.outcome is Outcome.CHANGED}
-        self.changed_elsewhere = {
-            c: r for c, r in self.changed_elsewhere.items() if c not in written or c in changed
-        }
 
-    def save(self) -> None:
+    def _cut_short(self) -> str:
+        """A stop came: what the drive has is no longer staged, the rest is."""
+        results = self.results.values()
+        done = [result.edit.code for result in results if result.done]
+        self.edits = Edits(tuple(edit for edit in self.edits.asked if edit.code not in done))
+        self._mark(self.marks.edited(done))
+        profile = self.session.profile
+        self.unsaved |= {c for c in done if profile[c].storage == "ram-until-saved"}
+        with suppress(LineError):
+            self.session.line.spawn(self._see_what_is_held, f"edits {self.session.device}")
+        left = len(self.edits)
+        return f"{len(done)} written and read back, {left} still staged." if left else ""
+
+    async def _see_what_is_held(self) -> None:
+        """Of the edit that a stop cut short it is not known whether the drive took it: look."""
+        with suppress(LineError, DriveError):
+            await Asker(self.session).ask([edit.code for edit in self.edits])
+            raws = self.raws
+            self.edits = Edits(tuple(e for e in self.edits.asked if raws.get(e.code) != e.new))
+            self.version += 1
+
+    def save(self, stamp: int | None = None) -> None:
         """Copy the settings to EEPROM, where the family needs that."""
 
-        async def work() -> str:
-            done = await save_to_eeprom(self.session, self.journal)
+        async def work(permit: Permit) -> str:
+            done = await save_to_eeprom(self.session, self.journal, permit)
             self.unsaved = set()
             return done
 
-        self._run(work)
+        self._run(work, stamp)
 
-    def factory(self) -> None:
+    def factory(self, stamp: int | None = None) -> None:
         """Recall the factory settings."""
 
-        async def work() -> str:
+        async def work(permit: Permit) -> str:
             confirmed = self.marks.confirmed
-            done = await factory_reset(self.session, self.journal, confirmed=confirmed)
-            self._asked, self.raws = {}, {}
+            done = await factory_reset(self.session, self.journal, permit, confirmed=confirmed)
+            self._asked = {}
             self.start()
             return done
 
-        self._run(work)
+        self._run(work, stamp)
 
-    def _run(self, work: Callable[[], Coroutine[Any, Any, str]]) -> None:
-        if self.busy:
-            self._say("Another writing is still under way.", "refused")
+    def _run(
+        self,
+        work: Callable[[Permit], Coroutine[Any, Any, str]],
+        stamp: int | None,
+        given_up: Callable[[], str] | None = None,
+    ) -> None:
+        """Do it as work on the drive; what speaks against it is told."""
+        queue = self.session.work
+        if queue.busy:
+            self._say("Another command is still being carried out.", Kind.REFUSED)
             return
-        if self.session.line.state.status is not LineStatus.CONNECTED:
-            self._say("The line is lost; nothing is written.", "refused")
-            return
+        try:
+            queue.put(Task(work, owner=self, given_up=given_up), stamp)
+        except OrderRefused as refused:
+            self._say(str(refused), Kind.REFUSED)
+        self.version += 1
 
-        async def guarded() -> None:
-            try:
-                self._say(await work(), "done")
-            except (LineError, DriveError) as error:
-                self._say(str(error), "refused")
-
-        self._work = self.session.line.spawn(guarded, f"write {self.session.device}")
-
-    def _say(self, text: str, kind: str) -> None:
-        self.said = Said(text, kind, time.monotonic())
+    def _say(self, text: str, kind: Kind) -> None:
+        self.session.work.tell(kind, text)
         self.version += 1
 
 

@@ -15,15 +15,17 @@ from tui.drive.mapping import UNUSED, Assignment, describe, problems, refusing, 
 from tui.drive.mapping_wire import reach, span
 from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
 from tui.drive.schema import Parameter
-from tui.drive.shown import depends_on, shown_text
+from tui.drive.shown import depends_on
 from tui.drive.values import check_raw, from_words, to_words
 from tui.drive.writable import AT_REST, is_order
 
 from .asking import Asker
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Entry, Journal, now_text
-from .mapping_write import Allowed, AssignmentRefused
-from .writing import NotTaken
+from .mapping_write import AssignmentRefused
+from .recording import record_start
+from .work import Permit
+from .writing import NotTaken, Writer
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +45,7 @@ async def exchange(
     wanted: Mapping[str, int],
     inputs: Assignment | None = None,
     *,
-    allowed: Allowed = lambda: True,
+    permit: Permit,
     in_force: bool = False,
 ) -> Exchanged:
     """Write through the output slots, and read the inputs in the same exchange by function 23.
@@ -56,22 +58,24 @@ async def exchange(
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
-    if not allowed():
-        raise AssignmentRefused("The drive is not armed; nothing was written.")
+    if why := permit.refusal():
+        raise AssignmentRefused(f"{why} Nothing was written.")
     if outputs.block.effective == "after-reset" and not in_force:
         raise AssignmentRefused(
             f"What {outputs.block.name.lower()} stands for since the last reset cannot be read,"
             " and nobody has confirmed it: nothing is written."
         )
-    work = _Exchange(session, journal, Asker(session), outputs, inputs, wanted)
+    work = _Exchange(
+        session, Writer(session, journal, permit), Asker(session), outputs, inputs, wanted
+    )
     work.check_named()
-    return await work.carry_out(allowed)
+    return await work.carry_out(permit)
 
 
 @dataclass(slots=True)
 class _Exchange:
     session: DriveSession
-    journal: Journal
+    writer: Writer
     asker: Asker
     outputs: Assignment
     inputs: Assignment | None
@@ -103,7 +107,7 @@ class _Exchange:
         if wrong := refusing(problems(profile, self.outputs)):
             raise AssignmentRefused(" ".join(problem.text for problem in wrong))
 
-    async def carry_out(self, allowed: Allowed) -> Exchanged:
+    async def carry_out(self, permit: Permit) -> Exchanged:
         await self._check_slots("before")
         await self._interlocks()
         await self._read_scales()
@@ -117,12 +121,21 @@ class _Exchange:
         for parameter in self.targets:
             if parameter.code in self.wanted:
                 self._check(parameter, known[parameter.code])
-        if not allowed():
-            raise AssignmentRefused("The drive is no longer armed; nothing was written.")
+        permit.check()
+        await self._record_start(permit)
         reply, back = await self._send(known, held)
         await self._check_slots("after")
         self._see_taken(known, held, back)
         return Exchanged(known, self._read(reply))
+
+    async def _record_start(self, permit: Permit) -> None:
+        """A command word that goes out with them may start the motor."""
+        commands = {chart.command for chart in self.session.profile.data.charts}
+        if commands.isdisjoint(parameter.code for parameter in self.targets):
+            return
+        await record_start(self.session, "forward", permit)
+        if self.session.starts is not None:
+            self.session.starts.sent(self.session)
 
     async def _read_scales(self) -> None:
         """What scales and units depend on: errors and the journal tell engineering values."""
@@ -154,7 +167,8 @@ class _Exchange:
         codes = deciding_codes(profile)
         for chart in profile.data.charts:
             codes += interlock_codes(chart)
-        raws = self.session.monitor.known.raws() | await self.asker.ask_raws(codes)
+        await self.asker.ask_raws(codes)
+        raws = self.session.image.raws
         found = chart_in_force(profile, raws)
         if found is None or not found.orders:
             raise AssignmentRefused("This drive is not commanded from here.")
@@ -163,7 +177,7 @@ class _Exchange:
 
     def _check(self, parameter: Parameter, raw: int) -> None:
         profile = self.session.profile
-        scale = profile.scale(parameter, self._raws(), self.asker.lacking)
+        scale = profile.scale(parameter, self.asker.raws, self.asker.lacking)
         check_raw(parameter, raw, profile.names(parameter), scale)
 
     async def _send(
@@ -172,16 +186,23 @@ class _Exchange:
         """The words that came back, and what the drive holds then; all into the journal."""
         words = [to_words(parameter, raws[parameter.code])[0] for parameter in self.targets]
         answer, back = "ok", dict[str, int]()
+        image = self.session.image
+        before = {p.code: image.get(p.code) for p in self.targets}
+        for code in before:
+            image.doubt(code)
         try:
             reply = await self._transmit(words)
             back = await self._held()
+        except RequestRefused as error:
+            answer = str(error)
+            for code, held_before in before.items():
+                image.believe(code, held_before)
+            raise
         except LineError as error:
             answer = str(error)
             raise
         finally:
             self.session.note_command()
-            for code, raw in back.items():
-                self.session.monitor.known.put(code, raw)
             for parameter in self.targets:
                 self._record(parameter, held, raws, answer, back)
         return reply, back
@@ -191,10 +212,17 @@ class _Exchange:
         address = block.address + self.places.start
         read = span(self.inputs) if self.inputs is not None else None
         if read is None or session.profile.function(23) is None:
-            await session.line.write(session.device, address, words, multiple=True)
+            await session.line.write(
+                session.device, address, words, multiple=True, forbidden=self._forbidden
+            )
             return ()
         both = await session.line.read_write(
-            session.device, *read, address, words, priority=Priority.OPERATOR_WRITE
+            session.device,
+            *read,
+            address,
+            words,
+            priority=Priority.OPERATOR_WRITE,
+            forbidden=self._forbidden,
         )
         return both.words
 
@@ -251,15 +279,14 @@ class _Exchange:
             read_back=back.get(code),
             why=f"through {self.outputs.block.name.lower()}",
         )
-        self.journal.add(entry)
+        self.writer.journal.add(entry)
 
     def _text(self, parameter: Parameter, raw: int | None) -> str:
-        profile, lacking = self.session.profile, self.asker.lacking
-        return shown_text(profile, parameter, raw, self._raws(), lacking)
+        return self.writer.text(parameter, raw)
 
-    def _raws(self) -> dict[str, int]:
-        """All raw values known, for scales."""
-        return self.session.monitor.known.raws() | self.asker.raws
+    def _forbidden(self) -> str:
+        """Why the frame must no longer go out, or nothing."""
+        return self.writer.permit.refusal() if self.writer.permit is not None else ""
 
     def _read(self, reply: tuple[int, ...]) -> dict[str, int]:
         found = {}

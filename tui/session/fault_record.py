@@ -14,7 +14,7 @@ from datetime import datetime
 from tui.drive.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
 
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Entry, Journal
 from .monitor import Snapshot
 from .readings import Quality, Reading

@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from tui.bus.errors import LineError
@@ -20,9 +20,9 @@ from tui.drive.orders import deciding_codes
 from tui.drive.profile import Profile
 from tui.drive.schema import Reaction
 
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .drive_state import DriveState, drive_state
-from .monitor import monitoring_codes
+from .monitor import Monitor, monitoring_codes
 from .reader import Reader
 from .readings import Reading
 
@@ -48,6 +48,11 @@ class Watch:
     reaction: Reaction | None
     active: bool = True
     """False where it begins only with a first command, and none was sent from here."""
+
+    @property
+    def trips(self) -> bool:
+        """Whether the drive may end in a fault; a reaction that is not known may be one."""
+        return self.reaction is None or self.reaction.trips
 
 
 @dataclass(frozen=True, slots=True)
@@ -79,6 +84,7 @@ class Hunger:
 @dataclass(slots=True)
 class _Kept:
     session: DriveSession
+    monitor: Monitor
     reader: Reader
     since: float = field(default_factory=time.monotonic)
     watch: Watch | None = None
@@ -104,23 +110,34 @@ class Keeper:
         kept = self._kept.get(device)
         return self._watch(kept) if kept else None
 
-    @staticmethod
-    def _watch(kept: _Kept) -> Watch | None:
+    def _watch(self, kept: _Kept) -> Watch | None:
         rules, watch = kept.session.profile.data.communication_fault, kept.watch
         if watch is None or rules is None:
             return None
-        return replace(watch, active=not rules.needs_write or kept.session.commanded)
+        begun = not rules.needs_write or kept.session.commanded or self._runs_by_the_line(kept)
+        return replace(watch, active=begun)
 
-    def left_alone(self) -> dict[int, float]:
-        """Running drives that act on their communication time-out once nobody asks them.
+    def _runs_by_the_line(self, kept: _Kept) -> bool:
+        """Whether the motor runs by somebody's command over the line, whoever gave it."""
+        state, _ = self._last_seen(kept)
+        return state is not None and state.kind == "running" and not state.local
 
-        By device, with the time-out in seconds.
-        """
+    def left_alone(self) -> dict[int, Watch]:
+        """Drives that act on their communication time-out once nobody asks them, at rest too."""
+        found = {device: self.watch(device) for device in self._kept}
         return {
-            device: watch.timeout
-            for device in self._kept
-            if (watch := self.watch(device)) is not None and watch.active and self.runs(device)
+            device: watch
+            for device, watch in found.items()
+            if watch is not None and watch.active and (watch.trips or self.runs(device))
         }
+
+    def unread(self) -> list[DriveSession]:
+        """Drives whose time-out was not read yet: what they do left alone is not known."""
+        return [
+            kept.session
+            for kept in self._kept.values()
+            if kept.learned is None and kept.session.profile.data.communication_fault is not None
+        ]
 
     def under_command(self) -> list[DriveSession]:
         """Drives that were commanded from here and whose motors do not surely stand."""
@@ -132,20 +149,20 @@ class Keeper:
 
     def runs(self, device: int) -> bool:
         """Whether a motor runs, as far as anybody saw it last."""
-        state, _ = self._last_seen(device)
+        state, _ = self._last_seen(self._kept[device])
         return state is not None and state.kind == "running"
 
     def _may_turn(self, kept: _Kept) -> bool:
         """Whether a motor runs, or may: not seen since the last order, or not understood."""
-        state, seen = self._last_seen(kept.session.device)
+        state, seen = self._last_seen(kept)
         ordered = kept.session.commanded_at
         if state is None or (ordered is not None and seen <= ordered):
             return True
         return state.kind in MAY_TURN
 
-    def _last_seen(self, device: int) -> tuple[DriveState | None, float]:
+    def _last_seen(self, kept: _Kept) -> tuple[DriveState | None, float]:
         """The newest state of a drive, by its own monitor or by a look; and when that was."""
-        look, latest = self._looks.get(device), self._kept[device].session.monitor.latest
+        look, latest = self._looks.get(kept.session.device), kept.monitor.latest
         state, seen = (look.state, look.time) if look else (None, 0.0)
         if latest is not None and latest.time > seen and not latest.error:
             return latest.state, latest.time
@@ -167,10 +184,10 @@ class Keeper:
     def _heard(self, kept: _Kept) -> float:
         return self._line.device_state(kept.session.device).heard or kept.since
 
-    def keep(self, session: DriveSession) -> None:
-        """Look after a drive from now on."""
-        device, profile = session.device, session.profile
-        kept = _Kept(session, Reader(self._line, device, profile))
+    def keep(self, session: DriveSession, monitor: Monitor) -> None:
+        """Look after a drive from now on; its monitor, while it runs, spares the looks."""
+        device = session.device
+        kept = _Kept(session, monitor, Reader(session))
         if device in self._kept:
             self._let_go(self._kept[device])
         self._kept = {**self._kept, device: kept}
@@ -228,14 +245,13 @@ class Keeper:
 
     async def _glance(self, kept: _Kept) -> float:
         """Look at a drive's state, unless its monitor does."""
-        if kept.session.monitor.running:
+        if kept.monitor.running:
             return GLANCE / 10
         profile, device = kept.session.profile, kept.session.device
         state, error = None, ""
         try:
             readings = await kept.reader.read(_state_codes(profile), priority=Priority.POLL)
             state = drive_state(profile, readings)
-            kept.session.monitor.known.note(readings)
         except LineError as fault:
             error = str(fault)
         watch = self._watch(kept)
@@ -253,12 +269,27 @@ class Keeper:
         codes = [code for code in (rules.timeout, rules.reaction) if code]
         codes += deciding_codes(kept.session.profile)
         readings = await kept.reader.read(codes, priority=Priority.POLL)
-        kept.session.monitor.known.note(readings)
         timeout = _seconds(readings[rules.timeout], rules.off)
         raw = readings[rules.reaction].raw if rules.reaction else None
         reaction = next((one for one in rules.reactions if one.raw == raw), None)
         kept.watch = None if timeout is None else Watch(timeout, reaction)
         kept.learned = time.monotonic()
+
+
+def left_alone_text(*sessions: DriveSession, watch: Watch | None) -> str:
+    """What drives of one family do when nobody asks them any more, in a sentence."""
+    it = "it" if len(sessions) == 1 else "each"
+    if watch is None:
+        return f"{names_of(sessions)}: left alone {it} goes on: no communication time-out."
+    does = watch.reaction.does if watch.reaction else "its own reaction follows"
+    after = f"acts {watch.timeout:g} s after the last request"
+    return f"{names_of(sessions)}: left alone {it} {after}: {does.rstrip('.')}."
+
+
+def names_of(sessions: Sequence[DriveSession]) -> str:
+    """Drives of one family as a person calls them: by device, and the family."""
+    word = "Device" if len(sessions) == 1 else "Devices"
+    return f"{word} {', '.join(str(one.device) for one in sessions)}, {sessions[0].profile.name}"
 
 
 def _seconds(reading: Reading, off: int | None) -> float | None:

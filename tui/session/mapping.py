@@ -8,7 +8,7 @@ comparison, with every parameter that could stand in it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
@@ -23,7 +23,7 @@ from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from .asking import Asker
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .readings import Reading
 from .verdict import Verdict, compare
 
@@ -101,6 +101,8 @@ class Mapper:
     """Looks at the blocks of one drive; raises the line's errors."""
 
     session: DriveSession
+    in_force: Callable[[], Mapping[str, int]] = dict
+    """Raw values by slot of what a monitor has proved to stand in each place."""
     priority: Priority = Priority.OPERATOR_READ
     written: dict[str, int] = field(default_factory=dict)
     """Slots written from here that count after a reset, which was not seen yet."""
@@ -112,7 +114,7 @@ class Mapper:
     @property
     def lacking(self) -> frozenset[str]:
         """Parameters that the drive said it does not have."""
-        return frozenset(self._asker.lacking)
+        return self.session.image.lacking
 
     def note_reset(self) -> None:
         """The drive may have been reset or switched off: what was written before may count now."""
@@ -254,7 +256,7 @@ class Mapper:
         """Whether the slot is in force, and what it brings where that is something else."""
         if block.effective == "at-once":
             return Force.ACTIVE, ""
-        if self.session.monitor.reader.in_force.get(slot) == raw:
+        if self.in_force().get(slot) == raw:
             # the monitor compares all the time, and has proved it
             return Force.ACTIVE, ""
         waits = self.written.get(slot) == raw

@@ -7,20 +7,20 @@ proposed belongs to the thread of the screen and is kept until it is written or 
 from __future__ import annotations
 
 import asyncio
-import time
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
 from tui.bus.errors import LineError
-from tui.bus.line import LineStatus, Worker
+from tui.bus.line import Worker
 from tui.drive.errors import DriveError
 from tui.drive.mapping import (
     Assignment,
     Change,
     MappingError,
     Problem,
+    assignment,
     changes,
     factory,
     pick,
@@ -33,17 +33,16 @@ from tui.drive.schema import Block
 from tui.drive.user_words import UserWords
 from tui.drive.writable import AT_REST
 
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .exchange import exchange
 from .journal import Journal
 from .mapping import BlockView, Force, Mapper, wire_timing
 from .mapping_write import at_rest_only, write_assignment
-from .monitor import Snapshot, monitoring_codes, rates_of
-from .order_queue import BY_STOP, Order
+from .monitor import Monitor, Snapshot, monitoring_codes, rates_of
 from .outputs import Meant, example, meant, refuse_pending, values_text
-from .said import Said
 from .user_words import load_words, read_words, save_words
 from .verdict import Verdict
+from .work import Kind, Outcome, Permit, Task
 
 AGAIN = 1.0
 """Seconds between two looks at the blocks."""
@@ -55,26 +54,25 @@ class MappingDesk:
     """What is known of a drive's blocks, what is proposed, and the work on them."""
 
     session: DriveSession
+    monitor: Monitor
     journal: Journal
     views: dict[str, BlockView] = field(default_factory=dict)
-    """By the id of the block, as last seen; replaced as a whole by the line's thread."""
+    """What was seen of each block when it was last compared, by its id; replaced as a whole."""
     plans: dict[str, Assignment] = field(default_factory=dict)
     """What is proposed, by the id of the block, where that is not today's assignment."""
     words: UserWords = field(default_factory=tuple)
     word_raws: list[int | None] = field(default_factory=list)
-    said: Said | None = None
     trouble: str = ""
     """Why nothing can be read now; empty while that works."""
     mapper: Mapper = field(init=False)
     _seen: dict[str, dict[str, int]] = field(default_factory=dict)
     """The slots as the person saw them when a proposal was begun, by the id of the block."""
     _reader: Worker | None = None
-    _at_work: bool = False
     _verify: bool = False
     _costs: dict[object, Saving] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.mapper = Mapper(self.session)
+        self.mapper = Mapper(self.session, lambda: self.monitor.reader.in_force)
         self.words = load_words(self.session)
         self.word_raws = [None] * len(self.words)
 
@@ -86,7 +84,12 @@ class MappingDesk:
     @property
     def busy(self) -> bool:
         """Whether something is being written."""
-        return self._at_work
+        return self.session.work.busy_for(self)
+
+    @property
+    def said(self) -> Outcome | None:
+        """What the last work on the drive has come to."""
+        return self.session.work.outcome
 
     # Reading
 
@@ -104,7 +107,7 @@ class MappingDesk:
     def verify(self) -> None:
         """Compare every slot several times at the next look, and tell what came of it."""
         self._verify = True
-        self._say("Comparing each slot with direct reads", "working")
+        self._say("Comparing each slot with direct reads", Kind.WORKING)
 
     async def _watch(self) -> None:
         while True:
@@ -126,7 +129,7 @@ class MappingDesk:
         self.word_raws = await read_words(self.session, self.words)
         if verify:
             text, good = _verdict(list(self.views.values()))
-            self._say(text, "done" if good else "refused")
+            self._say(text, Kind.DONE if good else Kind.REFUSED)
 
     def _wait_for_a_reset(self) -> None:
         """Note when the drive was silent or starts anew: what waits for a reset may count then."""
@@ -136,14 +139,14 @@ class MappingDesk:
                 self.mapper.note_reset()
                 leave()
 
-        leave = self.session.monitor.listen(seen)
+        leave = self.monitor.listen(seen)
 
     # Proposing
 
     def today(self, block: Block) -> Assignment | None:
         """What the drive holds; None while that is not known."""
-        view = self.views.get(block.id)
-        return view.plan if view else None
+        raws = self.session.image.raws
+        return assignment(block, {slot: raws[slot] for slot in block.slots if slot in raws})
 
     def proposed(self, block: Block) -> Assignment | None:
         """What is proposed, else today's assignment."""
@@ -229,22 +232,22 @@ class MappingDesk:
         """Watch other words from now on, and keep them for this drive."""
         self.words, self.word_raws = words, [None] * len(words)
         if wrong := save_words(self.session, words):
-            self._say(wrong, "refused")
+            self._say(wrong, Kind.REFUSED)
 
     # Writing
 
     def not_now(self, block: Block) -> str:
         """Why the slots of a block cannot be written in the state of now, as Monitor knows it."""
-        latest = self.session.monitor.latest
+        latest = self.monitor.latest
         if latest is None or latest.error or latest.state.kind in AT_REST:
             return ""
         return at_rest_only(block, latest.state.headline or latest.state.kind)
 
-    def write(self, allowed: Callable[[], bool]) -> None:
+    def write(self, stamp: int | None = None) -> None:
         """Write what is proposed; returns at once."""
         plans = [self.plans[b.id] for b in self.blocks if b.id in self.plans]
 
-        async def work() -> str:
+        async def work(permit: Permit) -> str:
             texts = []
             for plan in plans:
                 if plan.block.effective == "after-reset":
@@ -255,8 +258,8 @@ class MappingDesk:
                     self.session,
                     self.journal,
                     plan,
+                    permit=permit,
                     expected=self._seen.get(plan.block.id),
-                    allowed=allowed,
                 )
                 self.views = {
                     **self.views,
@@ -266,11 +269,11 @@ class MappingDesk:
                 texts.append(done.text)
             return " ".join(dict.fromkeys(texts))
 
-        self._run(work, "Writing, each slot read back")
+        self._run(work, "Writing, each slot read back", stamp)
 
     def example(self) -> str:
         """What may be typed to write through the outputs. Raises MappingError."""
-        return example(self.session.profile, self._outputs(), self.session.monitor.known.raws())
+        return example(self.session.profile, self._outputs(), self.session.image.raws)
 
     def meant(self, text: str) -> Meant:
         """What `LFRD=1500 ACC=5.0` would write through the outputs of now, and what follows.
@@ -281,29 +284,29 @@ class MappingDesk:
         refuse_pending(outputs, self.mapper.written)
         read = next((b for b in self.blocks if b.direction == "read"), None)
         inputs = self.today(read) if read else None
-        raws = session.monitor.known.raws()
+        raws = session.image.raws
         return meant(session.profile, session.device, outputs, inputs, raws, text)
 
-    def exchange(self, agreed: Meant, allowed: Callable[[], bool]) -> None:
+    def exchange(self, agreed: Meant, stamp: int | None = None) -> None:
         """Write through the outputs what a person has agreed to; returns at once."""
         session = self.session
 
-        async def work() -> str:
+        async def work(permit: Permit) -> str:
             done = await exchange(
                 session,
                 self.journal,
                 agreed.outputs,
                 agreed.wanted,
                 agreed.inputs,
-                allowed=allowed,
+                permit=permit,
                 in_force=True,
             )
-            raws = session.monitor.known.raws()
+            raws = session.image.raws
             sent = values_text(session.profile, agreed.wanted, raws)
             back = values_text(session.profile, done.inputs, raws)
             return f"Written: {sent}." + (f" Came back: {back}." if back else "")
 
-        self._run(work, "Writing through the outputs")
+        self._run(work, "Writing through the outputs", stamp)
 
     def _outputs(self) -> Assignment:
         block = next((b for b in self.blocks if b.direction == "write"), None)
@@ -312,39 +315,37 @@ class MappingDesk:
             raise MappingError("No output slot is in use.")
         return plan
 
-    def _run(self, work: Callable[[], Coroutine[Any, Any, str]], doing: str) -> None:
-        """Do it as an order to the drive: behind those before it, ended by a stop."""
-        session = self.session
-        if session.line.state.status is not LineStatus.CONNECTED:
-            self._say("The line is lost; nothing is written.", "refused")
+    def _run(
+        self, work: Callable[[Permit], Coroutine[Any, Any, str]], doing: str, stamp: int | None
+    ) -> None:
+        """Do it as work on the drive: nothing before it, ended by a stop."""
+        queue = self.session.work
+        if queue.busy:
+            self._say("Another command is still being carried out.", Kind.REFUSED)
             return
+        cut_short = False
 
-        async def guarded() -> None:
+        async def carry_out(permit: Permit) -> str:
+            nonlocal cut_short
             try:
-                self._say(await work(), "done")
-            except (LineError, DriveError) as error:
-                self._say(str(error), "refused")
-                await self._see_again()
+                return await work(permit)
             except asyncio.CancelledError:
-                self._say(f"Writing was {BY_STOP}; what was written stays.", "refused")
-                session.line.spawn(self._see_again, f"blocks {session.device} after a stop")
+                cut_short = True
                 raise
-            finally:
-                self._at_work = False
 
-        def dropped(why: str) -> None:
-            self._at_work = False
-            self._say(f"Nothing was written: {why}.", "refused")
+        def given_up() -> str | None:
+            self._look_again()
+            return "What was written stays." if cut_short else None
 
-        if self.busy or session.orders.busy:
-            self._say("Another order is still being carried out.", "refused")
-            return
-        self._at_work = True
-        self._say(doing, "working")
         try:
-            session.orders.put(Order(guarded, dropped))
+            queue.put(Task(carry_out, owner=self, working=doing, given_up=given_up), stamp)
         except OrderRefused as refused:
-            dropped(str(refused))
+            self._say(str(refused), Kind.REFUSED)
+
+    def _look_again(self) -> None:
+        """What was not done to its end: the person looks at what the drive holds now."""
+        with suppress(LineError):
+            self.session.line.spawn(self._see_again, f"blocks {self.session.device} again")
 
     async def _see_again(self) -> None:
         """After a refusal the person looks at what the drive holds now, and may write again."""
@@ -356,10 +357,10 @@ class MappingDesk:
 
     def refuse(self, text: str) -> None:
         """Tell why something was not done."""
-        self._say(text, "refused")
+        self._say(text, Kind.REFUSED)
 
-    def _say(self, text: str, kind: str) -> None:
-        self.said = Said(text, kind, time.monotonic())
+    def _say(self, text: str, kind: Kind) -> None:
+        self.session.work.tell(kind, text)
 
 
 def _verdict(views: list[BlockView]) -> tuple[str, bool]:

@@ -6,7 +6,7 @@ overwritten.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.bus.errors import DeviceException, RequestRefused
@@ -23,13 +23,11 @@ from tui.drive.schema import Block
 from tui.drive.writable import AT_REST
 
 from .asking import Asker
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Journal
 from .refusals import device_refusal
+from .work import Permit
 from .writing import NotTaken, Writer
-
-Allowed = Callable[[], bool]
-"""Whether the drive is still armed."""
 
 
 class AssignmentRefused(MappingError):
@@ -65,8 +63,8 @@ async def write_assignment(
     journal: Journal,
     plan: Assignment,
     *,
+    permit: Permit,
     expected: Mapping[str, int] | None = None,
-    allowed: Allowed = lambda: True,
 ) -> Written:
     """Make the drive hold an assignment, with the motor at rest.
 
@@ -78,12 +76,8 @@ async def write_assignment(
         raise RequestRefused("The line is read-only: nothing is written.")
     if wrong := refusing(problems(session.profile, plan)):
         raise AssignmentRefused(" ".join(problem.text for problem in wrong))
-    work = _Writing(session, Writer(session, journal), Asker(session), plan, allowed)
-    try:
-        return await work.carry_out(expected)
-    finally:
-        # the monitor learns what the block brings now
-        session.monitor.refresh()
+    work = _Writing(session, Writer(session, journal, permit), Asker(session), plan)
+    return await work.carry_out(expected)
 
 
 def at_rest_only(block: Block, headline: str) -> str:
@@ -100,7 +94,6 @@ class _Writing:
     writer: Writer
     asker: Asker
     plan: Assignment
-    allowed: Allowed
     done: tuple[Change, ...] = ()
 
     async def carry_out(self, expected: Mapping[str, int] | None) -> Written:
@@ -129,14 +122,15 @@ class _Writing:
         held = await self.asker.ask_raws(self.plan.block.slots)
         missing = [slot for slot in self.plan.block.slots if slot not in held]
         if missing:
-            said = self.asker.absent.get(missing[0], "")
+            said = self.asker.why_absent(missing[0])
             raise AssignmentRefused(self._so_far(f"{missing[0]} cannot be read: {said}"))
         return held
 
     async def _may(self) -> None:
-        """Raise unless the drive is armed yet and its motor surely at rest."""
-        if not self.allowed():
-            raise AssignmentRefused(self._so_far("The drive is no longer armed."))
+        """Raise unless the motor is surely at rest, and the task may still write."""
+        permit = self.writer.permit
+        if permit is not None and (why := permit.refusal()):
+            raise AssignmentRefused(self._so_far(why))
         if await self.asker.ask_state() not in AT_REST:
             text = at_rest_only(self.plan.block, self.asker.headline)
             raise AssignmentRefused(self._so_far(text))

@@ -14,9 +14,10 @@ from tui.drive.values import from_words
 from tui.drive.writable import AT_REST, is_setting, line_setting
 
 from .asking import Asker
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Journal
 from .refusals import device_refusal
+from .work import Permit
 from .writing import Writer
 
 LONGEST = 10.0
@@ -26,19 +27,20 @@ NAMED = 8
 """How many settings are named in a text."""
 
 
-async def save_to_eeprom(session: DriveSession, journal: Journal) -> str:
+async def save_to_eeprom(session: DriveSession, journal: Journal, permit: Permit) -> str:
     """Copy the settings to EEPROM and wait until the drive is done; returns what was done.
 
     Raises MemoryRefused (wrong state, or the family needs or knows no such order),
     DeviceException with what the drive's refusal means, and the line's other errors.
     """
     order = save_order(session.profile)
-    await _carry_out(session, journal, order, why="save to EEPROM", confirmed={order.parameter})
+    writer = Writer(session, journal, permit)
+    await _carry_out(writer, order, why="save to EEPROM", confirmed={order.parameter})
     return f"{session.profile.name}: the settings are saved to EEPROM."
 
 
 async def factory_reset(
-    session: DriveSession, journal: Journal, *, confirmed: Collection[str] = ()
+    session: DriveSession, journal: Journal, permit: Permit, *, confirmed: Collection[str] = ()
 ) -> str:
     """Recall the factory settings and look what became of them; returns what was done.
 
@@ -46,18 +48,21 @@ async def factory_reset(
     `confirmed`), DeviceException with what the drive's refusal means, and the line's other errors.
     """
     order = factory_order(session.profile)
-    asker = await _carry_out(session, journal, order, why="factory settings", confirmed=confirmed)
+    writer = Writer(session, journal, permit)
+    asker = await _carry_out(writer, order, why="factory settings", confirmed=confirmed)
+    # every word may hold something else now
+    session.image.forget()
     return await _told(session, asker)
 
 
 async def _carry_out(
-    session: DriveSession,
-    journal: Journal,
+    writer: Writer,
     order: MemoryOrder,
     *,
     why: str,
     confirmed: Collection[str],
 ) -> Asker:
+    session = writer.session
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
     profile = session.profile
@@ -74,13 +79,13 @@ async def _carry_out(
         held = (await asker.ask_raws([order.parameter])).get(order.parameter)
         if held is None:
             raise MemoryRefused(
-                f"{order.parameter} cannot be read: {asker.absent[order.parameter]}"
+                f"{order.parameter} cannot be read: {asker.why_absent(order.parameter)}"
             )
         word |= held & 0xFFFF & ~order.raw
     raw = from_words(parameter, [word])
     try:
         # the drive takes the order back by itself: what it holds afterwards proves nothing
-        await Writer(session, journal).write(parameter, raw, why=why, read_back=False)
+        await writer.write(parameter, raw, why=why, read_back=False)
     except DeviceException as error:
         text = device_refusal(profile, parameter, error, asker.headline).rstrip(".")
         raise DeviceException(
@@ -122,7 +127,7 @@ async def _until_done(asker: Asker, order: MemoryOrder) -> None:
             raws = {}  # a drive that is busy with its memory may not answer for a moment
         held = raws.get(order.parameter, order.raw)
         pending = held & order.raw if order.bit else held == order.raw
-        known = status is not None and status.code not in asker.absent
+        known = status is not None and not asker.why_absent(status.code)
         busy = profile.data.memory.busy_mask
         word = raws.get(status.code, busy) if status is not None and known else 0
         if raws and not pending and not word & busy:

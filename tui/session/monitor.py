@@ -7,6 +7,7 @@ a screen, so a terminal that is not read costs the drive nothing.
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
@@ -14,21 +15,25 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 
 from tui.bus.errors import LineClosed, LineError, LineLost
-from tui.bus.line import Line, LineState, Priority, Worker
+from tui.bus.line import LineState, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
 from tui.drive.profile import Profile
 from tui.drive.schema import Quantity
 
+from .drive import DriveSession
 from .drive_state import DriveState, drive_state
 from .due import Due
-from .known import Known
 from .reader import Reader
 from .readings import Reading
 
+log = logging.getLogger(__name__)
+
 STALE_CYCLES = 3
 """Cycles after which a value is no longer taken for the present one."""
+STALE_LEAST = 1.5
+"""Seconds for which a snapshot counts however fast the cycles are."""
 SLOW_FACTOR = 10
 """Cycles of the fast values to one of the slow ones."""
 TREND_SECONDS = 300.0
@@ -38,6 +43,8 @@ RESET_NEAR = frozenset({"fault", "starting", "unknown"})
 """Kinds of state in or after which a drive is reset, maybe without falling silent."""
 FORGOTTEN_AFTER = 3
 """Failed cycles in a row after which another drive may answer."""
+RESTART_AFTER = 1.0
+"""Seconds after which a monitor that failed by an error of its own begins anew."""
 RATE_OVER = 6
 """Cycles over which the rate is measured."""
 
@@ -60,6 +67,12 @@ class Snapshot:
     line: LineState
     block: str = ""
     """The block or scanner that brought some of the values."""
+    period: float = 0.5
+    """Seconds from one cycle to the next, as they were."""
+
+    def is_stale(self, now: float) -> bool:
+        """Whether no cycle has ended for so long that nothing here is the present any more."""
+        return now - self.time > max(STALE_CYCLES * self.period, STALE_LEAST)
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,27 +107,27 @@ Listener = Callable[[Snapshot], None]
 class Monitor:
     """Polls the monitoring set of one drive in a worker of the line's loop."""
 
-    def __init__(self, line: Line, device: int, profile: Profile) -> None:
-        self.line = line
-        self.device = device
-        self.profile = profile
+    def __init__(self, session: DriveSession) -> None:
+        self.session = session
+        self.line = session.line
+        self.device = session.device
+        self.profile = session.profile
         self.period = 0.5
         """Wished time of a cycle in seconds; read anew at each."""
-        self.reader = Reader(line, device, profile)
-        self.known = Known()
-        """What was last read of the drive, by whomever."""
-        self.also: tuple[str, ...] = ()
-        """Codes read with the seldom ones beside those that were asked for at the start."""
+        self.reader = Reader(session)
+        self.restarts = 0
+        """How often watching failed by an error of its own, and was begun anew."""
         self._latest: Snapshot | None = None
         self._using = ""
         self._kind = "unknown"
         """Kind of the state that was last read."""
         self._all_due = True
+        self._stirs = 0
         self._learn_due = True
         self._trend: deque[TrendPoint] = deque()
         self._listeners: tuple[Listener, ...] = ()
         self._worker: Worker | None = None
-        trend = (profile.quantity(quantity) for quantity in TREND_QUANTITIES)
+        trend = (session.profile.quantity(quantity) for quantity in TREND_QUANTITIES)
         self._trend_codes = [parameter.code if parameter else None for parameter in trend]
 
     @property
@@ -162,18 +175,42 @@ class Monitor:
             more += tuple(c for c in deciding_codes(self.profile) if c not in {*known, *more})
         rates = replace(rates, slow=rates.slow + more)
         self._worker = self.line.spawn(
-            lambda: self._watch(rates), f"monitor {self.profile.id} {self.device}"
+            lambda: self._keep_watching(rates), f"monitor {self.profile.id} {self.device}"
         )
-
-    def refresh(self) -> None:
-        """Read everything in the next cycle, the seldom values too; for any thread."""
-        self._all_due = True
 
     def stop(self) -> None:
         """Stop watching; an exchange in flight ends by itself."""
         if self._worker is not None:
             self._worker.cancel()
             self._worker = None
+
+    async def _keep_watching(self, rates: Rates) -> None:
+        """Watch for good: an error that nobody foresaw is told, and watching begins anew."""
+        while True:
+            try:
+                await self._watch(rates)
+            except Exception as error:
+                log.exception("watching device %s failed", self.device)
+                self.restarts += 1
+                told = f"Watching failed ({type(error).__name__}: {error}) and is begun anew."
+                self._tell_failure(told)
+                await asyncio.sleep(RESTART_AFTER)
+
+    def _tell_failure(self, text: str) -> None:
+        """The values of before, as old as they are, with why there are no new ones."""
+        if (latest := self._latest) is None:
+            return
+        snapshot = replace(latest, time=time.monotonic(), wall=time.time(), rate=0.0, error=text)
+        self._latest = snapshot
+        self._hand_out(snapshot)
+
+    def _hand_out(self, snapshot: Snapshot) -> None:
+        """Give a snapshot to every listener; one that fails hurts no other."""
+        for listener in self._listeners:
+            try:
+                listener(snapshot)
+            except Exception:
+                log.exception("a listener to device %s failed", self.device)
 
     async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
@@ -187,11 +224,13 @@ class Monitor:
                 cycle += 1
                 error = ""
                 period = self._period(rates)
-                if self._all_due:
+                if self._all_due or self._stirs != self.session.stirs:
+                    self._stirs = self.session.stirs
                     self._all_due, self._learn_due = False, True
                     due.add(rates.seldom)
                 try:
-                    turn = due.turn((*rates.seldom, *self.also), self.reader.groups)
+                    seldom = (*rates.seldom, *self.session.followed)
+                    turn = due.turn(seldom, self.reader.groups)
                     readings.update(await self._cycle(rates, readings, turn))
                 except (LineError, DriveError) as fault:
                     error = str(fault)
@@ -204,7 +243,6 @@ class Monitor:
                 else:
                     failures = 0
                     due.came()
-                    self.known.note(readings)
                     begun.append(started)
                 self._publish(cycle, readings, rates, _span(begun, period), error)
                 if not error:
@@ -274,6 +312,7 @@ class Monitor:
             error=error,
             line=self.line.state,
             block=self._using,
+            period=span,
         )
         if not error and snapshot.state.kind != self._kind:
             self._kind = snapshot.state.kind
@@ -282,8 +321,7 @@ class Monitor:
             self.reader.distrust()
         self._latest = snapshot
         self._add_to_trend(snapshot)
-        for listener in self._listeners:
-            listener(snapshot)
+        self._hand_out(snapshot)
 
     def _add_to_trend(self, snapshot: Snapshot) -> None:
         """A failed cycle leaves a gap in the trend, never a repeated value."""

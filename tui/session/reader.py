@@ -6,19 +6,20 @@ import math
 import time
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
-from decimal import Decimal
 
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Line, Priority, Reply
 from tui.bus.link import TcpLink, character_time, silence
+from tui.drive.chart import read_chart
 from tui.drive.profile import Profile, is_verified
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
 from tui.drive.schema import Block, Parameter
 from tui.drive.shown import depends_on, shown
 from tui.drive.values import Value, from_words, percent_of, word_count
 
-from .limits import limits_of
-from .readings import Quality, Reading
+from .drive import DriveSession
+from .image import Origin, Raw, RegisterImage
+from .readings import Quality, Rating, Reading
 from .slots import Slots
 
 SOURCE_AGE = 5.0
@@ -33,52 +34,39 @@ ASK_AGAIN = 30.0
 """Seconds after which a poll asks again for a parameter that the drive refused."""
 
 
-@dataclass(frozen=True, slots=True)
-class Raw:
-    """A raw value with the time it was on the wire, or why there is none."""
-
-    time: float
-    raw: int | None
-    error: str = ""
-    absent: bool = False
-    """True where the drive itself said that it has no such word."""
-
-
-@dataclass(frozen=True, slots=True)
-class Rating:
-    """What 100 % is: a number and its unit."""
-
-    number: Decimal
-    unit: str
-
-
 @dataclass(slots=True)
 class Reader:
-    """Reads parameters of one drive and keeps what their scales depend on.
+    """Reads parameters of one drive into its image.
 
     Raises the line's errors for all but a drive's refusal, which makes only the refused
     parameter bad.
     """
 
-    line: Line
-    device: int
-    profile: Profile
-    ratings: dict[str, Rating] = field(default_factory=dict)
-    """What 100 % is, by code, where a person has told it from the nameplate."""
+    session: DriveSession
     using: str = ""
     """Name of the block or scanner that the last poll read, if it read one."""
-    _sources: dict[str, Raw] = field(default_factory=dict)
-    _refused: dict[str, Raw] = field(default_factory=dict)
     _met: set[str] = field(default_factory=set)
     """Unconfirmed words that this drive has answered."""
-    _unanswered: dict[str, Raw] = field(default_factory=dict)
-    """Unconfirmed words at which the drive fell silent while it answers others."""
     _plans: dict[tuple[Hashable, ...], ReadPlan] = field(default_factory=dict)
     _slots: Slots = field(init=False)
 
     def __post_init__(self) -> None:
-        self.line.describe(self.device, limits_of(self.profile))
         self._slots = Slots(self.line, self.device, self.profile)
+
+    @property
+    def line(self) -> Line:
+        """The line of the drive."""
+        return self.session.line
+
+    @property
+    def device(self) -> int:
+        """The drive's slave address."""
+        return self.session.device
+
+    @property
+    def profile(self) -> Profile:
+        """What is known of the drive's family."""
+        return self.session.profile
 
     async def read(
         self, codes: Iterable[str], *, priority: Priority = Priority.OPERATOR_READ
@@ -87,24 +75,33 @@ class Reader:
         wanted = list(dict.fromkeys(codes))
         await self._read_sources(wanted, priority)
         raws = await self._raws(frozenset(wanted), priority)
-        return {code: self._reading(self.profile[code], raws[code]) for code in wanted}
+        self._note_state(wanted)
+        known = _Known(self.session.image)
+        return {code: self._reading(self.profile[code], raws[code], known) for code in wanted}
+
+    def _note_state(self, codes: Iterable[str]) -> None:
+        """Tell the session when the motor was seen at rest."""
+        status = {chart.status for chart in self.profile.data.charts}
+        image = self.session.image
+        for code in status.intersection(codes):
+            if (held := image.get(code)) is not None:
+                self.session.note_state(read_chart(self.profile, image.raws).kind, held.time)
 
     def seconds(self, codes: Iterable[str]) -> float:
         """What reading these costs on the wire by plan, without retries."""
-        sure, unsure = self._by_trust(frozenset(codes).difference(self._refused))
+        sure, unsure = self._by_trust(frozenset(codes).difference(self.session.image.refused))
         return self._plan(sure, self.in_force).seconds + self._plan(unsure).seconds
 
     def groups(self, codes: Iterable[str]) -> list[tuple[str, ...]]:
         """The codes that come in one request each."""
-        wanted = frozenset(codes).difference(self._refused)
+        wanted = frozenset(codes).difference(self.session.image.refused)
         trusts = self._by_trust(wanted)
         requests = [request for trust in trusts for request in self._plan(trust).requests]
         return [tuple(place.code for place in request.places) for request in requests]
 
     def forget(self) -> None:
         """Read scales and refused parameters anew: another drive may answer now."""
-        self._sources.clear()
-        self._refused.clear()
+        self.session.image.distrust()
         self._plans.clear()
         self._met.clear()
         self._slots.forget()
@@ -139,26 +136,27 @@ class Reader:
     async def _read_sources(self, codes: list[str], priority: Priority) -> None:
         sources = {source for code in codes for source in _sources_of(self.profile[code])}
         oldest = time.monotonic() - SOURCE_AGE if priority >= Priority.POLL else math.inf
-        due = frozenset(
-            code
-            for code in sources - set(codes)
-            if code not in self._sources or self._sources[code].time < oldest
-        )
+        due = frozenset(code for code in sources - set(codes) if not self._is_known(code, oldest))
         if due:
-            self._sources.update(await self._raws(due, priority))
-        for code in sources & set(codes):
-            self._sources.setdefault(code, Raw(0.0, None))
+            await self._raws(due, priority)
+
+    def _is_known(self, code: str, oldest: float) -> bool:
+        """Whether a word that others' values depend on was read, or refused, since a time."""
+        image = self.session.image
+        held = image.get(code) if code in image.trusted else image.refused.get(code)
+        return held is not None and held.time >= oldest
 
     async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
-        sure, unsure = self._by_trust(codes.difference(self._refused, found))
+        image = self.session.image
+        sure, unsure = self._by_trust(codes.difference(image.refused, found))
         slots = self.in_force if priority >= Priority.POLL else {}
         found.update(await self._follow(self._plan(sure, slots), priority))
         for request in self._plan(unsure).requests:
             found.update(await self._exchange_unsure(request, priority))
         for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
-        self._note_sources(found)
+        image.take(found, Origin.POLL if priority >= Priority.POLL else Origin.READ)
         return found
 
     async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Raw]:
@@ -197,23 +195,18 @@ class Reader:
             if status is None:
                 raise
             await self.line.read(self.device, status.address, 1, priority=Priority.OPERATOR_READ)
-            nothing = Raw(time.monotonic(), None, "no answer: perhaps this drive has no such word")
-            self._unanswered.update({place.code: nothing for place in request.places})
+            text = "no answer: perhaps this drive has no such word"
+            nothing = Raw(time.monotonic(), None, text, silent=True)
             return {place.code: nothing for place in request.places}
 
     def _still_refused(self, codes: frozenset[str]) -> dict[str, Raw]:
         """Refusals young enough that a poll need not ask again."""
         oldest = time.monotonic() - ASK_AGAIN
-        refused = {c: r for c, r in self._refused.items() if c in codes and r.time > oldest}
-        return refused | {c: r for c, r in self._unanswered.items() if c in codes}
-
-    def _note_sources(self, found: Mapping[str, Raw]) -> None:
-        """A scale source that is read for its own sake is fresher than the one kept."""
-        for code in self._sources.keys() & found.keys():
-            self._sources[code] = found[code]
+        refused = self.session.image.refused
+        return {c: r for c, r in refused.items() if c in codes and (r.silent or r.time > oldest)}
 
     def _plan(self, codes: frozenset[str], slots: Mapping[str, int] | None = None) -> ReadPlan:
-        refused, turnaround = frozenset(self._refused), self._turnaround()
+        refused, turnaround = frozenset(self.session.image.refused), self._turnaround()
         key = (codes, refused, turnaround, tuple(sorted((slots or {}).items())))
         if key not in self._plans:
             timing = self._timing(turnaround)
@@ -250,8 +243,7 @@ class Reader:
         except DeviceException as refusal:
             if several:
                 return {}
-            self._refused.update({p.code: self._refusal(refusal) for p in request.places})
-            return {p.code: self._refused[p.code] for p in request.places}
+            return {p.code: self._refusal(refusal) for p in request.places}
         unknown = self.profile.data.reading.unknown_word
         found: dict[str, Raw] = {}
         for place in request.places:
@@ -277,40 +269,44 @@ class Reader:
                 self.device, parameter.address, count, priority=priority
             )
         except DeviceException as refusal:
-            self._refused[parameter.code] = self._refusal(refusal)
-            return self._refused[parameter.code]
-        self._refused.pop(parameter.code, None)
+            return self._refusal(refusal)
         return Raw(reply.time, from_words(parameter, reply.words))
 
     def _refusal(self, refusal: DeviceException) -> Raw:
         absent = refusal.code == self.profile.data.reading.unknown_exception
         return Raw(time.monotonic(), None, str(refusal), absent)
 
-    def _reading(self, parameter: Parameter, raw: Raw) -> Reading:
+    def _reading(self, parameter: Parameter, raw: Raw, known: _Known) -> Reading:
         if raw.raw is None:
             return Reading.bad(parameter, raw.time, raw.error)
-        value = self._value(parameter, raw.raw)
-        physical = self._physical(parameter, value)
+        value = self._value(parameter, raw.raw, known)
+        physical = self._physical(parameter, value, known)
         return Reading(parameter, raw.raw, value, Quality.GOOD, raw.time, physical=physical)
 
-    def _value(self, parameter: Parameter, raw: int) -> Value:
-        known = {code: one.raw for code, one in self._sources.items() if one.raw is not None}
-        absent = {code for code, one in self._sources.items() if one.absent}
-        return shown(self.profile, parameter, raw, known, absent)
+    def _value(self, parameter: Parameter, raw: int, known: _Known) -> Value:
+        return shown(self.profile, parameter, raw, known.raws, known.lacking)
 
-    def _physical(self, parameter: Parameter, value: Value) -> Value | None:
+    def _physical(self, parameter: Parameter, value: Value, known: _Known) -> Value | None:
         """A percentage in the unit of its rating: the person's, else the drive's own."""
         if parameter.unit != "%" or value.number is None:
             return None
-        rating = self.ratings.get(parameter.code)
-        source = self._sources.get(parameter.rating)
-        if rating is None and source is not None and source.raw is not None:
-            own = self._value(self.profile[parameter.rating], source.raw)
+        rating = self.session.ratings.get(parameter.code)
+        own_raw = known.raws.get(parameter.rating)
+        if rating is None and own_raw is not None:
+            own = self._value(self.profile[parameter.rating], own_raw, known)
             rating = Rating(own.number, own.unit) if own.number is not None else None
         if rating is None:
             return None
         number = percent_of(value.number, rating.number)
         return Value(value.raw, number, rating.unit, f"{number:f}")
+
+
+class _Known:
+    """What scales and units follow, at one moment."""
+
+    def __init__(self, image: RegisterImage) -> None:
+        self.raws = image.trusted
+        self.lacking = image.lacking
 
 
 def _sources_of(parameter: Parameter) -> list[str]:

@@ -3,10 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from decimal import Decimal
 from enum import StrEnum
 
 from tui.drive.schema import Parameter
 from tui.drive.values import NOT_AVAILABLE, Value
+
+
+@dataclass(frozen=True, slots=True)
+class Rating:
+    """What 100 % is: a number and its unit."""
+
+    number: Decimal
+    unit: str
 
 
 class Quality(StrEnum):

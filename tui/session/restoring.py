@@ -20,11 +20,12 @@ from tui.drive.restore_plan import PLAIN, Held, Options, RestorePlan, plan_resto
 from tui.drive.writable import waits_for_reset
 
 from .applying import Applied, Progress, Result, apply_edits
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Journal, now_text
 from .link_change import LinkChange
 from .state import state_folder
 from .upload import Upload, setting_codes
+from .work import Permit
 
 PASSES = 5
 """How often is planned again at most: writing some settings changes others."""
@@ -59,9 +60,8 @@ async def held_by(session: DriveSession, reading: Reading | None = None) -> Held
     """The settings that the drive holds now; raises the line's errors."""
     upload = Upload(session, setting_codes(session.profile), reading)
     await upload.run()
-    asker = upload.asker
     reference = session.identity.reference if session.identity is not None else ""
-    return Held(dict(asker.raws), dict(asker.absent), frozenset(asker.lacking), reference)
+    return Held(upload.raws, upload.absent, session.image.lacking, reference)
 
 
 async def restore(
@@ -71,6 +71,7 @@ async def restore(
     source_profile: Profile,
     options: Options = PLAIN,
     *,
+    permit: Permit,
     progress: Progress | None = None,
     reading: Reading | None = None,
 ) -> Restored:
@@ -91,7 +92,7 @@ async def restore(
         if not len(left):
             break
         try:
-            applied = await _one_pass(session, journal, plan, options, progress)
+            applied = await _one_pass(session, journal, plan, options, permit, progress)
             results.update({result.edit.code: result for result in applied.results})
             links += applied.links
             stopped, left = applied.stopped, applied.left
@@ -136,6 +137,7 @@ async def _one_pass(
     journal: Journal,
     plan: RestorePlan,
     options: Options,
+    permit: Permit,
     progress: Progress | None,
 ) -> Applied:
     return await apply_edits(
@@ -143,6 +145,7 @@ async def _one_pass(
         journal,
         plan.edits,
         confirmed=options.confirmed,
+        permit=permit,
         why="restore",
         progress=progress,
     )

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from .start_record import StartRecord
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 ENDING = ".json"
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})

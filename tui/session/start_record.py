@@ -59,8 +59,9 @@ def offer(
     if not runs or (identity is not None and not _same(record, identity)):
         return ""
     since = _since(record.begun, now or datetime.now().astimezone())
-    left = ", left running on purpose" if record.left_running else ""
-    return f"runs{since} by a command from here{left}, that program ended"
+    if record.left_running:
+        return f"runs{since}, left running on purpose by a program that ended"
+    return f"runs{since} by a command from here, that program ended"
 
 
 def _same(record: StartRecord, identity: DriveIdentity) -> bool:

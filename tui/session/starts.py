@@ -28,7 +28,7 @@ from .state import state_folder
 if TYPE_CHECKING:
     from .identify import DriveIdentity
 
-log = logging.getLogger("drivepanel")
+log = logging.getLogger(__name__)
 
 PATIENCE = 5.0
 """Seconds that begin() waits for the disk; a slow memory card flushes in two."""

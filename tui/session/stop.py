@@ -9,32 +9,39 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from enum import StrEnum
 from functools import partial
 
 from tui.bus.errors import DeviceException, ExchangeError, LineError, RequestRefused
 from tui.bus.line import Line, Priority, Worker
-from tui.drive.chart import read_chart
+from tui.drive.chart import state_of
 from tui.drive.errors import DriveError
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
     choose,
-    deciding_codes,
+    last_word,
+    stop_conditions,
+    stop_in_any,
     target,
     with_options,
 )
 from tui.drive.schema import Chart, Order, OrderId
 from tui.drive.values import from_words
 
-from .drive_session import DriveSession
+from .drive import DriveSession
+from .image import Raw
 from .journal import Journal
 from .limits import limits_of
+from .reader import Reader
 from .writing import Writer
 
 log = logging.getLogger(__name__)
+
+STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
+"""Kinds of state in which a motor at 0 Hz is stopped: nothing enables it."""
 
 FRESH = 1.0
 """Seconds for which a state counts as that of now."""
@@ -111,16 +118,21 @@ class Stopper:
         """The last report of each drive, by device."""
         return self._reports
 
-    def stop(self, sessions: Iterable[DriveSession], order: OrderId = "stop") -> None:
-        """Order drives to stop. Raises LineClosed."""
+    def stop(
+        self, sessions: Iterable[DriveSession], order: OrderId = "stop", by: str = "the stop key"
+    ) -> None:
+        """Order drives to stop; ends their work and their arming. Raises LineClosed."""
         ordered = time.monotonic()
         wanted = list(sessions)
+        for session in wanted:
+            session.work.stop(by)
+            if session.starts is not None:
+                session.starts.withdraw(session)
         if len(wanted) > 1:
             self._line.spawn(lambda: self._broadcast(wanted, order), "stop all")
         for session in wanted:
             if (before := self._workers.get(session.device)) is not None:
                 before.cancel()
-            session.orders.cancel()
             self._say(session, Phase.SENDING, "stop is being sent", ordered)
             work = partial(self._stop, session, order, ordered)
             self._workers[session.device] = self._line.spawn(work, f"stop {session.device}")
@@ -149,9 +161,10 @@ class Stopper:
         """Reach at once all drives of families whose word can start none that hears it."""
         sent: set[tuple[int, int]] = set()
         for session in sessions:
+            raws = session.image.trusted
             try:
-                chart = chart_in_force(session.profile, session.monitor.known.raws())
-                found = choose(chart, order, session.monitor.known.raws()) if chart else None
+                chart = chart_in_force(session.profile, raws)
+                found = choose(chart, order, raws) if chart else None
             except OrderRefused:
                 continue
             if chart is None or found is None or not found.broadcast:
@@ -167,11 +180,10 @@ class Stopper:
 
     async def _stop(self, session: DriveSession, order: OrderId, ordered: float) -> None:
         error = "it did not answer"
+        one = _Stop(session, Writer(session, self._journal, None), order, ordered, self._say)
         for _ in range(TRIES):
             try:
-                chart, chosen = await self._order(session, order)
-                await self._send(session, chart, chosen)
-                text = await self._follow(session, chosen, ordered)
+                text = await one.carry_out()
             except RequestRefused as refused:
                 error = str(refused)
                 break
@@ -194,69 +206,133 @@ class Stopper:
             ordered,
         )
 
-    async def _order(self, session: DriveSession, order: OrderId) -> tuple[Chart, Order]:
-        """The words that stop this drive now; reads what it depends on where that is not known."""
-        known, profile = session.monitor.known, session.profile
-        chart = chart_in_force(profile, known.raws())
-        if chart is None:
-            for code in deciding_codes(profile):
-                await self._read(session, code)
-            chart = chart_in_force(profile, known.raws())
-        if chart is None:
-            raise OrderRefused("How this drive is commanded is not known.")
-        by_state = any(one.states for one in chart.orders if one.id == order)
-        if by_state and chart.status not in known.raws(FRESH):
-            # what stops a motor in one state may do something else in another
-            await self._read(session, chart.status)
-        return chart, choose(chart, order, known.raws())
 
-    async def _read(self, session: DriveSession, code: str) -> None:
+Say = Callable[[DriveSession, Phase, str, float], None]
+
+
+@dataclass(slots=True)
+class _Stop:
+    """One stop of one drive: its word chosen by what the drive tells now, sent, followed."""
+
+    session: DriveSession
+    writer: Writer
+    order: OrderId
+    ordered: float
+    say: Say
+    reader: Reader = field(init=False)
+    held: dict[str, Raw] = field(default_factory=dict)
+    """What command words held before they were written here: option bits are kept from it."""
+
+    def __post_init__(self) -> None:
+        self.reader = Reader(self.session)
+
+    async def carry_out(self) -> str | None:
+        """Choose, send and follow; returns why the motor does not stop, or nothing."""
+        chart, chosen = await self._chosen()
+        await self._send(chart, chosen)
+        return await self._follow(chart, chosen)
+
+    async def _chosen(self) -> tuple[Chart, Order]:
+        """The words that stop this drive now; what decides is read anew where it may differ."""
+        profile = self.session.profile
+        deciding = [chart.when.parameter for chart in profile.data.charts if chart.when]
         try:
-            reply = await self._line.read(
-                session.device, session.profile[code].address, 1, priority=Priority.STOP
-            )
-        except DeviceException:
-            return
-        session.monitor.known.put(code, reply.words[0])
+            await self._read_anew(deciding)
+            chart = chart_in_force(profile, self._sure(deciding))
+            if chart is not None:
+                await self._read_anew(stop_conditions(chart, self.order))
+        except ExchangeError as failure:
+            # blind: by the word that stops whatever the drive is in
+            log.warning("stop of device %s without a look: %s", self.session.device, failure)
+            known = self._sure(deciding)
+            chart = chart_in_force(profile, known)
+            if chart is None:
+                return stop_in_any(profile, known)
+        if chart is None:
+            return stop_in_any(profile, {})
+        return chart, choose(chart, self.order, self._sure(stop_conditions(chart, self.order)))
 
-    async def _send(self, session: DriveSession, chart: Chart, order: Order) -> None:
+    async def _read_anew(self, codes: Iterable[str]) -> None:
+        wanted = list(dict.fromkeys(codes))
+        unsure = [code for code in wanted if code not in self._sure(wanted)]
+        if unsure:
+            await self.reader.read(unsure, priority=Priority.STOP)
+
+    def _sure(self, codes: Iterable[str]) -> dict[str, int]:
+        """What is surely held now: just read, or not to be changed since the motor has run."""
+        session, image = self.session, self.session.image
+        fresh, trusted = image.fresh(FRESH), image.trusted
+        turns = session.state(FRESH).kind in ("running", "stopping")
+        found = {}
+        for code in codes:
+            held = image.get(code)
+            if code not in trusted or held is None:
+                continue
+            since = session.profile[code].access == "rw-stopped" and held.time > session.rest_seen
+            if code in fresh or (turns and since):
+                found[code] = trusted[code]
+        return found
+
+    async def _send(self, chart: Chart, order: Order) -> None:
+        session = self.session
         parameter = target(session.profile, chart, order)
-        writer = Writer(session, self._journal)
-        for word in with_options(chart, order, session.monitor.known.raws()):
+        if (held := session.image.get(parameter.code)) is not None:
+            self.held[parameter.code] = held
+        kept = {code: one.raw for code, one in self.held.items() if one.raw is not None}
+        for word in with_options(chart, order, kept):
             raw = from_words(parameter, [word])
             why = f"stopped: {order.name}"
-            await writer.write(parameter, raw, why=why, priority=Priority.STOP, read_back=False)
+            await self.writer.write(
+                parameter, raw, why=why, priority=Priority.STOP, read_back=False
+            )
 
-    async def _follow(self, session: DriveSession, order: Order, ordered: float) -> str | None:
+    async def _follow(self, chart: Chart, order: Order) -> str | None:
         """See the motor stop; returns why it does not, or nothing."""
-        sent = time.monotonic()
-        fastest = None
-        while (now := time.monotonic()) - ordered < SEEN_FOR:
-            kind, hertz = await self._motion(session)
-            if not hertz and (hertz is not None or kind not in ("running", "stopping")):
-                self._say(session, Phase.STOPPED, "stopped", ordered)
-                session.monitor.refresh()
+        progress, before = time.monotonic(), None
+        ending = last_word(chart, order)
+        while (now := time.monotonic()) - self.ordered < SEEN_FOR:
+            kind, hertz = await self._motion(chart)
+            if not hertz and kind in STANDING:
+                self.say(self.session, Phase.STOPPED, "stopped", self.ordered)
+                self.session.stir()
                 return None
-            slower = hertz is not None and fastest is not None and hertz < fastest
-            if kind == "running" and not slower and now - sent > TAKES_EFFECT:
-                return "it answers and runs on; it is commanded from elsewhere."
-            if hertz is not None:
-                fastest = max(hertz, fastest or 0.0)
+            if hertz == 0 and kind == "running" and ending is not None:
+                # at 0 Hz and enabled by the very word that has stopped it
+                await self._send(chart, ending)
+                progress, ending = time.monotonic(), None
+                continue
+            if kind != "running" or (None not in (hertz, before) and (hertz or 0) < (before or 0)):
+                progress = now
+            if now - progress > TAKES_EFFECT:
+                return self._why_not(hertz)
+            before = hertz
             speed = f", {hertz:g} Hz" if hertz else ""
-            self._say(session, Phase.STOPPING, f"{order.name}{speed}", ordered)
+            self.say(self.session, Phase.STOPPING, f"{order.name}{speed}", self.ordered)
             await asyncio.sleep(LOOK)
         return "it still turns after a minute."
 
-    async def _motion(self, session: DriveSession) -> tuple[str, float | None]:
+    def _why_not(self, hertz: float | None) -> str:
+        """What still enables a drive that does not obey."""
+        state = self.session.state(FRESH)
+        who = "from its terminals or keypad" if state.local else state.channel
+        if hertz == 0:
+            by = who or "from elsewhere"
+            return f"it stands at 0 Hz and is still enabled {by}: a reference turns it at once."
+        return f"it answers and runs on; it is commanded {who or 'from elsewhere'}."
+
+    async def _motion(self, chart: Chart) -> tuple[str, float | None]:
         """The kind of state and the output frequency in Hz, read now."""
-        profile, known = session.profile, session.monitor.known
-        chart = chart_in_force(profile, known.raws())
-        frequency = profile.quantity("output_frequency")
-        codes = [chart.status] if chart else []
+        session = self.session
+        frequency = session.profile.quantity("output_frequency")
+        # the word that was sent, too: the next one keeps its option bits
+        codes = [
+            chart.status,
+            *(code for code in self.held if self.session.image.get(code) is None),
+        ]
         if frequency is not None:
             codes.append(frequency.code)
-        readings = await session.monitor.reader.read(codes, priority=Priority.OPERATOR_READ)
-        known.note(readings)
+        readings = await self.reader.read(codes, priority=Priority.OPERATOR_READ)
         number = readings[frequency.code].number if frequency else None
-        kind = read_chart(profile, known.raws()).kind
+        word = readings[chart.status].raw
+        kind = state_of(chart, word).kind if word is not None else "unknown"
         return kind, abs(number) if number is not None else None

@@ -15,7 +15,7 @@ from tui.drive.shown import scale_sources
 from tui.drive.writable import is_setting
 
 from .asking import Asker, neighbours
-from .drive_session import DriveSession
+from .drive import DriveSession
 
 Progress = Callable[[int, int], None]
 """Called with how many parameters were asked for, and how many there are."""
@@ -45,6 +45,10 @@ class Upload:
     """What is to be read; every readable parameter where empty."""
     progress: Progress | None = None
     priority: Priority = Priority.BACKGROUND
+    raws: dict[str, int] = field(default_factory=dict)
+    """What was read so far."""
+    absent: dict[str, str] = field(default_factory=dict)
+    """What has no value, and what the drive or the line said instead."""
     asker: Asker = field(init=False)
 
     def __post_init__(self) -> None:
@@ -54,8 +58,7 @@ class Upload:
     @property
     def left(self) -> list[str]:
         """Codes that were not asked for yet."""
-        known = self.asker
-        return [c for c in self.codes if c not in known.raws and c not in known.absent]
+        return [c for c in self.codes if c not in self.raws and c not in self.absent]
 
     @property
     def done(self) -> bool:
@@ -77,11 +80,15 @@ class Upload:
             await self._ask(codes)
 
     async def _ask(self, codes: Iterable[str]) -> None:
-        asker = self.asker
-        wanted = [code for code in codes if code not in asker.raws and code not in asker.absent]
-        if wanted:
-            await self.asker.ask(wanted)
-            self._tell()
+        wanted = [code for code in codes if code not in self.raws and code not in self.absent]
+        if not wanted:
+            return
+        for code, reading in (await self.asker.ask(wanted)).items():
+            if reading.raw is None:
+                self.absent[code] = reading.error
+            else:
+                self.raws[code] = reading.raw
+        self._tell()
 
     def _tell(self) -> None:
         if self.progress is not None:
@@ -92,8 +99,8 @@ class Upload:
         wanted = set(self.codes)
         return ParameterSet(
             head=head_of(self.session),
-            raws={code: raw for code, raw in self.asker.raws.items() if code in wanted},
-            absent={code: why for code, why in self.asker.absent.items() if code in wanted},
+            raws={code: raw for code, raw in self.raws.items() if code in wanted},
+            absent={code: why for code, why in self.absent.items() if code in wanted},
         )
 
 

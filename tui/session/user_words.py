@@ -10,7 +10,7 @@ from tui.bus.line import Priority
 from tui.drive.mapping import MappingError
 from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, is_no_value
 
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .state import state_folder
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 from dataclasses import dataclass
 
-from tui.bus.errors import DeviceException, LineError
+from tui.bus.errors import DeviceException, LineError, RequestRefused, Superseded
 from tui.bus.line import Priority
 from tui.drive.errors import DriveError
 from tui.drive.schema import Parameter
-from tui.drive.values import decode, from_words, to_words
+from tui.drive.shown import depends_on, shown_text
+from tui.drive.values import from_words, to_words
 
-from .drive_session import DriveSession
+from .drive import DriveSession
 from .journal import Entry, Journal, now_text
+from .reader import Reader
+from .work import Permit
 
 
 class NotTaken(DriveError):
@@ -20,10 +24,11 @@ class NotTaken(DriveError):
 
 @dataclass(frozen=True, slots=True)
 class Writer:
-    """Writes the parameters of one drive."""
+    """Writes the parameters of one drive, with the permit of a task; a stop needs none."""
 
     session: DriveSession
     journal: Journal
+    permit: Permit | None
 
     async def write(
         self,
@@ -39,12 +44,18 @@ class Writer:
         """Write a raw value and see that the drive holds it, in the bits of `check`.
 
         A `replaceable` one gives way to a newer value of the same parameter while it waits.
+        What the drive holds is unknown from here on until it was read back.
 
-        Raises the line's errors, and NotTaken where the drive holds something else.
+        Raises Stopped and NotArmed, the line's errors, and NotTaken where the drive holds
+        something else.
         """
-        session = self.session
-        old = session.monitor.known.raws().get(parameter.code)
+        session, code = self.session, parameter.code
+        if self.permit is not None:
+            self.permit.check()
+            await self._read_scale(parameter)
+        before = session.image.get(code)
         answer, back = "ok", None
+        session.image.doubt(code)
         try:
             await session.line.write(
                 session.device,
@@ -52,20 +63,36 @@ class Writer:
                 to_words(parameter, raw),
                 priority=priority,
                 replaceable=replaceable,
+                forbidden=self.permit.refusal if self.permit is not None else None,
             )
             back = await self._read_back(parameter) if read_back else None
             if back is not None and (back ^ raw) & check & 0xFFFFFFFF:
                 answer = "holds another value"
                 raise NotTaken(
-                    f"{parameter.code}: written {self._text(parameter, raw)}, the drive holds"
-                    f" {self._text(parameter, back)}."
+                    f"{code}: written {self.text(parameter, raw)}, the drive holds"
+                    f" {self.text(parameter, back)}."
                 )
+        except (RequestRefused, Superseded) as error:
+            answer = str(error)
+            # never sent: what was known before still holds
+            session.image.believe(code, before)
+            raise
         except LineError as error:
             answer = str(error)
             raise
+        except asyncio.CancelledError:
+            answer = "a stop came: not known whether it was taken"
+            raise
         finally:
-            session.monitor.known.put(parameter.code, raw if back is None else back)
+            old = before.raw if before is not None else None
             self.journal.add(self._entry(parameter, old, raw, answer, back, why))
+
+    async def _read_scale(self, parameter: Parameter) -> None:
+        """See what the parameter's scale and unit follow, so that the journal tells units."""
+        image = self.session.image
+        known = {*image.trusted, *image.lacking}
+        if unknown := [code for code in depends_on(parameter) if code not in known]:
+            await Reader(self.session).read(unknown)
 
     async def _read_back(self, parameter: Parameter) -> int | None:
         """What the drive holds now; None where it does not tell."""
@@ -78,14 +105,14 @@ class Writer:
             )
         except DeviceException:
             return None
-        return from_words(parameter, reply.words)
+        back = from_words(parameter, reply.words)
+        self.session.image.confirm(parameter.code, back, reply.time)
+        return back
 
-    def _text(self, parameter: Parameter, raw: int | None) -> str:
-        if raw is None:
-            return ""
-        profile = self.session.profile
-        scale = profile.scale(parameter, self.session.monitor.known.raws())
-        return decode(parameter, raw, profile.names(parameter), scale).display
+    def text(self, parameter: Parameter, raw: int | None) -> str:
+        """A raw value as a person reads it; nothing for None."""
+        image = self.session.image
+        return shown_text(self.session.profile, parameter, raw, image.raws, image.lacking)
 
     def _entry(
         self,
@@ -105,9 +132,9 @@ class Writer:
             code=parameter.code,
             address=parameter.address,
             old_raw=old,
-            old=self._text(parameter, old),
+            old=self.text(parameter, old),
             new_raw=raw,
-            new=self._text(parameter, raw),
+            new=self.text(parameter, raw),
             answer=answer,
             read_back=back,
             why=why,

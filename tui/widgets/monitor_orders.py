@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.style import Style
 from rich.text import Text
 
-from tui.session.command import Kind, Outcome
+from tui.session.work import Kind, Outcome
 
 from .drawing import Key, cut, key_line, key_styles
 from .monitor_view import View

@@ -151,10 +151,10 @@ def _messages(view: View, width: int) -> list[Text]:
     snapshot = view.snapshot
     if snapshot is None:
         return [Text("connecting to the drive", FAINT), Text("")]
-    if snapshot.error:
+    if view.trouble:
         return [
             Text(cut("NO VALUES: what is shown is old" + _countdown(view), width), ALARM),
-            Text(cut(snapshot.error, width), STALE),
+            Text(cut(view.trouble, width), STALE),
         ]
     state = snapshot.state
     if state.fault is not None:
@@ -173,6 +173,7 @@ def _messages(view: View, width: int) -> list[Text]:
         ]
     alarm, control = _alarm_line(view, state, width), view.control
     for said, style in (
+        (control.offer, ATTENTION),
         (control.lost, ALARM),
         (control.why_disarmed, ATTENTION),
         (control.no_effect and f"Orders from here have no effect: {control.no_effect}", FAINT),
@@ -239,7 +240,8 @@ def status_lines(view: View, width: int) -> list[Text]:
     """What the panel itself does: monitoring, how fast, how well the line answers."""
     text = Text(no_wrap=True)
     text.append_text(armed_text(view.control.armed_for, lost=view.lost))
-    rate, wished = view.snapshot.rate if view.snapshot else 0.0, 1 / view.period
+    rate = view.snapshot.rate if view.snapshot and not view.lost else 0.0
+    wished = 1 / view.period
     counts = view.counters
     bad = counts.timeouts + counts.checksum + counts.wrong
     held = rate > HELD * wished or not rate

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from tui.bus.line import Counters, LineState, LineStatus
 from tui.drive.profile import Profile
 from tui.drive.schema import MonitoringValue
-from tui.session.command import Outcome
 from tui.session.identify import DriveIdentity
 from tui.session.keeper import Watch
 from tui.session.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
 from tui.session.readings import Reading
 from tui.session.stop import StopReport
+from tui.session.work import Outcome
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +26,8 @@ class Control:
     """What has become of the last order, while that is news."""
     no_effect: str = ""
     """Why a run order would have no effect now; empty where it would."""
+    offer: str = ""
+    """What an earlier program has started and left, and how it is taken over."""
     lost: str = ""
     """What the drive no longer holds of what was written from here."""
 
@@ -93,9 +95,18 @@ class View:
     @property
     def lost(self) -> bool:
         """Whether nothing on the screen is known to be current."""
-        return self.line.status is not LineStatus.CONNECTED or (
-            self.snapshot is not None and bool(self.snapshot.error)
-        )
+        if self.line.status is not LineStatus.CONNECTED:
+            return True
+        return self.snapshot is not None and bool(self.trouble)
+
+    @property
+    def trouble(self) -> str:
+        """Why what is shown is not the present; empty while it is."""
+        if self.snapshot is None or self.snapshot.error:
+            return self.snapshot.error if self.snapshot is not None else ""
+        if self.snapshot.is_stale(self.now):
+            return f"Nothing was read for {age_text(self.now - self.snapshot.time)}."
+        return ""
 
 
 def end_of(view: View, end: str) -> float | None:

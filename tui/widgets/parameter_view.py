@@ -309,8 +309,8 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
 def status_line(editor: Editor, armed: float | None, width: int) -> Text:
     """Armed or not, what the drive does, what waits to be written, saved or reset."""
     text = Text(no_wrap=True).append_text(armed_text(armed))
-    latest = editor.session.monitor.latest
-    now = "state not known" if latest is None or latest.error else latest.state.headline
+    watched = editor.watched()
+    now = "state not known" if watched is None else watched.headline
     text.append(f"  {now}", PLAIN if editor.state else ALARM)
     count = len(editor.edits)
     text.append(f"   {count} staged", ATTENTION if count else FAINT)

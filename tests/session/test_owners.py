@@ -1,0 +1,326 @@
+"""One owner per drive: what is known of it, what is done to it, who may, and who looks after it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import threading
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from typing import Any
+
+import pytest
+
+from tui.bus.errors import NoAnswer
+from tui.bus.line import Line, Priority, Reply
+from tui.bus.link import SerialLink
+from tui.drive import library
+from tui.drive.orders import OrderRefused
+from tui.session import monitor as monitor_module
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
+from tui.session.fleet import Fleet
+from tui.session.journal import Journal
+from tui.session.reader import Reader
+from tui.session.work import Kind
+from tui.simulator import DriveSpec, Simulation
+from tui.simulator.drive import SimulatedDrive
+
+
+async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not come to that"
+        await asyncio.sleep(0.01)
+
+
+class Bench:
+    """A fleet over a simulated line, with the drive at address 1."""
+
+    def __init__(self, simulation: Simulation, fleet: Fleet, console: DriveConsole) -> None:
+        self.simulation = simulation
+        self.fleet = fleet
+        self.console = console
+        self.session = console.session
+        self.drive: SimulatedDrive = simulation.drive(1)
+
+    @property
+    def line(self) -> Line:
+        """The line."""
+        return self.fleet.line
+
+    def writes(self) -> list[tuple[int, int]]:
+        """Register and word of every write of one word so far."""
+        sent = [f.data for f in self.line.trace if f.direction == "out" and f.data[1] == 6]
+        return [(int.from_bytes(d[2:4], "big"), int.from_bytes(d[4:6], "big")) for d in sent]
+
+
+@asynccontextmanager
+async def bench(family: str, *, watch: bool = True, **spec: Any) -> AsyncIterator[Bench]:
+    """One simulated drive in a fleet, watched."""
+    simulation = Simulation([DriveSpec(family, 1, **spec)])
+    simulation.start()
+    line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"))
+    line.open(wait=5.0)
+    journal = Journal()
+    fleet = Fleet(line, journal)
+    console = fleet.take(DriveSession(line, 1, library.load(family)))
+    if watch:
+        console.monitor.start(period=0.1)
+    try:
+        await until(lambda: not watch or console.latest is not None)
+        yield Bench(simulation, fleet, console)
+    finally:
+        fleet.forget()
+        journal.close()
+        line.close()
+        simulation.stop()
+
+
+# What is known
+
+
+async def test_an_older_reply_never_takes_the_place_of_a_newer_one() -> None:
+    async with bench("atv71", watch=False) as here:
+        image = here.session.image
+        now = time.monotonic()
+        image.confirm("ACC", 50, now)
+        image.confirm("ACC", 30, now - 1)
+        assert image.raws["ACC"] == 50
+
+
+async def test_what_may_have_changed_since_is_known_but_not_trusted() -> None:
+    async with bench("atv71", watch=False) as here:
+        image = here.session.image
+        await Reader(here.session).read(["CHCF"])
+        assert image.trusted["CHCF"] == 1
+        image.distrust()
+        assert "CHCF" in image.raws
+        assert "CHCF" not in image.trusted
+        await Reader(here.session).read(["CHCF"])
+        assert image.trusted["CHCF"] == 1
+
+
+# Watching
+
+
+async def test_a_monitor_that_dies_by_an_error_of_its_own_says_so_and_begins_anew(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(monitor_module, "RESTART_AFTER", 0.2)
+    async with bench("atv71") as here:
+        monitor = here.console.monitor
+        read, broken = monitor.reader.read, True
+
+        async def failing(codes: Any, *, priority: Priority = Priority.POLL) -> Any:
+            if broken:
+                raise KeyError("a mistake of our own")
+            return await read(codes, priority=priority)
+
+        monkeypatch.setattr(type(monitor.reader), "read", lambda _self, c, **k: failing(c, **k))
+        await until(lambda: monitor.restarts >= 2)
+        assert monitor.latest is not None
+        assert "a mistake of our own" in monitor.latest.error
+        assert monitor.latest.rate == 0.0
+        assert monitor.running
+        assert "watching device 1 failed" in caplog.text
+        assert "a mistake of our own" in caplog.text
+        broken = False
+        await until(lambda: monitor.latest is not None and not monitor.latest.error)
+
+
+async def test_a_listener_that_raises_hurts_nobody(caplog: pytest.LogCaptureFixture) -> None:
+    async with bench("atv71") as here:
+        monitor = here.console.monitor
+
+        def bad(_snapshot: object) -> None:
+            raise RuntimeError("a listener's own mistake")
+
+        seen: list[object] = []
+        monitor.listen(bad)
+        monitor.listen(seen.append)
+        await until(lambda: len(seen) > 3)
+        assert monitor.restarts == 0
+        assert monitor.latest is not None
+        assert not monitor.latest.error
+        assert "a listener's own mistake" in caplog.text
+
+
+async def test_a_snapshot_that_no_cycle_follows_is_stale() -> None:
+    async with bench("atv71") as here:
+        latest = here.console.latest
+        assert latest is not None
+        assert not latest.is_stale(latest.time + 1.0)
+        assert latest.is_stale(latest.time + 5.0)
+
+
+async def test_arming_asks_for_a_state_of_now() -> None:
+    """With a monitor that stands still, an old state arms nothing; the drive is asked."""
+    async with bench("atv71") as here:
+        here.console.monitor.stop()
+        await until(lambda: here.session.state(1.0).kind == "unknown")
+        before = len(here.line.trace)
+        here.console.commander.arm()
+        assert not here.session.arming.armed
+        await until(lambda: here.session.arming.armed)
+        asked = [f for f in list(here.line.trace)[before:] if f.direction == "out"]
+        assert asked
+
+
+async def test_a_drive_that_does_not_tell_its_state_is_not_armed(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with bench("atv71", watch=False) as here:
+
+        async def deaf(*_: Any, **__: Any) -> Reply:
+            raise NoAnswer(1, 3, 0)
+
+        monkeypatch.setattr(here.line, "read", deaf)
+        here.console.commander.arm()
+        await until(lambda: here.session.work.outcome is not None)
+        assert here.session.work.outcome is not None
+        assert here.session.work.outcome.kind is Kind.REFUSED
+        assert not here.session.arming.armed
+
+
+# What is being done
+
+
+EIGHT = ("ACC", "DEC", "LSP", "AC2", "DE2", "TLS", "JPF", "ITH")
+
+
+async def test_a_stop_ends_parameter_writing_before_its_next_frame() -> None:
+    """Eight staged edits: what was on the wire may go out, nothing behind the stop does."""
+    async with bench("atv71", run_hz=20.0) as here:
+        editor, profile = here.console.editor, here.session.profile
+        codes = [c for c in EIGHT if profile.get(c) and profile[c].access == "rw"]
+        readings = await Reader(here.session).read([*codes, "INR"])
+        staged = 0
+        for code in codes:
+            raw = readings[code].raw
+            assert raw is not None
+            try:
+                editor.stage_raw(code, raw + 1)
+                staged += 1
+            except OrderRefused:
+                continue
+        assert staged >= 5
+        here.session.arming.arm()
+        editor.apply()
+        await until(lambda: len(here.writes()) >= 2)
+        here.fleet.stop([here.session])
+        await until(lambda: (8501, 7) in here.writes())
+        sent = here.writes()
+        at = sent.index((8501, 7))
+        await until(lambda: not here.session.work.busy)
+        await asyncio.sleep(0.3)
+        assert [one for one in here.writes()[at:] if one[0] != 8501] == []
+        assert at < staged
+        assert not here.session.arming.armed
+        assert len(editor.edits) >= staged - at
+        # of the one that was on the wire the drive itself is asked
+        await until(lambda: all(here.drive.raw(e.code) == e.old for e in editor.edits))
+        assert len(editor.edits) < staged
+
+
+async def test_settings_and_blocks_are_refused_while_the_drive_is_not_armed() -> None:
+    """Arming belongs to the drive, not to the screen that asks."""
+    async with bench("atv71") as here:
+        await Reader(here.session).read(["ACC", "INR"])
+        editor = here.console.editor
+        editor.stage("ACC", "7 s")
+        editor.apply()
+        editor.save()
+        editor.factory()
+        await asyncio.sleep(0.3)
+        assert here.writes() == []
+        assert here.session.work.outcome is not None
+        assert "Not armed" in here.session.work.outcome.text
+        assert "ACC" in editor.edits
+
+
+async def test_one_thing_at_a_time_is_done_to_a_drive() -> None:
+    async with bench("atv71") as here:
+        await Reader(here.session).read(["ACC", "INR"])
+        here.session.arming.arm()
+        here.console.commander.order("forward")
+        editor = here.console.editor
+        editor.stage("ACC", "7 s")
+        editor.apply()
+        assert here.session.work.outcome is not None
+        assert "Another command" in here.session.work.outcome.text
+        await until(lambda: not here.session.work.busy)
+        assert here.drive.raw("ACC") == 30
+
+
+# The fleet
+
+
+async def test_the_drives_are_walked_from_another_thread_while_they_come_and_go() -> None:
+    async with bench("atv71", watch=False) as here:
+        fleet, ended = here.fleet, threading.Event()
+        errors: list[BaseException] = []
+
+        def walk() -> None:
+            try:
+                while not ended.is_set():
+                    for found in fleet.found.values():
+                        assert found.identity.device
+                    assert len(fleet.sessions) <= 31
+            except BaseException as error:
+                errors.append(error)
+
+        thread = threading.Thread(target=walk)
+        thread.start()
+        try:
+            for device in range(2, 32):
+                fleet.take(DriveSession(fleet.line, device, here.session.profile))
+                await asyncio.sleep(0)
+        finally:
+            ended.set()
+            thread.join()
+        assert errors == []
+        assert list(fleet.found) == list(range(1, 32))
+
+
+async def test_drives_at_rest_that_will_trip_are_known() -> None:
+    """An Altivar 21 watches the line from the first request on, at rest too."""
+    async with bench("atv21") as here:
+        await until(lambda: here.fleet.keeper.watch(1) is not None)
+        alone = here.fleet.keeper.left_alone()
+        assert alone[1].timeout == 3.0
+        assert here.fleet.keeper.under_command() == []
+
+
+async def test_a_motor_that_runs_by_the_line_is_watched_whoever_started_it() -> None:
+    """The time-out of an Altivar 71 runs once it was commanded, be it by another program."""
+    async with bench("atv71", watch=False) as here:
+        keeper = here.fleet.keeper
+        await until(lambda: keeper.watch(1) is not None)
+        assert keeper.left_alone() == {}
+        for address, word in ((8502, 200), (8501, 6), (8501, 7), (8501, 15)):
+            await here.line.write(1, address, [word])
+        await until(lambda: keeper.runs(1))
+        assert not here.session.commanded
+        assert 1 in keeper.left_alone()
+
+
+async def test_arming_that_a_command_asked_for_does_not_run_out() -> None:
+    async with bench("atv71") as here:
+        here.session.arming.arm(seconds=math.inf)
+        assert here.session.arming.armed_for == math.inf
+        here.session.arming.touch()
+        assert here.session.arming.armed_for == math.inf
+
+
+async def test_a_drive_that_is_found_again_keeps_what_is_known_of_it() -> None:
+    """A rescan while a motor runs by a command from here must not disown it."""
+    async with bench("atv71") as here:
+        here.session.note_command()
+        again = here.fleet.take(DriveSession(here.line, 1, here.session.profile))
+        assert again is here.console
+        assert here.fleet.console(1) is here.console
+        other = here.fleet.take(DriveSession(here.line, 1, library.load("atv312")))
+        assert other is not here.console
+        assert not here.console.monitor.running

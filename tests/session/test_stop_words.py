@@ -1,0 +1,166 @@
+"""By which word a motor is stopped, and what counts as stopped."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from tui.bus.errors import DeviceException, NoAnswer
+from tui.bus.line import Priority, Reply
+from tui.drive import library
+from tui.drive.orders import OrderRefused, stop_in_any
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+from tui.session.limits import limits_of
+from tui.session.monitor import Monitor
+from tui.session.reader import Reader
+from tui.session.stop import Phase, Stopper
+from tui.session.work import Stopped
+from tui.session.writing import Writer
+from tui.simulator import DriveSpec
+
+from .test_stop import Start, ended, journal, start, wait_for, writes
+
+__all__ = ["journal", "start"]
+ATV71 = library.load("atv71")
+
+
+async def test_a_refused_write_of_the_profile_does_not_choose_the_next_stop_word(
+    start: Start, journal: Journal
+) -> None:
+    """CHCF = 1 was refused: 16#0007 would run the motor forward in the I/O profile."""
+    simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0}))
+    drive = simulation.drive(1)
+    line.describe(1, limits_of(ATV71))
+    for address, word in ((8502, 200), (8501, 1)):
+        await line.write(1, address, [word])
+    await wait_for(lambda: drive.motor.frequency > 15)
+    session = DriveSession(line, 1, ATV71)
+    session.arming.arm(seconds=math.inf)
+    await Reader(session).read(["CHCF", "ETA"])
+    writer = Writer(session, journal, session.work.permit())
+    with pytest.raises(DeviceException):
+        await writer.write(ATV71["CHCF"], 1, why="setting")
+    sent = len(writes(line))
+    stopper = Stopper(line, journal)
+    stopper.stop([session])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert {word for address, word in writes(line)[sent:] if address == 8501} == {0x0000}
+    assert drive.motor.frequency == 0
+
+
+async def test_what_somebody_changed_at_rest_is_read_anew(start: Start, journal: Journal) -> None:
+    """At rest the profile may be changed at the keypad: 16#0007 would start the motor then."""
+    simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 1, "TCC": 0}))
+    drive = simulation.drive(1)
+    session = DriveSession(line, 1, ATV71)
+    await Reader(session).read(["CHCF", "DOTD", "ETA"])
+    drive.set("CHCF", 3)
+    session.image._trusted_from = -math.inf
+    await wait_for(lambda: session.image.age("CHCF") > 1.1)
+    stopper = Stopper(line, journal)
+    stopper.stop([session])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert writes(line) == [(8501, 0x0000)]
+
+
+async def test_while_the_motor_runs_what_needs_it_at_rest_is_not_read_again(
+    start: Start, journal: Journal
+) -> None:
+    simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
+    await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
+    session = DriveSession(line, 1, ATV71)
+    monitor = Monitor(session)
+    monitor.start(["ETA", "RFR"], 0.1)
+    await Reader(session).read(["CHCF", "DOTD"])
+    await wait_for(lambda: session.image.age("CHCF") > 1.5)
+    before = len(line.trace)
+    stopper = Stopper(line, journal)
+    stopper.stop([session])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    monitor.stop()
+    asked = [f.data for f in list(line.trace)[before:] if f.direction == "out"]
+    at = next(i for i, data in enumerate(asked) if data[1] == 6)
+    assert asked[at][2:6].hex() == "21350007"
+    assert not any(data[2:4] == (8401).to_bytes(2, "big") for data in asked[:at])
+
+
+async def test_a_profile_that_cannot_be_read_is_stopped_by_the_word_of_all(
+    start: Start, journal: Journal, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
+    drive = simulation.drive(1)
+    await wait_for(lambda: drive.motor.frequency > 5)
+    read = line.read
+
+    async def deaf(
+        device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+    ) -> Reply:
+        if address == 8401:
+            raise NoAnswer(device, 3, address)
+        return await read(device, address, count, priority=priority)
+
+    monkeypatch.setattr(line, "read", deaf)
+    stopper = Stopper(line, journal)
+    stopper.stop([DriveSession(line, 1, ATV71)])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert writes(line)[0] == (8501, 0x0000)
+    assert drive.motor.frequency == 0
+
+
+def test_the_word_of_all_charts() -> None:
+    assert stop_in_any(ATV71, {})[1].words == [0x0000]
+    assert stop_in_any(ATV71, {"CHCF": 1})[1].words == [0x0007]
+    assert stop_in_any(ATV71, {"CHCF": 3})[1].words == [0x0000]
+    with pytest.raises(OrderRefused, match="How this drive is commanded"):
+        stop_in_any(ATV71, {"CHCF": 0})
+
+
+async def test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped(
+    start: Start, journal: Journal
+) -> None:
+    """Run at the terminals with reference 0: the next touch of the potentiometer turns it."""
+    simulation, line = start(DriveSpec("atv71", 1, sets={"FR1": 1}))
+    simulation.drive(1).run(0.0)
+    session = DriveSession(line, 1, ATV71)
+    chart = session.profile.data.charts[0]
+    await Reader(session).read([chart.status])
+    assert session.state(5.0).kind == "running"
+    stopper = Stopper(line, journal)
+    stopper.stop([session])
+    report = await ended(stopper, 1)
+    assert report.phase is Phase.FAILED
+    assert "0 Hz" in report.text
+    assert "still enabled from its terminals or keypad" in report.text
+
+
+async def test_halt_is_followed_by_the_word_that_ends_operation(
+    start: Start, journal: Journal
+) -> None:
+    """With DOTD = 0 the motor is halted; at 0 Hz the drive would still be enabled."""
+    simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0, sets={"DOTD": 0}))
+    await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
+    stopper = Stopper(line, journal)
+    session = DriveSession(line, 1, ATV71)
+    stopper.stop([session])
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert [word for _, word in writes(line)] == [0x010F, 0x0007]
+    await Reader(session).read(["ETA"])
+    assert session.state(5.0).kind != "running"
+
+
+async def test_a_stop_disarms_and_voids_what_was_typed_before_it(
+    start: Start, journal: Journal
+) -> None:
+    _, line = start(DriveSpec("atv71", 1))
+    session = DriveSession(line, 1, ATV71)
+    session.arming.arm()
+    typed, permit = session.work.stops, session.work.permit()
+    Stopper(line, journal).stop([session], by="F9")
+    assert session.arming.armed_for is None
+    assert "Stopped" in session.arming.why_disarmed
+    session.arming.arm()
+    with pytest.raises(Stopped, match="F9"):
+        session.work.permit(typed)
+    assert "F9" in permit.refusal()

@@ -1,0 +1,242 @@
+"""Writing one parameter to a drive that does as it likes: what it holds then is what is known."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Callable, Iterator, Sequence
+
+import pytest
+
+from tui.bus.errors import DeviceException, NoAnswer, RequestRefused, Superseded
+from tui.bus.line import LineState, LineStatus, Priority
+from tui.session.arming import NotArmed
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+from tui.session.reader import Reader
+from tui.session.work import Permit, Stopped
+from tui.session.writing import NotTaken, Writer
+
+from .fakes import FakeLine, parameter, profile_of
+
+INR = {"parameter": "INR", "scales": {"0": "0.01", "1": "0.1", "2": "1"}}
+PROFILE = profile_of(
+    parameter("ACC", 10, unit="s", scale_by=INR),
+    parameter("INR", 11),
+    parameter("CMD", 12, access="w"),
+    functions=[{"code": 3, "name": "Read", "max_read": 29}, {"code": 6, "name": "Write"}],
+)
+
+
+class WilfulLine(FakeLine):
+    """A drive that takes, changes, refuses or forgets what is written, as a test wants."""
+
+    def __init__(self) -> None:
+        super().__init__({10: 30, 11: 1, 12: 0})
+        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
+        self.read_only = False
+        self.written: list[tuple[int, int]] = []
+        self.keeps: Callable[[int, int], int] = lambda _address, word: word
+        self.answer: Exception | None = None
+        self.before: Callable[[], None] = lambda: None
+
+    async def write(
+        self,
+        device: int,
+        address: int,
+        values: Sequence[int],
+        *,
+        priority: Priority = Priority.OPERATOR_WRITE,
+        multiple: bool | None = None,
+        replaceable: bool = False,
+        forbidden: Callable[[], str] | None = None,
+    ) -> float:
+        self.before()
+        if forbidden is not None and (why := forbidden()):
+            raise RequestRefused(why)
+        if isinstance(self.answer, RequestRefused | Superseded):
+            raise self.answer
+        self.written.append((address, values[0]))
+        if isinstance(self.answer, DeviceException):
+            raise self.answer
+        self.registers[address] = self.keeps(address, values[0])
+        if self.answer is not None:
+            raise self.answer
+        return 0.0
+
+
+@pytest.fixture
+def line() -> WilfulLine:
+    """A drive that holds ACC = 3.0 s."""
+    return WilfulLine()
+
+
+@pytest.fixture
+def session(line: WilfulLine) -> DriveSession:
+    """An armed session with it."""
+    made = DriveSession(line.as_line(), 1, PROFILE)
+    made.arming.arm(seconds=math.inf)
+    return made
+
+
+@pytest.fixture
+def journal() -> Iterator[Journal]:
+    """A journal in the test's own folder."""
+    made = Journal()
+    yield made
+    made.close()
+
+
+def writer(session: DriveSession, journal: Journal, permit: Permit | None = None) -> Writer:
+    return Writer(session, journal, permit or session.work.permit())
+
+
+async def test_a_value_that_the_drive_keeps_is_known_and_recorded(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    await Reader(session).read(["ACC"])
+    await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert line.written == [(10, 50)]
+    assert session.image.raws["ACC"] == 50
+    (entry,) = journal.recent
+    assert (entry.old, entry.new, entry.answer, entry.read_back) == ("3.0 s", "5.0 s", "ok", 50)
+
+
+@pytest.mark.parametrize("kept", [30, 49, 51, 0xFFFF])
+async def test_another_value_than_was_written_is_told_and_known(
+    line: WilfulLine, session: DriveSession, journal: Journal, kept: int
+) -> None:
+    line.keeps = lambda _address, _word: kept
+    with pytest.raises(NotTaken, match=r"ACC: written 5\.0 s, the drive holds"):
+        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert session.image.raws["ACC"] == kept
+    (entry,) = journal.recent
+    assert (entry.answer, entry.read_back) == ("holds another value", kept)
+
+
+async def test_only_the_bits_that_are_checked_must_be_held(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    line.keeps = lambda _address, word: word | 0x8000
+    await writer(session, journal).write(PROFILE["INR"], 1, why="bits", check=0x00FF)
+    with pytest.raises(NotTaken):
+        await writer(session, journal).write(PROFILE["INR"], 1, why="bits", check=0x80FF)
+
+
+async def test_a_refused_write_leaves_nothing_known(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    """Only confirmed reads are known: neither the new value nor the old one is."""
+    await Reader(session).read(["ACC"])
+    line.answer = DeviceException(1, 6, 10, 4, "not in this state")
+    with pytest.raises(DeviceException):
+        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert "ACC" not in session.image.raws
+    await Reader(session).read(["ACC"])
+    assert session.image.raws["ACC"] == 30
+
+
+async def test_an_unanswered_write_makes_the_word_unknown(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    await Reader(session).read(["ACC"])
+    line.answer = NoAnswer(1, 6, 10)
+    with pytest.raises(NoAnswer):
+        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert "ACC" not in session.image.raws
+    (entry,) = journal.recent
+    assert "did not answer" in entry.answer
+    assert entry.read_back is None
+
+
+@pytest.mark.parametrize(
+    "answer", [RequestRefused("The line is read-only: nothing is written."), Superseded(1, 10)]
+)
+async def test_a_write_that_was_never_sent_changes_nothing_of_what_is_known(
+    line: WilfulLine, session: DriveSession, journal: Journal, answer: Exception
+) -> None:
+    await Reader(session).read(["ACC"])
+    line.answer = answer
+    with pytest.raises(type(answer)):
+        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert session.image.raws["ACC"] == 30
+    assert line.written == []
+
+
+async def test_a_reply_from_before_the_write_is_not_taken_for_the_word_after_it(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    held = (await Reader(session).read(["ACC"]))["ACC"]
+    line.answer = NoAnswer(1, 6, 10)
+    with pytest.raises(NoAnswer):
+        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert held.raw is not None
+    session.image.confirm("ACC", held.raw, held.time)
+    assert "ACC" not in session.image.raws
+
+
+async def test_what_cannot_be_read_back_is_not_known(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    await writer(session, journal).write(PROFILE["CMD"], 7, why="command")
+    assert "CMD" not in session.image.raws
+    assert line.requests == []
+
+
+async def test_the_journal_tells_units_though_the_scale_was_never_read(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert journal.recent[0].new == "5.0 s"
+
+
+async def test_nothing_is_written_unarmed(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    permit = session.work.permit()
+    session.arming.disarm()
+    with pytest.raises(NotArmed):
+        await writer(session, journal, permit).write(PROFILE["ACC"], 50, why="setting")
+    with pytest.raises(NotArmed):
+        session.work.permit()
+    assert line.written == []
+
+
+async def test_nothing_is_written_behind_a_stop(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    permit = session.work.permit()
+    session.work.stop("the stop key")
+    session.arming.arm(seconds=math.inf)
+    with pytest.raises(Stopped, match="the stop key"):
+        await writer(session, journal, permit).write(PROFILE["ACC"], 50, why="setting")
+    assert line.written == []
+
+
+async def test_a_stop_while_the_frame_waits_for_the_line_keeps_it_from_going_out(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    permit = session.work.permit()
+    line.before = lambda: session.work.stop("the stop key")
+    with pytest.raises(RequestRefused, match="stop came after"):
+        await writer(session, journal, permit).write(PROFILE["ACC"], 50, why="setting")
+    assert line.written == []
+
+
+async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    """The read-back is asked behind the answer, never beside it."""
+    order: list[str] = []
+    read = line.read
+
+    async def slow(*args: int, priority: Priority = Priority.POLL) -> object:
+        order.append("read")
+        await asyncio.sleep(0)
+        return await read(*args, priority=priority)
+
+    line.read = slow  # type: ignore[method-assign, assignment]
+    line.before = lambda: order.append("write")
+    await Reader(session).read(["INR"])
+    await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    assert order == ["read", "write", "read"]

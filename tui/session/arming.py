@@ -1,0 +1,78 @@
+"""Whether a drive may be written to from here: until when, and why no longer."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from tui.bus.line import Line, LineStatus
+from tui.drive.orders import OrderRefused
+
+ARMED_FOR = 60.0
+"""Seconds without a key after which a drive is no longer armed."""
+
+
+class NotArmed(OrderRefused):
+    """A write or command to a drive that is not armed."""
+
+    def __init__(self, why: str = "") -> None:
+        super().__init__(why or "Not armed: a arms this drive.")
+
+
+class Arming:
+    """Lets writes to one drive through for a while; whatever writes asks here."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self._until: float | None = None
+        self._span = ARMED_FOR
+        self._why = ""
+
+    def arm(self, *, seconds: float = ARMED_FOR) -> None:
+        """Let writes through from now on.
+
+        `seconds` is how long without a key; math.inf for a command that ends by itself. Raises
+        OrderRefused on a read-only line.
+        """
+        if self._line.read_only:
+            raise OrderRefused("The line is read-only: nothing is written.")
+        self._span, self._why = seconds, ""
+        self._until = time.monotonic() + seconds
+
+    def disarm(self, why: str = "") -> None:
+        """Let no write through any more."""
+        self._until = None
+        self._why = why
+
+    def touch(self) -> None:
+        """A key was pressed, or work goes on: an armed drive stays armed."""
+        if self.armed_for is not None:
+            self._until = time.monotonic() + self._span
+
+    @property
+    def armed_for(self) -> float | None:
+        """Seconds for which the drive is armed yet, maybe infinite; None when it is not."""
+        until = self._until
+        if until is None:
+            return None
+        if until <= time.monotonic():
+            self.disarm("No key for a minute: no longer armed.")
+            return None
+        if self._line.state.status is not LineStatus.CONNECTED:
+            self.disarm("The line was lost: no longer armed.")
+            return None
+        return math.inf if until == math.inf else until - time.monotonic()
+
+    @property
+    def armed(self) -> bool:
+        """Whether writes are let through now."""
+        return self.armed_for is not None
+
+    @property
+    def why_disarmed(self) -> str:
+        """Why arming ended by itself, or nothing."""
+        return self._why
+
+    def refusal(self) -> str:
+        """Why nothing may be written now; empty where it may."""
+        return "" if self.armed else self._why or "Not armed: a arms this drive."

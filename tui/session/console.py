@@ -1,0 +1,85 @@
+"""One drive with everything that watches, commands and edits it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+from .command import Commander
+from .drive import DriveSession
+from .drive_state import DriveState
+from .fault_record import Recorder
+from .identify import DriveIdentity
+from .journal import Journal
+from .monitor import Monitor, Snapshot
+from .reader import Reader
+from .readings import Reading
+
+if TYPE_CHECKING:
+    from .editor import Editor
+    from .mapping_desk import MappingDesk
+
+
+@dataclass(eq=False)
+class DriveConsole:
+    """The one monitor, commander, editor, block desk and recorder of a drive."""
+
+    session: DriveSession
+    journal: Journal
+
+    def __post_init__(self) -> None:
+        self.monitor = Monitor(self.session)
+        self.commander = Commander(self.session, self.journal)
+        self.recorder = Recorder(self.session, self.journal)
+        self.monitor.listen(self.recorder.take)
+
+    async def read(self, codes: Iterable[str]) -> dict[str, Reading]:
+        """Readings by code, asked for by a person; raises the line's errors."""
+        return await Reader(self.session).read(codes)
+
+    @property
+    def device(self) -> int:
+        """The drive's slave address."""
+        return self.session.device
+
+    @property
+    def identity(self) -> DriveIdentity | None:
+        """What the drive says of itself."""
+        return self.session.identity
+
+    @cached_property
+    def editor(self) -> Editor:
+        """What is staged and written of its parameters."""
+        from .editor import Editor  # what Monitor does not need is imported later
+
+        return Editor(self.session, self.journal, self._state)
+
+    @cached_property
+    def blocks(self) -> MappingDesk:
+        """What is proposed and written of its blocks."""
+        from .mapping_desk import MappingDesk
+
+        return MappingDesk(self.session, self.monitor, self.journal)
+
+    @property
+    def begun_editor(self) -> Editor | None:
+        """The editor, if anybody has looked at the parameters."""
+        return self.__dict__.get("editor")
+
+    @property
+    def latest(self) -> Snapshot | None:
+        """The last cycle of the monitor."""
+        return self.monitor.latest
+
+    def _state(self) -> DriveState | None:
+        latest = self.monitor.latest
+        if latest is None or latest.error or latest.is_stale(time.monotonic()):
+            return None
+        return latest.state
+
+    def close(self) -> None:
+        """Stop watching; the line stays open."""
+        self.monitor.stop()

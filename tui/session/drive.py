@@ -1,0 +1,93 @@
+"""One drive on a line: what it is, what is known of it, what is being done to it, who may."""
+
+from __future__ import annotations
+
+import math
+import time
+
+from tui.bus.line import Line
+from tui.bus.link import label
+from tui.drive.chart import UNKNOWN, ChartState, read_chart
+from tui.drive.profile import Profile
+
+from .arming import Arming
+from .identify import DriveIdentity
+from .image import RegisterImage
+from .limits import limits_of
+from .readings import Rating
+from .recording import StartKeeper
+from .work import WorkQueue
+
+
+class DriveSession:
+    """A drive with its profile; the one owner of its registers, its work and its arming.
+
+    It knows none of those who read, watch, command or edit the drive. For any thread.
+    """
+
+    def __init__(
+        self, line: Line, device: int, profile: Profile, identity: DriveIdentity | None = None
+    ) -> None:
+        self.line = line
+        self.device = device
+        self.profile = profile
+        self.identity = identity
+        self.image = RegisterImage()
+        """What is known of its registers."""
+        self.arming = Arming(line)
+        """Whether it may be written to from here."""
+        self.work = WorkQueue(line, device, self.arming)
+        """What is being done to it; a stop ends it."""
+        self.work.on_change = self.stir
+        self.ratings: dict[str, Rating] = {}
+        """What 100 % is, by code, where a person has told it from the nameplate."""
+        self.commanded_at: float | None = None
+        """When a command or reference was last sent to the drive from here (monotonic)."""
+        self.followed: tuple[str, ...] = ()
+        """Codes of words that were written from here and are polled on."""
+        self.starts: StartKeeper | None = None
+        """Where the starts of its motor are put on record; None where they are not."""
+        self.rest_seen = -math.inf
+        """When the motor was last seen at rest, or in an unknown state (monotonic)."""
+        self.stirs = 0
+        """Counts the moments after which every value is worth a new look."""
+        line.describe(device, limits_of(profile))
+
+    @property
+    def known_identity(self) -> DriveIdentity:
+        """What the drive says of itself; empty where it says nothing."""
+        return self.identity or DriveIdentity(self.device, "", "", "", "", None, ())
+
+    @property
+    def commanded(self) -> bool:
+        """Whether a command or reference was sent to the drive from here."""
+        return self.commanded_at is not None
+
+    def note_command(self) -> None:
+        """A command or reference was sent."""
+        self.commanded_at = time.monotonic()
+
+    def stir(self) -> None:
+        """Something was done to the drive: whoever watches it looks at all of it again."""
+        self.stirs += 1
+
+    def note_state(self, kind: str, time: float) -> None:
+        """The drive was seen in a state: what needs a motor at rest may be changed in it."""
+        if kind in ("running", "stopping"):
+            return
+        self.rest_seen = max(self.rest_seen, time)
+        if self.starts is not None and kind != "unknown":
+            self.starts.standing(self, time)
+
+    @property
+    def line_text(self) -> str:
+        """The line as it is written."""
+        return label(self.line.link)
+
+    def state(self, longest: float) -> ChartState:
+        """The drive's state by its status word; unknown where that is older than so many s."""
+        raws = self.image.trusted
+        chart = self.profile.chart(raws)
+        if chart is None or self.image.age(chart.status) > longest:
+            return ChartState(UNKNOWN)
+        return read_chart(self.profile, raws)

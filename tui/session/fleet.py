@@ -1,0 +1,140 @@
+"""The drives of an open line: who was found, what commands each, and the stops of all.
+
+Everything may be looked at from any thread: a mapping is replaced as a whole, never changed.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from types import MappingProxyType
+
+from tui.bus.line import Line
+from tui.drive.schema import OrderId
+
+from .console import DriveConsole
+from .drive import DriveSession
+from .identify import DriveIdentity
+from .journal import Journal
+from .keeper import Keeper
+from .recording import StartKeeper
+from .stop import Stopper
+
+Stamp = Mapping[int, int]
+"""The count of stops of each drive when something was typed."""
+
+
+@dataclass(frozen=True, slots=True)
+class FoundDrive:
+    """A drive that answered: what it says of itself, and what it is taken for."""
+
+    identity: DriveIdentity
+    console: DriveConsole | None = None
+    guessed: bool = False
+    """Whether its profile is one of several that may fit, and nobody has said which."""
+
+    @property
+    def session(self) -> DriveSession | None:
+        """The session with it; None while its profile is not known."""
+        return self.console.session if self.console else None
+
+
+class Fleet:
+    """The drives of one line, with what looks after them and stops them."""
+
+    def __init__(self, line: Line, journal: Journal, starts: StartKeeper | None = None) -> None:
+        self.line = line
+        self.journal = journal
+        self.starts = starts
+        """Where starts of motors are put on record; None where none are."""
+        self.keeper = Keeper(line)
+        self.stopper = Stopper(line, journal)
+        self._lock = threading.Lock()
+        self._found: Mapping[int, FoundDrive] = MappingProxyType({})
+
+    @property
+    def found(self) -> Mapping[int, FoundDrive]:
+        """Every drive that answered, by device, in the order of the devices."""
+        return self._found
+
+    @property
+    def consoles(self) -> list[DriveConsole]:
+        """The drives whose profile is known, in the order of the devices."""
+        return [one.console for one in self._found.values() if one.console is not None]
+
+    @property
+    def sessions(self) -> list[DriveSession]:
+        """The same, as sessions."""
+        return [console.session for console in self.consoles]
+
+    def console(self, device: int) -> DriveConsole | None:
+        """The drive at an address, or None."""
+        found = self._found.get(device)
+        return found.console if found else None
+
+    def note(self, identity: DriveIdentity) -> None:
+        """A drive answered; what it is taken for is not known yet."""
+        self._put(FoundDrive(identity))
+
+    def take(
+        self, session: DriveSession, identity: DriveIdentity | None = None, *, guessed: bool = False
+    ) -> DriveConsole:
+        """Look after a drive from now on.
+
+        One that is known already stays as it is: what was commanded and staged is not forgotten.
+        """
+        before = self.console(session.device)
+        if before is not None and _same(before.session, session):
+            self._put(FoundDrive(identity or session.known_identity, before, guessed))
+            return before
+        session.starts = self.starts
+        console = DriveConsole(session, self.journal)
+        said = identity or session.known_identity
+        self._put(FoundDrive(said, console, guessed))
+        if before is not None:
+            before.close()
+        self.keeper.keep(session, console.monitor)
+        if self.starts is not None:
+            # reads files: in a thread that nobody waits for
+            look = threading.Thread(target=self.starts.look, args=(session,), daemon=True)
+            look.start()
+        return console
+
+    def _put(self, drive: FoundDrive) -> None:
+        with self._lock:
+            drives = {**self._found, drive.identity.device: drive}
+            self._found = MappingProxyType(dict(sorted(drives.items())))
+
+    def forget(self) -> None:
+        """Let every drive go; the line stays open."""
+        with self._lock:
+            before, self._found = self._found, MappingProxyType({})
+        self.keeper.stop()
+        for drive in before.values():
+            if drive.console is not None:
+                drive.console.close()
+
+    def stop(
+        self,
+        sessions: Iterable[DriveSession],
+        order: OrderId = "stop",
+        by: str = "the stop key",
+    ) -> None:
+        """Stop drives; may be called in any thread. Raises LineClosed."""
+        self.stopper.stop(sessions, order, by)
+
+    @property
+    def stamp(self) -> Stamp:
+        """The count of stops of every drive now."""
+        return {session.device: session.work.stops for session in self.sessions}
+
+    @property
+    def commanded(self) -> list[DriveSession]:
+        """The drives that were commanded from here."""
+        return [session for session in self.sessions if session.commanded]
+
+
+def _same(one: DriveSession, other: DriveSession) -> bool:
+    """Whether two sessions are with one drive, by all that it says of itself."""
+    return one.profile.id == other.profile.id and one.known_identity == other.known_identity

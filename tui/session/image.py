@@ -1,0 +1,154 @@
+"""What is known of a drive's registers: raw values that the drive itself has told, and when.
+
+Only replies of the drive come in here. A write makes its word unknown until it is read back.
+"""
+
+from __future__ import annotations
+
+import math
+import threading
+import time
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+from enum import StrEnum
+from types import MappingProxyType
+
+
+class Origin(StrEnum):
+    """Why a register was read."""
+
+    POLL = "poll"
+    READ = "read"
+    READ_BACK = "read back"
+
+
+@dataclass(frozen=True, slots=True)
+class Raw:
+    """A raw value with the time it was on the wire (monotonic), or why there is none."""
+
+    time: float
+    raw: int | None
+    error: str = ""
+    absent: bool = False
+    """True where the drive itself said that it has no such word."""
+    silent: bool = False
+    """True where the drive met the request with silence while it answers others."""
+    origin: Origin = Origin.READ
+
+
+@dataclass(frozen=True, slots=True)
+class _State:
+    """Everything at one moment; replaced as a whole, so that any thread may look."""
+
+    held: Mapping[str, Raw]
+    raws: Mapping[str, int]
+    trusted: Mapping[str, int]
+    refused: Mapping[str, Raw]
+
+
+_EMPTY = _State({}, MappingProxyType({}), MappingProxyType({}), {})
+
+
+class RegisterImage:
+    """The registers of one drive by code, as its replies told them; for any thread.
+
+    A newer reply counts, however late an older one is handed in.
+    """
+
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self._now = _EMPTY
+        self._doubted: dict[str, float] = {}
+        """When a word was last written, or may have been."""
+        self._trusted_from = -math.inf
+
+    @property
+    def raws(self) -> Mapping[str, int]:
+        """The last raw value of every register that was read."""
+        return self._now.raws
+
+    @property
+    def trusted(self) -> Mapping[str, int]:
+        """The raw values that decisions may rest on: read since the drive may have changed."""
+        return self._now.trusted
+
+    @property
+    def refused(self) -> Mapping[str, Raw]:
+        """The registers that the drive refused, or met with silence, when they were last read."""
+        return self._now.refused
+
+    @property
+    def lacking(self) -> frozenset[str]:
+        """Codes that the drive itself said it does not have."""
+        return frozenset(code for code, one in self._now.refused.items() if one.absent)
+
+    def get(self, code: str) -> Raw | None:
+        """What is held of a register; None where it was never read, or is unknown by now."""
+        return self._now.held.get(code)
+
+    def age(self, code: str) -> float:
+        """Seconds since a register's value was on the wire; infinite where it is not known."""
+        held = self._now.held.get(code)
+        return math.inf if held is None else max(0.0, time.monotonic() - held.time)
+
+    def fresh(self, longest: float) -> dict[str, int]:
+        """Trusted raw values no older than so many seconds."""
+        state, oldest = self._now, time.monotonic() - longest
+        return {c: raw for c, raw in state.trusted.items() if state.held[c].time >= oldest}
+
+    def take(self, found: Mapping[str, Raw], origin: Origin = Origin.READ) -> None:
+        """Keep replies of the drive: values, and refusals."""
+        with self._lock:
+            held, refused = dict(self._now.held), dict(self._now.refused)
+            for code, one in found.items():
+                if one.time < self._doubted.get(code, -math.inf):
+                    continue
+                before = held.get(code) or refused.get(code)
+                if before is not None and before.time > one.time:
+                    continue
+                held.pop(code, None)
+                refused.pop(code, None)
+                if one.raw is None:
+                    refused[code] = one
+                else:
+                    held[code] = replace(one, origin=origin)
+            self._set(held, refused)
+
+    def confirm(self, code: str, raw: int, time: float, origin: Origin = Origin.READ_BACK) -> None:
+        """Keep one raw value that was read at a time on the monotonic clock."""
+        self.take({code: Raw(time, raw)}, origin)
+
+    def doubt(self, code: str) -> None:
+        """A word is being written: what it holds is unknown until it is read again."""
+        with self._lock:
+            self._doubted = {**self._doubted, code: time.monotonic()}
+            held = {c: one for c, one in self._now.held.items() if c != code}
+            self._set(held, self._now.refused)
+
+    def believe(self, code: str, before: Raw | None) -> None:
+        """The write of a word was never sent: what was known of it before still holds."""
+        with self._lock:
+            self._doubted = {c: at for c, at in self._doubted.items() if c != code}
+            if before is not None and code not in self._now.held:
+                self._set({**self._now.held, code: before}, self._now.refused)
+
+    def distrust(self) -> None:
+        """The drive may have been reset: no decision rests on what was read before now."""
+        with self._lock:
+            self._trusted_from = time.monotonic()
+            silent = {c: one for c, one in self._now.refused.items() if one.silent}
+            self._set(self._now.held, silent)
+
+    def forget(self, codes: Iterable[str] | None = None) -> None:
+        """Another drive may answer now, or these words may hold anything: nothing is known."""
+        with self._lock:
+            gone = None if codes is None else set(codes)
+            held = self._now.held.items()
+            kept = {} if gone is None else {c: one for c, one in held if c not in gone}
+            self._set(kept, {} if gone is None else self._now.refused)
+
+    def _set(self, held: Mapping[str, Raw], refused: Mapping[str, Raw]) -> None:
+        raws = {code: one.raw for code, one in held.items() if one.raw is not None}
+        since = self._trusted_from
+        trusted = {code: raw for code, raw in raws.items() if held[code].time >= since}
+        self._now = _State(held, MappingProxyType(raws), MappingProxyType(trusted), refused)
