@@ -180,6 +180,57 @@ async def test_a_block_is_configured_then_pending_then_active() -> None:
         assert [s.parameter.code for s in view.slots[2:4] if s.parameter] == ["FE05", "FE03"]
 
 
+async def test_one_comparison_proves_nothing_but_a_monitor_may_have_proved_it() -> None:
+    with bench("atv21", sets=READ_BLOCK, run_hz=35.0) as here:
+        read = block(here, "read")
+        view = await Mapper(here.session).look(read)
+        assert {s.force for s in view.slots} == {Force.UNPROVED}
+        view = await Mapper(here.session, lambda: {"F875": 1, "F876": 3}).look(read)
+        assert [s.force for s in view.slots[:2]] == [Force.ACTIVE, Force.UNPROVED]
+
+
+async def test_slots_changed_between_two_comparisons_prove_nothing() -> None:
+    # at rest, where all values are zero and nothing can be told
+    with bench("atv21", sets=READ_BLOCK) as here:
+        line, honest, reads = here.session.line, here.session.line.read, itertools.count()
+
+        async def read(device: int, address: int, count: int = 1, **how: object) -> Reply:
+            reply = await honest(device, address, count, **how)  # type: ignore[arg-type]
+            if address == block(here, "read").address and next(reads) == 0:
+                await line.write(1, here.profile["F877"].address, [4])
+            return reply
+
+        line.read = read  # type: ignore[method-assign]
+        view = await Mapper(here.session).verify(block(here, "read"))
+        assert view.slots[2].raw == 4
+        assert view.slots[2].force is Force.UNPROVED
+
+
+@pytest.mark.parametrize("between", [False, True], ids=["under way", "between two rounds"])
+async def test_what_was_compared_before_a_change_counts_no_more(between: bool) -> None:
+    codes = ["ACC", "DEC"]
+    with bench("atv71", sets={"ACC": 37, "DEC": 59}) as here:
+        line, honest, reads = here.session.line, here.session.line.read, itertools.count()
+
+        def choose(codes: list[str]) -> None:
+            for slot, raw in plan_of(here, "read", codes).slots.items():
+                here.drive.set(slot, raw)
+
+        async def read(device: int, address: int, count: int = 1, **how: object) -> Reply:
+            reply = await honest(device, address, count, **how)  # type: ignore[arg-type]
+            if address == watched and next(reads) == 1:
+                choose(codes[::-1])
+            return reply
+
+        # with the second reply of the block, or of the slots when they are read after the first
+        watched = here.profile["NMA1"].address if between else block(here, "read").address
+        choose(codes)
+        line.read = read  # type: ignore[method-assign]
+        view = await Mapper(here.session).verify(block(here, "read"))
+        assert [s.word for s in view.slots[:2]] == [59, 37]
+        assert [s.verdict for s in view.slots[:2]] == [Verdict.SAME] * 2
+
+
 async def test_what_was_written_waits_for_a_reset_even_where_all_values_are_zero() -> None:
     with bench("atv21") as here:
         mapper, read = Mapper(here.session), block(here, "read")

@@ -6,14 +6,16 @@ import random
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.blocks import block_of
 from tui.drive import library
-from tui.drive.values import decode
+from tui.drive.values import decode, type_range
 from tui.session.proof import Proof
 from tui.session.readings import Quality, Reading
+from tui.session.verdict import Verdict
 
 PROFILE = library.load("atv21")
 BLOCK = block_of(PROFILE, "read")
@@ -63,16 +65,21 @@ def compared(
     proof = Proof(PROFILE, BLOCK)
     now = 0.0
 
+    def raw(code: str) -> int:
+        """What the drive holds now: at the end of its range a value stays there."""
+        low, high = type_range(PROFILE[code])
+        return min(max(low, signal[code].at(now, chance)), high)
+
     def ask(code: str) -> Reading:
         nonlocal now
         now += 0.03
-        return reading(code, signal[code].at(now, chance))
+        return reading(code, raw(code))
 
     for _ in range(rounds):
         for code in CODES:
             before = {code: ask(code)}
             now += 0.03
-            words = [signal[behind[slot]].at(now, chance) & 0xFFFF for slot in BLOCK.slots]
+            words = [raw(behind[slot]) & 0xFFFF for slot in BLOCK.slots]
             proof.note(words, before, {code: ask(code)})
         proof.conclude({slot: RAWS[c] for slot, c in (chosen or behind).items()})
     return proof
@@ -91,6 +98,46 @@ def test_what_fits_only_one_parameter_is_proved() -> None:
 def test_two_comparisons_are_not_enough() -> None:
     proof = compared(CHOSEN, APART, 2, random.Random(1))
     assert not any(proof.holds(slot, RAWS[code]) for slot, code in CHOSEN.items())
+
+
+def test_what_is_brought_in_place_of_a_choice_is_told() -> None:
+    behind = dict.fromkeys(BLOCK.slots, CODES[2])
+    proof = compared(behind, APART, 2, random.Random(1), CHOSEN)
+    assert {proof.brings(slot) for slot in BLOCK.slots} == {""}
+    assert not any(proof.excludes(slot, RAWS[code]) for slot, code in CHOSEN.items())
+    proof = compared(behind, APART, 3, random.Random(1), CHOSEN)
+    assert {proof.brings(slot) for slot in BLOCK.slots} == {CODES[2]}
+    excluded = [slot for slot, code in CHOSEN.items() if proof.excludes(slot, RAWS[code])]
+    assert excluded == [slot for slot in BLOCK.slots if slot != "F877"]
+    # those that are alike cannot be told from each other, but from what was chosen
+    alike = APART | {CODES[5]: APART[CODES[2]]}
+    proof = compared(behind, alike, 3, random.Random(1), CHOSEN)
+    assert proof.brings("F875") == ""
+    assert proof.excludes("F875", RAWS[CODES[0]])
+
+
+@pytest.mark.parametrize(
+    ("code", "rounds", "verdict"),
+    [
+        ("FE03", [], Verdict.UNREAD),
+        ("FE03", [(100, 100, 100)], Verdict.SAME),
+        ("FE03", [(100, 101, 100)], Verdict.DIFFERS),
+        ("FE03", [(100, 102, 104)], Verdict.MOVING),
+        ("FE03", [(104, 96, 100)], Verdict.MOVING),  # as far again as it went between them
+        ("FE03", [(104, 95, 100)], Verdict.DIFFERS),
+        ("FE03", [(100, 100, 100), (200, 200, 200)], Verdict.SAME),
+        ("FE03", [(100, 100, 100), (200, 201, 200)], Verdict.MOVING),
+        ("FE03", [(100, 101, 100), (200, 201, 200)], Verdict.DIFFERS),
+        ("FD01", [(0b100, 0b001, 0b001)], Verdict.MOVING),  # every bit as in one of them
+        ("FD01", [(0b100, 0b011, 0b001)], Verdict.DIFFERS),
+    ],
+)
+def test_how_words_compare(code: str, rounds: list[tuple[int, int, int]], verdict: Verdict) -> None:
+    proof = Proof(PROFILE, BLOCK)
+    for first, word, second in rounds:
+        proof.note([word], {code: reading(code, first)}, {code: reading(code, second)})
+    assert proof.verdict("F875", code) is verdict
+    assert proof.verdict("F876", code) is Verdict.UNREAD
 
 
 def test_an_even_ramp_does_not_hide_what_a_place_brings() -> None:
@@ -153,6 +200,8 @@ def test_nothing_is_proved_that_is_not_so(
     }
     proof = compared(real, given, rounds, chance, wanted)
     for slot, code in real.items():
+        assert proof.brings(slot) in ("", code), (slot, code)
+        assert not proof.excludes(slot, RAWS[code]), (slot, code)
         for other in CODES:
             if other != code:
                 assert not proof.holds(slot, RAWS[other]), (slot, code, other)

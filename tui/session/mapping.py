@@ -3,7 +3,7 @@
 What a slot brings is compared with direct reads before and after. The slots of a scanner are
 read again after each use: a word counts only when its slot still stands for the same. What an
 indirect block really brings until the drive's next reset cannot be read; it is told by the same
-comparison, with every parameter that could stand in it.
+comparison, with every parameter that could stand in it. What the words prove, `proof` concludes.
 """
 
 from __future__ import annotations
@@ -24,11 +24,12 @@ from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from .asking import Asker
 from .drive import DriveSession
+from .proof import SURE, Proof
 from .readings import Reading
-from .verdict import Verdict, compare
+from .verdict import Verdict
 
-ROUNDS = 3
-"""Comparisons that must all fail before a slot is said to bring something else."""
+MOST = 2 * SURE
+"""Comparisons after which what is not proved stays so: values that are alike cannot be told."""
 USUAL_TURNAROUND = 0.005
 
 
@@ -75,6 +76,21 @@ class BlockView:
     slots: tuple[Slot, ...]
     trouble: str = ""
     """Why the block brought nothing, or nothing sure; else empty."""
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a slot does not seem to bring what it stands for."""
+        read = self.slots if self.block.direction == "read" else ()
+        return any(
+            slot.verdict is Verdict.DIFFERS
+            or (slot.verdict is Verdict.NONE and slot.force is Force.UNPROVED)
+            for slot in read
+        )
+
+    @property
+    def is_unproved(self) -> bool:
+        """Whether it is not sure of a slot's word yet what it is."""
+        return any(s.word is not None and s.force is Force.UNPROVED for s in self.slots)
 
     @property
     def raws(self) -> dict[str, int]:
@@ -128,26 +144,28 @@ class Mapper:
         """The slots of a block, what each brings, the same read directly, and the verdict.
 
         More rounds make surer: a slot differs only if every round says so, and is the same only
-        if every one says that. Where a slot seems to differ, it is looked at again anyway.
+        if every one says that. Where a slot seems to differ, it is looked at again anyway; where
+        all rounds were asked for, so is one that is not proved yet.
         """
-        held = await self.slots(block)
-        view = await self._round(block, held)
-        for number in range(1, ROUNDS):
-            reads = block.direction == "read"
-            doubtful = reads and any(slot.verdict is Verdict.DIFFERS for slot in view.slots)
+        proof, view = Proof(self.session.profile, block), BlockView(block, ())
+        for number in range(1, MOST + 1):
+            view = await self._round(proof, view)
+            doubtful = view.is_doubtful if number < SURE else rounds >= SURE and view.is_unproved
             if number >= rounds and not doubtful:
                 break
-            again = await self._round(block, await self.slots(block))
-            view = _both(view, again)
         return view
 
     async def verify(self, block: Block) -> BlockView:
         """The same, compared several times."""
-        return await self.look(block, rounds=ROUNDS)
+        return await self.look(block, rounds=SURE)
 
-    async def _round(self, block: Block, held: Mapping[str, int]) -> BlockView:
+    async def _round(self, proof: Proof, earlier: BlockView) -> BlockView:
         """One comparison: direct, block, direct, and the slots again."""
-        profile = self.session.profile
+        block, profile = proof.block, self.session.profile
+        held = await self.slots(block)
+        if held != earlier.raws:
+            # what was compared before says nothing of these slots
+            proof.begin()
         chosen = {
             slot: target(profile, block, held[slot]) if slot in held else None
             for slot in block.slots
@@ -161,15 +179,18 @@ class Mapper:
             still = await self.slots(block)
         if still != held:
             # one slot was seen to change: others may have, there and back again
+            proof.begin()
             changed = tuple(
                 Slot(slot, still.get(slot), verdict=Verdict.CHANGED) for slot in block.slots
             )
             return BlockView(block, changed, "The slots were changed while they were looked at.")
+        proof.note(words, before, after)
         found = []
         for place, slot in enumerate(block.slots):
+            was = earlier.slots[place] if earlier.slots else None
             word = words[place] if place < len(words) else None
-            raw = held.get(slot)
-            found.append(self._slot(block, slot, raw, chosen[slot], word, before, after))
+            now = Slot(slot, held.get(slot), chosen[slot], word)
+            found.append(self._slot(proof, now, was, after))
         return BlockView(block, tuple(found), trouble)
 
     def _to_ask(self, block: Block, chosen: Iterable[Parameter | None]) -> list[str]:
@@ -206,114 +227,42 @@ class Mapper:
         return reply.words, ""
 
     def _slot(
-        self,
-        block: Block,
-        slot: str,
-        raw: int | None,
-        parameter: Parameter | None,
-        word: int | None,
-        before: Mapping[str, Reading],
-        after: Mapping[str, Reading],
+        self, proof: Proof, now: Slot, was: Slot | None, direct: Mapping[str, Reading]
     ) -> Slot:
+        """A slot with its code, raw value, parameter and word, and what the words have told."""
+        slot, raw, parameter, word = now.code, now.raw, now.parameter, now.word
+        if was is not None and was.raw != raw:
+            return Slot(slot, raw, parameter, verdict=Verdict.CHANGED)
         if raw == UNUSED:
             return Slot(slot, raw, verdict=Verdict.UNUSED)
         if raw is None or parameter is None:
             return Slot(slot, raw, word=word, verdict=Verdict.NONE)
-        direct = after.get(parameter.code)
-        force, brings = self._force(block, slot, raw, word, before, after)
-        base = Slot(slot, raw, parameter, direct=direct, force=force, brings=brings)
+        force, brings = self._force(proof, slot, raw)
+        told = replace(now, direct=direct.get(parameter.code), force=force, brings=brings)
         if word is None or word_count(parameter) != 1:
-            return base
-        through = self._through(parameter, word)
-        if through is None:
-            return Slot(slot, raw, parameter, word, NOT_AVAILABLE, direct, Verdict.NONE, force)
-        verdict = compare(parameter, through, before.get(parameter.code), direct)
+            return replace(told, word=None)
+        if word == self.session.profile.data.reading.unknown_word:
+            return replace(told, verdict=Verdict.NONE)
+        verdict, through = proof.verdict(slot, parameter.code), from_words(parameter, [word])
+        if verdict is Verdict.MOVING and was is not None and not proof.fitted(slot, parameter.code):
+            # its value of the round in which it fitted
+            return replace(was, verdict=verdict, force=force, brings=brings)
         text = self._text(parameter, through)
-        if verdict is Verdict.DIFFERS and block.direction == "read":
+        if verdict is Verdict.DIFFERS and proof.block.direction == "read":
             # it is not this parameter's value: it gets neither its scale nor its unit
             text = f"raw {word}"
-        return Slot(slot, raw, parameter, through, text, direct, verdict, force, brings)
+        return replace(told, word=through, text=text, verdict=verdict)
 
     def _text(self, parameter: Parameter, raw: int) -> str:
         profile, asker = self.session.profile, self._asker
         return shown(profile, parameter, raw, asker.raws, asker.lacking).display
 
-    def _through(self, parameter: Parameter, word: int) -> int | None:
-        """The raw value of a word; None where it stands for no value."""
-        if word == self.session.profile.data.reading.unknown_word:
-            return None
-        return from_words(parameter, [word])
-
-    def _force(
-        self,
-        block: Block,
-        slot: str,
-        raw: int,
-        word: int | None,
-        before: Mapping[str, Reading],
-        after: Mapping[str, Reading],
-    ) -> tuple[Force, str]:
+    def _force(self, proof: Proof, slot: str, raw: int) -> tuple[Force, str]:
         """Whether the slot is in force, and what it brings where that is something else."""
-        if block.effective == "at-once":
+        # the monitor compares all the time, and may have proved it
+        known = proof.block.effective == "at-once" or self.in_force().get(slot) == raw
+        if known or proof.holds(slot, raw):
             return Force.ACTIVE, ""
-        if self.in_force().get(slot) == raw:
-            # the monitor compares all the time, and has proved it
-            return Force.ACTIVE, ""
-        waits = self.written.get(slot) == raw
-        if word is None or block.direction == "write":
-            return (Force.PENDING if waits else Force.UNPROVED), ""
-        profile = self.session.profile
-        fits = [
-            choice
-            for choice in block.choices
-            if compare(
-                profile[choice.parameter],
-                from_words(profile[choice.parameter], [word]),
-                before.get(choice.parameter),
-                after.get(choice.parameter),
-            )
-            is not Verdict.DIFFERS
-        ]
-        raws = {choice.raw for choice in fits}
-        if raws == {raw}:
-            return Force.ACTIVE, ""
-        if raw not in raws:
-            return Force.PENDING, fits[0].parameter if len(fits) == 1 else ""
-        return (Force.PENDING if waits else Force.UNPROVED), ""
-
-
-def _both(one: BlockView, other: BlockView) -> BlockView:
-    """Two comparisons taken together: the later values, the verdict of both."""
-    slots = tuple(_two(a, b) for a, b in zip(one.slots, other.slots, strict=True))
-    return BlockView(other.block, slots, other.trouble)
-
-
-def _two(one: Slot, other: Slot) -> Slot:
-    if one.raw != other.raw:
-        return Slot(other.code, other.raw, other.parameter, verdict=Verdict.CHANGED)
-    verdict = other.verdict
-    if one.verdict != verdict and {one.verdict, verdict} <= _COMPARED:
-        verdict = Verdict.MOVING
-    force = other.force
-    if one.force is not other.force:
-        # one comparison that leaves a single parameter is enough, if none speaks against it
-        against = Force.PENDING in (one.force, other.force)
-        force = Force.UNPROVED if against else Force.ACTIVE
-    if verdict is Verdict.MOVING and other.verdict is Verdict.DIFFERS:
-        # its value of the round in which it fitted
-        other = replace(other, word=one.word, text=one.text, direct=one.direct, brings="")
-    brings = other.brings if force is Force.PENDING else ""
-    return Slot(
-        other.code,
-        other.raw,
-        other.parameter,
-        other.word,
-        other.text,
-        other.direct,
-        verdict,
-        force,
-        brings,
-    )
-
-
-_COMPARED = frozenset({Verdict.SAME, Verdict.MOVING, Verdict.DIFFERS})
+        if proof.excludes(slot, raw):
+            return Force.PENDING, proof.brings(slot)
+        return (Force.PENDING if self.written.get(slot) == raw else Force.UNPROVED), ""

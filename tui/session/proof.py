@@ -1,8 +1,8 @@
-"""What the words of an indirect block have told of what each of its places brings.
+"""What the words of a block or scanner have told of what each of its places brings.
 
-What a block brings since its drive's last reset cannot be read. It is told by its words: a place
-brings what was chosen for it when nothing else that the block can bring has fitted, and the
-chosen parameter has. What was told once stays true until the drive is reset.
+What an indirect block brings since its drive's last reset cannot be read. It is told by its words:
+a place brings a parameter when nothing else that the block can bring has fitted, and this one has.
+What was told once of a chosen parameter stays true until the drive is reset.
 """
 
 from __future__ import annotations
@@ -13,12 +13,13 @@ from dataclasses import dataclass, field
 
 from tui.drive.profile import Profile
 from tui.drive.schema import Block, Parameter
-from tui.drive.values import from_words
+from tui.drive.values import from_words, word_count
 
 from .readings import Reading
+from .verdict import Verdict
 
 SURE = 3
-"""Comparisons that must speak for the chosen parameter, and against each other one."""
+"""Comparisons that must speak for a parameter, and against each other one."""
 BEYOND = 3
 """So many times as far as it was seen to tremble, a word may be off and still be its own."""
 LEAST = 3
@@ -27,7 +28,7 @@ LEAST = 3
 
 @dataclass(slots=True)
 class Proof:
-    """Evidence about one indirect block; pure, and worthless after the drive's reset."""
+    """Evidence about one block; pure, and worthless after the drive's reset."""
 
     profile: Profile
     block: Block
@@ -48,25 +49,49 @@ class Proof:
     ) -> None:
         """Take the block's words with direct readings of some of what it could bring."""
         for code in before:
+            parameter = self.profile[code]
             first, second = before[code].raw, after[code].raw
-            if first is None or second is None:
+            if first is None or second is None or word_count(parameter) != 1:
                 continue
             self._seen[code] += [first, second]
-            parameter = self.profile[code]
             for slot, word in zip(self.block.slots, words, strict=False):
                 raw = from_words(parameter, [word])
                 self._off[slot, code].append(_off(parameter, raw, first, second))
 
+    def verdict(self, slot: str, code: str) -> Verdict:
+        """How a slot's words compare with a parameter: one that differs did so each time."""
+        offs, seen = self._off[slot, code], self._seen[code]
+        if not offs:
+            return Verdict.UNREAD
+        if all(offs):
+            return Verdict.DIFFERS
+        return Verdict.MOVING if any(offs) or seen[::2] != seen[1::2] else Verdict.SAME
+
+    def fitted(self, slot: str, code: str) -> bool:
+        """Whether a slot's last word could be that of a parameter."""
+        return self._off[slot, code][-1:] == [0]
+
     def conclude(self, chosen: Mapping[str, int]) -> None:
         """Keep what is sure by now of these slots and their raw values."""
         for slot, raw in chosen.items():
-            code = self._code(raw)
-            if code and not any(self._is_open(slot, one, code) for one in self.codes):
-                self._sure[slot] = code
+            if self.holds(slot, raw):
+                self._sure[slot] = self._code(raw)
+
+    def brings(self, slot: str) -> str:
+        """The code of what a place surely brings; empty while that is not known."""
+        if slot in self._sure:
+            return self._sure[slot]
+        left = [code for code in self.codes if not self._excluded(slot, code)]
+        return left[0] if len(left) == 1 and self._confirmed(slot, left[0]) else ""
 
     def holds(self, slot: str, raw: int) -> bool:
         """Whether a place surely brings what its slot's raw value stands for."""
-        return slot in self._sure and self._sure[slot] == self._code(raw)
+        code = self._code(raw)
+        return bool(code) and self.brings(slot) == code
+
+    def excludes(self, slot: str, raw: int) -> bool:
+        """Whether a place surely brings something else than its slot's raw value stands for."""
+        return not self.holds(slot, raw) and self._excluded(slot, self._code(raw))
 
     def open_codes(self, chosen: Mapping[str, int]) -> list[str]:
         """The parameters to be compared yet until every place of `chosen` is sure."""
@@ -74,7 +99,10 @@ class Proof:
         return [
             code
             for code in self.codes
-            if any(self._is_open(slot, code, target) for slot, target in targets.items())
+            if any(
+                not (self._confirmed if code == target else self._excluded)(slot, code)
+                for slot, target in targets.items()
+            )
         ]
 
     @property
@@ -82,13 +110,16 @@ class Proof:
         """Everything that the block can bring."""
         return list(dict.fromkeys(choice.parameter for choice in self.block.choices))
 
-    def _is_open(self, slot: str, code: str, chosen: str) -> bool:
+    def _confirmed(self, slot: str, code: str) -> bool:
+        return len(self._off[slot, code]) >= SURE and not self._against(slot, code)
+
+    def _excluded(self, slot: str, code: str) -> bool:
+        return self._against(slot, code) >= SURE
+
+    def _against(self, slot: str, code: str) -> int:
+        """How many words were further off than the parameter was seen to tremble."""
         may_be = LEAST + BEYOND * _tremble(self._seen[code])
-        offs = self._off[slot, code]
-        against = sum(off > may_be for off in offs)
-        if code == chosen:
-            return len(offs) - against < SURE or against > 0
-        return against < SURE
+        return sum(off > may_be for off in self._off[slot, code])
 
     def _code(self, raw: int) -> str:
         return next((c.parameter for c in self.block.choices if c.raw == raw), "")
