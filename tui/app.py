@@ -236,7 +236,7 @@ class DrivePanelApp(LeanApp, Leaving):
             await asyncio.to_thread(self.stop_motors)
         await self.disconnect()
         if self._journal is not None:
-            self._journal.close()
+            await asyncio.to_thread(self._journal.close)
 
     def _handle_exception(self, error: Exception) -> None:
         """An error of the panel itself: all of it to the log, one line to the person."""

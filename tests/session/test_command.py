@@ -355,6 +355,7 @@ async def test_a_journal_that_cannot_be_written_stops_no_command(tmp_path: Path)
         await made.until(lambda: commander.outcome is not None)
         assert commander.outcome is not None
         assert commander.outcome.kind is Kind.DONE
+        assert not journal.flush()
         assert "cannot be written" in journal.trouble
         assert len(journal.recent) == 3
 

@@ -309,6 +309,7 @@ async def test_what_moves_is_taken_out_first() -> None:
         ]  # fmt: skip
         assert [here.drive.raw(slot) for slot in plan.block.slots] == list(plan.raws)
         assert await write(here, plan) == "Nothing was to be changed."
+        here.journal.flush()
         kept = [json.loads(x) for x in here.journal.path.read_text().splitlines()]
         assert [(e["code"], e["new_raw"], e["read_back"]) for e in kept][:2] == [
             ("NMA1", 0, 0), ("NMA2", 0, 0),

@@ -87,6 +87,7 @@ async def test_the_scanner_tells_what_it_brings() -> None:
 async def test_damaged_lines_of_the_journal_are_left_out() -> None:
     with bench("atv71") as made:
         await made.apply(ACC="5")
+        made.journal.flush()
         path = made.journal.path
         path.with_name(f"{path.name}.1").write_text('{"half\n[1]\n{"a": 1}\n', encoding="utf-8")
         with path.open("a", encoding="utf-8") as file:

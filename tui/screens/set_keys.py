@@ -71,7 +71,9 @@ class SetKeys(ParameterKeys):
         upload = Upload(self.session, progress=progress)
         try:
             await upload.run()
-            write_file(path, text(upload.parameter_set()))
+            values = upload.parameter_set()
+            # the disk may hang
+            await asyncio.to_thread(lambda: write_file(path, text(values)))
         except (LineError, DriveError) as error:
             self.note(f"No file: {error}")
         else:

@@ -1,23 +1,35 @@
-"""The record of everything that was written to a drive: JSON lines in the state folder, rotated."""
+"""The record of everything that was written to a drive: JSON lines in the state folder, rotated.
+
+Nobody waits for the disk: entries are put down by a thread, in their order and one by one, so a
+kill -9 or a power cut takes at most those that were not flushed by then.
+"""
 
 from __future__ import annotations
 
 import json
 import logging
+import threading
+import time
 from collections import deque
 from dataclasses import asdict, dataclass
 from datetime import datetime
-from logging.handlers import RotatingFileHandler
 from pathlib import Path
-from threading import Lock
 
+from .journal_file import JournalFile
 from .state import state_folder
 
-NAME = "journal.jsonl"
-LARGEST = 1_000_000
-"""Bytes of one file; then the next one is begun."""
-KEPT = 9
 SHOWN = 500
+"""Entries kept at hand."""
+MOST = 10_000
+"""Entries that wait for a disk which takes none; then the oldest of them is lost."""
+AGAIN = 1.0
+"""Seconds after which a disk that took nothing is tried again."""
+IDLE = 10.0
+"""Seconds without an entry after which the thread ends; the next entry begins another."""
+SLOW = 5.0
+"""Seconds in which a disk has to take an entry, else it counts as hanging."""
+PATIENCE = 3.0
+"""Seconds that who reads or closes the journal waits for the disk."""
 
 log = logging.getLogger(__name__)
 
@@ -45,49 +57,165 @@ class Entry:
 
 
 class Journal:
-    """Appends entries; keeps the last ones at hand. May be used from any thread."""
+    """Appends entries; keeps the last ones at hand. May be used from any thread.
+
+    What the disk refuses is kept and tried again.
+    """
 
     def __init__(self, folder: Path | None = None) -> None:
-        self._folder = folder or state_folder()
-        self._handler: RotatingFileHandler | None = None
-        self._lock = Lock()
+        self._file = JournalFile(folder or state_folder())
+        self._changed = threading.Condition()
+        """Guards all below; never held over disk work."""
         self._recent: deque[Entry] = deque(maxlen=SHOWN)
-        self.trouble = ""
-        """Why entries cannot be kept, for the person; empty while they can."""
+        self._waiting: deque[Entry] = deque()
+        self._begun: float | None = None
+        """Since when an entry is being written, in monotonic time."""
+        self._thread: threading.Thread | None = None
+        self._why = ""
+        self._failures = 0
+        self._lost = 0
+        self._closed = False
 
     @property
     def path(self) -> Path:
         """The file that is written now."""
-        return self._folder / NAME
+        return self._file.path
+
+    @property
+    def files(self) -> list[Path]:
+        """The files that there may be, the oldest first."""
+        return self._file.all
 
     @property
     def recent(self) -> tuple[Entry, ...]:
-        """The entries since the start, oldest first."""
-        return tuple(self._recent)
+        """The entries since the start, oldest first; on the disk or not."""
+        with self._changed:
+            return tuple(self._recent)
+
+    @property
+    def lost(self) -> int:
+        """How many entries were given up, since too many waited for the disk."""
+        with self._changed:
+            return self._lost
+
+    @property
+    def trouble(self) -> str:
+        """Why entries cannot be kept, for the person; empty while they can."""
+        with self._changed:
+            why, lost = self._why, self._lost
+            if self._begun is not None and (since := time.monotonic() - self._begun) > SLOW:
+                why = f"the disk has not answered for {since:.0f} s"
+        if not why:
+            return ""
+        return f"The journal cannot be written: {why}." + (f" {lost} entries lost." if lost else "")
 
     def add(self, entry: Entry) -> None:
-        """Keep an entry; a folder that cannot be written stops no command."""
-        with self._lock:
+        """Keep an entry; returns at once and never raises, whatever the disk does."""
+        with self._changed:
             self._recent.append(entry)
-            try:
-                if self._handler is None:
-                    self._folder.mkdir(parents=True, exist_ok=True)
-                    self._handler = RotatingFileHandler(
-                        self.path, maxBytes=LARGEST, backupCount=KEPT, encoding="utf-8"
-                    )
-                text = json.dumps(asdict(entry), ensure_ascii=False)
-                self._handler.emit(logging.makeLogRecord({"msg": text}))
-            except OSError as error:
-                if not self.trouble:
-                    log.error("the journal cannot be written: %s", error)
-                self.trouble = f"The journal cannot be written: {error.strerror or error}."
+            self._waiting.append(entry)
+            self._closed = False
+            self._drop()
+            self._begin()
+            self._changed.notify_all()
 
-    def close(self) -> None:
-        """Close the file."""
-        with self._lock:
-            if self._handler is not None:
-                self._handler.close()
-                self._handler = None
+    def flush(self, timeout: float = PATIENCE) -> bool:
+        """Wait until all entries are on the disk, at most so many seconds; False if they are not.
+
+        A disk that refuses is tried once more, and not waited for.
+        """
+        with self._changed:
+            failures = self._failures
+            if not self._is_done():
+                self._begin()
+                self._changed.notify_all()
+            self._changed.wait_for(lambda: self._is_done() or self._failures > failures, timeout)
+            return self._is_done()
+
+    def close(self, timeout: float = PATIENCE) -> bool:
+        """Flush what is left, as flush() does; a disk that still refuses is tried no more."""
+        with self._changed:
+            self._closed = True
+            self._changed.notify_all()
+        return self.flush(timeout)
+
+    def _is_done(self) -> bool:
+        return not self._waiting and self._begun is None
+
+    def _drop(self) -> None:
+        while len(self._waiting) > MOST:
+            self._waiting.popleft()
+            self._lost += 1
+
+    def _begin(self) -> None:
+        if self._thread is not None:
+            return
+        thread = threading.Thread(target=self._work, name="journal", daemon=True)
+        try:
+            thread.start()
+        except RuntimeError as error:
+            # no thread to be had: the next entry tries again
+            self._why = str(error)
+            self._failures += 1
+        else:
+            self._thread = thread
+
+    def _work(self) -> None:
+        while (entry := self._next()) is not None:
+            why = self._trouble_with(entry)
+            with self._changed:
+                assert self._begun is not None
+                took, self._begun = time.monotonic() - self._begun, None
+                before, self._why = self._why, why
+                if why:
+                    self._waiting.appendleft(entry)
+                    self._drop()
+                    self._failures += 1
+                lost, left = self._lost, len(self._waiting)
+                self._changed.notify_all()
+            _tell(before, why, took, left, lost)
+            if why and not self._may_go_on():
+                return
+
+    def _next(self) -> Entry | None:
+        """The entry to write; None where the thread is to end."""
+        with self._changed:
+            self._changed.wait_for(lambda: self._waiting or self._closed, IDLE)
+            if not self._waiting:
+                self._thread = None
+                return None
+            self._begun = time.monotonic()
+            return self._waiting.popleft()
+
+    def _may_go_on(self) -> bool:
+        """Whether the disk is to be tried again, after a moment or as soon as somebody waits."""
+        with self._changed:
+            if self._closed:
+                self._thread = None
+                return False
+            self._changed.wait(AGAIN)
+            return True
+
+    def _trouble_with(self, entry: Entry) -> str:
+        """Write an entry; what went wrong, or nothing."""
+        try:
+            self._file.append(json.dumps(asdict(entry), ensure_ascii=False))
+        except OSError as error:
+            return error.strerror or str(error)
+        except Exception as error:
+            log.exception("the journal")
+            return str(error) or type(error).__name__
+        return ""
+
+
+def _tell(before: str, why: str, took: float, left: int, lost: int) -> None:
+    """Say in the log when the journal cannot be written, and when it can again."""
+    if why and not before:
+        log.error("the journal cannot be written: %s", why)
+    elif before and not why:
+        log.warning("the journal is written again: %d entries wait, %d lost so far", left, lost)
+    elif took > SLOW:
+        log.warning("the disk took %.0f s for an entry of the journal", took)
 
 
 def now_text() -> str:

@@ -17,7 +17,7 @@ from tui.drive.schema import Block, Quantity
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, set_bits
 
-from .journal import KEPT, Entry, Journal
+from .journal import Entry, Journal
 
 LONGEST = 200
 """How many entries of the journal a report shows at most, the last ones."""
@@ -25,9 +25,12 @@ CHANNELS: tuple[Quantity, ...] = ("command_channel", "reference_channel")
 
 
 def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
-    """What the journal's files tell of a drive on a line, oldest first; damaged lines left out."""
-    files = [journal.path.with_name(f"{journal.path.name}.{n}") for n in range(KEPT, 0, -1)]
-    found = (entry for file in (*files, journal.path) for entry in _entries(file))
+    """What the journal's files tell of a drive on a line, oldest first.
+
+    Waits a few seconds for entries that are not on the disk yet. Damaged lines are left out.
+    """
+    journal.flush()
+    found = (entry for file in journal.files for entry in _entries(file))
     return [entry for entry in found if (entry.line, entry.device) == (line, device)]
 
 

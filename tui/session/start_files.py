@@ -47,7 +47,7 @@ class StartFiles:
             if not wanted():
                 return
             part.replace(path)
-            _sync_folder(self.folder)
+            sync_folder(self.folder)
         finally:
             with suppress(OSError):
                 part.unlink(missing_ok=True)
@@ -65,7 +65,7 @@ class StartFiles:
                 log.error("the record of a start, %s, cannot be removed: %s", path, error)
         if removed:
             with suppress(OSError):
-                _sync_folder(self.folder)
+                sync_folder(self.folder)
 
     def records(self) -> list[StartRecord]:
         """All records; damaged files are set aside and logged."""
@@ -86,7 +86,7 @@ class StartFiles:
     def _make_folder(self) -> None:
         if not self.folder.is_dir():
             self.folder.mkdir(parents=True, exist_ok=True)
-            _sync_folder(self.folder.parent)
+            sync_folder(self.folder.parent)
 
 
 def _name(record: StartRecord) -> str:
@@ -113,7 +113,7 @@ def _read(path: Path) -> StartRecord | None:
     return None
 
 
-def _sync_folder(folder: Path) -> None:
+def sync_folder(folder: Path) -> None:
     """Flush the names in a folder, where the system can."""
     if os.name != "posix":
         return

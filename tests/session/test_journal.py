@@ -1,0 +1,287 @@
+"""The journal: nobody waits for its disk, nothing is lost while it can be kept."""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import json
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from tests.programs import PATIENCE, wait_until
+from tests.session.sets_bench import bench
+from tui.session import journal as module
+from tui.session import journal_file
+from tui.session.journal import Entry, Journal
+from tui.session.report import entries_of
+from tui.session.stop import Phase, Stopper
+
+PROGRAM = """
+import os, signal, sys, threading
+from pathlib import Path
+from tests.session.test_journal import entry
+from tui.session.journal import Journal
+journal = Journal(Path(sys.argv[1]))
+for number in range(3):
+    journal.add(entry(number))
+assert journal.flush(60)
+os.fsync = lambda number: threading.Event().wait()
+for number in range(3, 9):
+    journal.add(entry(number))
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+class Disk:
+    """A disk that flushes, hangs in it, or refuses."""
+
+    def __init__(self) -> None:
+        self.real, self.works, self.hangs = os.fsync, threading.Event(), threading.Event()
+        self.refuses = False
+        self.works.set()
+
+    def fsync(self, number: int) -> None:
+        if not self.works.is_set():
+            self.hangs.set()
+        assert self.works.wait(PATIENCE)
+        if self.refuses:
+            raise OSError(errno.EIO, "Input/output error")
+        self.real(number)
+
+
+@pytest.fixture
+def disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
+    """The disk under every journal of the test; it works again at its end."""
+    made = Disk()
+    monkeypatch.setattr(os, "fsync", made.fsync)
+    monkeypatch.setattr(module, "AGAIN", 0.01)
+    yield made
+    made.refuses = False
+    made.works.set()
+
+
+@pytest.fixture
+def journal(disk: Disk, tmp_path: Path) -> Iterator[Journal]:
+    made = Journal(tmp_path / "state")
+    yield made
+    disk.refuses = False
+    disk.works.set()
+    assert made.close(PATIENCE)
+    wait_until(lambda: not threads(), "the thread ends")
+
+
+def entry(number: int) -> Entry:
+    """An entry that is told from others by its new value."""
+    text = str(number)
+    return Entry("now", "line", 1, "atv71", "ACC", 9001, 0, "0", number, text, "ok", number, "test")
+
+
+def threads() -> list[threading.Thread]:
+    return [thread for thread in threading.enumerate() if thread.name == "journal"]
+
+
+def kept(journal: Journal) -> list[int]:
+    """What the file holds, in its order."""
+    lines = journal.path.read_text("utf-8").splitlines()
+    return [json.loads(line)["new_raw"] for line in lines]
+
+
+def test_what_is_never_used_leaves_nothing(tmp_path: Path) -> None:
+    made = Journal(tmp_path / "state")
+    assert made.flush(0)
+    assert made.close(0)
+    assert (made.recent, made.trouble, threads()) == ((), "", [])
+    assert not (tmp_path / "state").exists()
+
+
+def test_nobody_waits_for_a_disk_that_hangs(journal: Journal, disk: Disk) -> None:
+    disk.works.clear()
+    for number in range(20):
+        journal.add(entry(number))
+    assert disk.hangs.wait(PATIENCE)
+    journal.add(entry(20))
+    assert [one.new_raw for one in journal.recent] == list(range(21))
+    assert not journal.flush(0.01)
+    assert not journal.close(0.01)
+    disk.works.set()
+    assert journal.flush(PATIENCE)
+    assert kept(journal) == list(range(21))
+
+
+def test_a_disk_that_hangs_is_told(
+    journal: Journal, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(module, "SLOW", 0.01)
+    disk.works.clear()
+    journal.add(entry(1))
+    wait_until(lambda: "the disk has not answered for" in journal.trouble, "it is told")
+    disk.works.set()
+    assert journal.flush(PATIENCE)
+    assert journal.trouble == ""
+    wait_until(lambda: "the disk took" in caplog.text, "it is logged")
+
+
+async def test_a_stop_does_not_wait_for_the_disk(disk: Disk) -> None:
+    with bench("atv71", run_hz=20.0) as here:
+        await asyncio.to_thread(wait_until, lambda: here.drive.motor.frequency > 5, "it runs")
+        disk.works.clear()
+        stopper = Stopper(here.session.line, here.journal)
+        stopper.stop([here.session])
+        ended = (Phase.STOPPED, Phase.FAILED)
+
+        def is_over() -> bool:
+            return 1 in stopper.reports and stopper.reports[1].phase in ended
+
+        await asyncio.to_thread(wait_until, is_over, "the stop ends")
+        assert stopper.reports[1].phase is Phase.STOPPED
+        assert here.drive.motor.frequency == 0
+        assert disk.hangs.is_set()
+        assert here.journal.recent
+        disk.works.set()
+
+
+@pytest.mark.skipif(os.name != "posix", reason="without kill -9")
+def test_a_kill_takes_what_was_not_flushed_and_no_more(tmp_path: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, str(tmp_path)], timeout=PATIENCE, check=False
+    )
+    assert done.returncode == -signal.SIGKILL
+    # the fourth was being flushed, the others waited for that
+    assert kept(Journal(tmp_path)) in ([0, 1, 2], [0, 1, 2, 3])
+
+
+def test_entries_of_several_threads_keep_their_order(journal: Journal) -> None:
+    def add(first: int) -> None:
+        for number in range(first, first + 50):
+            journal.add(entry(number))
+
+    with ThreadPoolExecutor(4) as pool:
+        list(pool.map(add, range(0, 400, 100)))
+    order = [one.new_raw for one in journal.recent]
+    assert len(order) == 200
+    assert journal.flush(PATIENCE)
+    assert kept(journal) == order
+
+
+def test_a_folder_that_cannot_be_written(
+    disk: Disk, tmp_path: Path, caplog: pytest.LogCaptureFixture
+) -> None:
+    (tmp_path / "file").touch()
+    made = Journal(tmp_path / "file")
+    made.add(entry(1))
+    wait_until(lambda: bool(made.trouble), "it is told")
+    assert made.trouble.startswith("The journal cannot be written: ")
+    assert "the journal cannot be written" in caplog.text
+    # who waits is told as soon as the disk refuses again
+    assert not made.flush(PATIENCE * 10)
+    assert not made.close(PATIENCE * 10)
+    wait_until(lambda: not threads(), "nobody tries any more")
+    assert [one.new_raw for one in made.recent] == [1]
+    # the person mends it
+    (tmp_path / "file").unlink()
+    made.add(entry(2))
+    assert made.close(PATIENCE)
+    assert kept(made) == [1, 2]
+    assert made.trouble == ""
+
+
+def refusing(disk: Disk, tmp_path: Path) -> tuple[Callable[[], None], Callable[[], None]]:
+    """A disk whose flush fails."""
+    return lambda: setattr(disk, "refuses", True), lambda: setattr(disk, "refuses", False)
+
+
+def full(disk: Disk, tmp_path: Path) -> tuple[Callable[[], None], Callable[[], None]]:
+    """A file that takes nothing: a folder stands in its place."""
+    aside, path = tmp_path / "aside", tmp_path / "state" / journal_file.NAME
+
+    def breaks() -> None:
+        path.rename(aside)
+        path.mkdir()
+
+    def mended() -> None:
+        path.rmdir()
+        aside.rename(path)
+
+    return breaks, mended
+
+
+@pytest.mark.parametrize("how", [refusing, full])
+def test_a_disk_that_comes_back_gets_what_it_missed(
+    journal: Journal,
+    disk: Disk,
+    tmp_path: Path,
+    how: Callable[[Disk, Path], tuple[Callable[[], None], Callable[[], None]]],
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    caplog.set_level(logging.WARNING)
+    journal.add(entry(0))
+    assert journal.flush(PATIENCE)
+    breaks, mended = how(disk, tmp_path)
+    breaks()
+    for number in range(1, 6):
+        journal.add(entry(number))
+    wait_until(lambda: bool(journal.trouble), "it is told")
+    assert not journal.flush(PATIENCE)
+    mended()
+    # nobody has to ask for it
+    wait_until(lambda: journal.trouble == "" and journal.flush(), "it is written")
+    assert kept(journal) == list(range(6))
+    assert [one.new_raw for one in entries_of(journal, "line", 1)] == list(range(6))
+    assert journal.lost == 0
+    assert caplog.text.count("the journal cannot be written") == 1
+    assert "written again" in caplog.text
+
+
+def test_what_is_too_much_to_keep_is_lost_and_counted(
+    journal: Journal,
+    disk: Disk,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    monkeypatch.setattr(module, "MOST", 5)
+    disk.refuses = True
+    for number in range(12):
+        journal.add(entry(number))
+    wait_until(lambda: "7 entries lost" in journal.trouble, "it is told")
+    disk.refuses = False
+    wait_until(lambda: journal.trouble == "" and journal.flush(), "it is written")
+    # one that was given up may stand there, its flush failed
+    assert [number for number in kept(journal) if number >= 7] == [7, 8, 9, 10, 11]
+    assert journal.lost == 7
+    assert "7 lost" in caplog.text
+
+
+def test_old_files_make_room(journal: Journal, monkeypatch: pytest.MonkeyPatch) -> None:
+    journal.add(entry(0))
+    assert journal.flush(PATIENCE)
+    size = journal.path.stat().st_size
+    monkeypatch.setattr(journal_file, "LARGEST", 2 * size)
+    for number in range(1, 30):
+        journal.add(entry(number % 10))
+    assert journal.flush(PATIENCE)
+    there = sorted(path.name for path in journal.path.parent.iterdir())
+    assert there == [journal_file.NAME, *(f"{journal_file.NAME}.{n}" for n in range(1, 10))]
+    held = [one.new_raw for one in entries_of(journal, "line", 1)]
+    assert held == [number % 10 for number in range(10, 30)]
+
+
+def test_a_line_that_was_cut_off_damages_no_other(journal: Journal) -> None:
+    journal.path.parent.mkdir()
+    journal.path.write_text('{"time": "a power cut')
+    journal.add(entry(1))
+    assert [one.new_raw for one in entries_of(journal, "line", 1)] == [1]
+
+
+def test_who_reads_gets_what_was_just_added(journal: Journal) -> None:
+    for number in range(30):
+        journal.add(entry(number))
+        assert entries_of(journal, "line", 1)[-1].new_raw == number
