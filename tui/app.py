@@ -97,6 +97,7 @@ class DrivePanelApp(LeanApp, Leaving):
         self._hungry: set[int] = set()
         self._told: StopSummary | None = None
         self._journal: Journal | None = None
+        self._journal_trouble = ""
 
     @property
     def journal(self) -> Journal:
@@ -185,6 +186,7 @@ class DrivePanelApp(LeanApp, Leaving):
         self.push_screen(self.connection)
         self.set_interval(HUNGER_LOOK, self._tell_hunger)
         self.set_interval(HUNGER_LOOK, self._tell_stops)
+        self.set_interval(HUNGER_LOOK, self._tell_journal)
         if self._on_shown is not None:
             self.connection.call_after_refresh(self._on_shown)
         if self._start is not None:
@@ -203,6 +205,13 @@ class DrivePanelApp(LeanApp, Leaving):
                     timeout=max(3.0, one.left),
                 )
         self._hungry = {one.device for one in hungry}
+
+    def _tell_journal(self) -> None:
+        """Tell once, at once, that what is written is not on record."""
+        trouble = self._journal.trouble if self._journal is not None else ""
+        if trouble and trouble != self._journal_trouble:
+            self.notify(trouble, severity="error", timeout=30.0)
+        self._journal_trouble = trouble
 
     def _tell_stops(self) -> None:
         """Tell what the last stop has come to where the screen on top does not show it."""

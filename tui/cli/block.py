@@ -19,7 +19,7 @@ from .options import (
     read_only_option,
     settings_options,
 )
-from .orders import arm_option, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of
 from .sets import dry_run_option, write_down
 
 if TYPE_CHECKING:
@@ -202,7 +202,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
             raise Failure(str(error), DRIVE_REFUSED) from error
         raise
     finally:
-        journal.close()
+        close_journal(journal)
     if wanted.as_json:
         show_blocks(session, line_text, await _looked_at(session, verify=False), as_json=True)
     return DONE

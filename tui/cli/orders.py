@@ -50,6 +50,12 @@ def complain(text: str) -> None:
         click.echo(f"drivepanel: {text}", err=True)
 
 
+def close_journal(journal: Journal) -> None:
+    """Close the journal, and say what keeps it from being written: nothing is lost unsaid."""
+    if not journal.close() and journal.trouble:
+        complain(journal.trouble)
+
+
 def moved(journal: Journal) -> bool:
     """Whether a command was sent, answered or not; a reference alone moves nothing."""
     return any(not entry.why.startswith("reference") for entry in journal.recent)
@@ -86,7 +92,7 @@ async def watched(
         yield fleet, console
     finally:
         fleet.forget()
-        journal.close()
+        close_journal(journal)
         if starts is not None:
             starts.close()
 

@@ -18,7 +18,7 @@ from .options import (
     profile_option,
     read_only_option,
 )
-from .orders import arm_option, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of
 from .sets import (
     codes_of,
     confirm_option,
@@ -192,7 +192,7 @@ async def _restore(
         click.echo("drivepanel: The same command writes what is missing.", err=True)
         return status_of_results(done.results) or DRIVE_REFUSED
     finally:
-        journal.close()
+        close_journal(journal)
 
 
 def say_plan_left_out(plan: RestorePlan) -> None:

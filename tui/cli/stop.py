@@ -20,7 +20,7 @@ from .options import (
     read_only_option,
     unidentified,
 )
-from .orders import complain
+from .orders import close_journal, complain
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
@@ -135,7 +135,7 @@ async def _stop_one(opened: OpenLine, found: Found, order: OrderId) -> int:
     try:
         return await _seen_through(Stopper(opened.line, journal), found, order)
     finally:
-        journal.close()
+        close_journal(journal)
 
 
 async def _seen_through(stopper: Stopper, found: Found, order: OrderId) -> int:
@@ -204,7 +204,7 @@ async def _stop_all(
     finally:
         # whatever went wrong with the search: stops that were begun are seen through
         worst = max([worst, *await asyncio.gather(*stops)])
-        journal.close()
+        close_journal(journal)
     if left:
         complain(f"No answer at {', '.join(map(str, left))}.")
     return worst or (0 if stops else LINE_TROUBLE)

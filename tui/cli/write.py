@@ -8,7 +8,7 @@ import click
 
 from .errors import DONE, told
 from .options import Target, connect, line_argument, on_line, read_only_option, settings_options
-from .orders import arm_option, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of
 from .sets import (
     codes_of,
     confirm_option,
@@ -131,4 +131,4 @@ async def _write(
         say_afterwards(done.after_reset, done.unsaved, saved=saved)
         return status_of_results(done.results)
     finally:
-        journal.close()
+        close_journal(journal)
