@@ -7,13 +7,13 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
-from tui.screens.ask import Ask
 from tui.screens.blocks import BlocksScreen
-from tui.screens.confirm import Confirm
 from tui.screens.connection import ConnectionScreen
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.pick_parameter import PickParameter
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
-from tui.screens.pick_parameter import PickParameter
 from tui.session.mapping_desk import MappingDesk
 
 from .test_command_flows import Bench, bench

@@ -12,14 +12,14 @@ from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
 from tui.app import DrivePanelApp
-from tui.screens.ask import Ask
 from tui.screens.connection import ConnectionScreen
 from tui.screens.control_source import ControlSourceScreen
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.leave import Leave
+from tui.screens.dialogs.options import OptionsScreen
 from tui.screens.faults import FaultsScreen
 from tui.screens.help import HelpScreen
-from tui.screens.leave import Leave
 from tui.screens.monitor import MonitorScreen
-from tui.screens.options import OptionsScreen
 from tui.session.lines import OpenLine, open_line
 from tui.session.stop import Phase
 from tui.simulator import DriveSpec, Simulation

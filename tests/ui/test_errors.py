@@ -13,7 +13,7 @@ from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
 from tui.bus.errors import PortBusy
-from tui.screens.confirm import Confirm
+from tui.screens.dialogs.confirm import Confirm
 from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
 

@@ -12,11 +12,11 @@ from textual.widgets import OptionList
 
 from tui.app import DrivePanelApp
 from tui.screens.actions import ACTIONS, EVERYWHERE
-from tui.screens.ask import Ask
 from tui.screens.blocks import BlocksScreen
-from tui.screens.confirm import Confirm
 from tui.screens.connection import ConnectionScreen
 from tui.screens.control_source import ControlSourceScreen
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults import FaultsScreen
 from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen

@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
-from tui.screens.ask import Ask
-from tui.screens.confirm import Confirm
-from tui.screens.edit_value import EditBits, EditNumber, PickValue
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.edit_value import EditBits, EditNumber, PickValue
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
 

@@ -11,7 +11,7 @@ from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, word_
 from tui.session.mapping_desk import MappingDesk
 
 from .arming import Arming
-from .files import fault_of_known, fault_of_new
+from .dialogs.files import fault_of_known, fault_of_new
 
 
 class BlockKeys(Arming):
@@ -36,8 +36,8 @@ class BlockKeys(Arming):
 
     def action_exchange(self) -> None:
         """Write values through the outputs."""
-        from .ask import Ask
-        from .confirm import Confirm
+        from .dialogs.ask import Ask
+        from .dialogs.confirm import Confirm
 
         desk = self.desk
         if not self._armed():
@@ -81,7 +81,7 @@ class BlockKeys(Arming):
 
     def action_save(self) -> None:
         """Ask for a file, and save what is proposed, else today's assignment."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         plans = [p for block in self.desk.blocks if (p := self.desk.proposed(block))]
         if not plans:
@@ -109,7 +109,7 @@ class BlockKeys(Arming):
 
     def action_load(self) -> None:
         """Ask for a file, and propose what it holds."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         if not self.desk.blocks:
             self._refuse(no_blocks(self.session.profile))
@@ -135,7 +135,7 @@ class BlockKeys(Arming):
 
     def action_words(self) -> None:
         """Choose the four user words."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         profile = self.session.profile
 

@@ -144,7 +144,7 @@ class BlocksScreen(BlockKeys):
 
     def action_pick(self) -> None:
         """Choose what the slot stands for."""
-        from .pick_parameter import PickParameter
+        from .dialogs.pick_parameter import PickParameter
 
         block, place = self._block, self._at
         if block is None:
@@ -194,7 +194,7 @@ class BlocksScreen(BlockKeys):
 
     def action_write(self) -> None:
         """Say what follows, and write it."""
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         desk = self.desk
         todo = {block.id: block for block in desk.blocks if desk.changes(block)}

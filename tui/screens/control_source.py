@@ -127,7 +127,7 @@ class ControlSourceScreen(OrderKeys):
 
     def action_write_chosen(self) -> None:
         """Say what follows, and write it."""
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         found = changes(self.session.profile, self._chosen, self._raws)
         if self._armed_or_told() and found and self._raws:

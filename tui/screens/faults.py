@@ -23,7 +23,7 @@ from tui.widgets.palette import ALARM, STRONG
 
 from .actions import FAULTS, bindings
 from .base import PanelScreen
-from .files import fault_of_new
+from .dialogs.files import fault_of_new
 
 LEFT = 36
 STORED = 52
@@ -140,7 +140,7 @@ class FaultsScreen(PanelScreen):
 
     def action_save(self) -> None:
         """Write the record to a file whose name the person may change."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         record = self._recorder.latest
         if record is None:

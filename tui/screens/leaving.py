@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from .confirm import Confirm
-from .leave import Choice, Leave
+from .dialogs.confirm import Confirm
+from .dialogs.leave import Choice, Leave
 from .panel import Panel
 
 if TYPE_CHECKING:

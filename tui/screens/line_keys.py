@@ -27,7 +27,7 @@ class LineKeys(Scanning):
 
     def action_type_line(self) -> None:
         """Type a line."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         def typed(text: str | None) -> None:
             if text:

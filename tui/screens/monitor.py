@@ -279,7 +279,7 @@ class MonitorScreen(OrderKeys):
 
     def action_rating(self) -> None:
         """Tell the rated current of a drive that gives its current in %."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         current = self.session.profile.quantity("motor_current")
         if current is None or current.unit != "%":

@@ -68,7 +68,7 @@ class OrderKeys(Arming):
         order = self.commander.last_order
         if order not in ("forward", "reverse"):
             return
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         def told(sure: bool | None) -> None:
             if sure:
@@ -92,7 +92,7 @@ class OrderKeys(Arming):
 
     def action_hand_back(self) -> None:
         """Give the control back, after saying what may start then."""
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         def told(sure: bool | None) -> None:
             if sure:
@@ -112,7 +112,7 @@ class OrderKeys(Arming):
 
     def action_reference(self) -> None:
         """Type a reference."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         def given(text: str | None) -> None:
             if text:
@@ -133,7 +133,7 @@ class OrderKeys(Arming):
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""
-        from .options import OptionsScreen
+        from .dialogs.options import OptionsScreen
 
         raws = self.session.image.raws
         chart = chart_in_force(self.session.profile, raws)

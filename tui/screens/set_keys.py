@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
-from .files import fault_of_new
+from .dialogs.files import fault_of_new
 from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
@@ -48,7 +48,7 @@ class SetKeys(ParameterKeys):
     def _ask_for_file(
         self, question: str, suffix: str, about: str, text: Callable[[ParameterSet], str]
     ) -> None:
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         when = time.strftime("%Y%m%d-%H%M")
         name = f"{self.session.profile.id}-{self.session.device}-{when}.{suffix}"
@@ -85,7 +85,7 @@ class SetKeys(ParameterKeys):
 
     def action_compare(self) -> None:
         """Ask for what to compare with."""
-        from .ask import Ask
+        from .dialogs.ask import Ask
 
         def told(text: str | None) -> None:
             if text:
@@ -174,7 +174,7 @@ class SetKeys(ParameterKeys):
         self.run_worker(self._stage_set(), exclusive=True, group="sets")
 
     async def _stage_set(self) -> None:
-        from .skipped import Skipped
+        from .dialogs.skipped import Skipped
 
         editor = self.editor
         try:

@@ -12,7 +12,7 @@ class StageKeys(ParameterKeys):
 
     def action_edit(self) -> None:
         """A dialog for the parameter under the cursor."""
-        from .edit_value import dialog_for
+        from .dialogs.edit_value import dialog_for
 
         code = self.listed.code
         if not code or not self._may_edit(code):
@@ -60,7 +60,7 @@ class StageKeys(ParameterKeys):
 
     def action_confirm(self) -> None:
         """Confirm an unverified parameter, or keep an edit over another's change."""
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         code = self.listed.code
         if code in self.editor.changed_elsewhere:
@@ -92,7 +92,7 @@ class StageKeys(ParameterKeys):
 
     def action_undo_all(self) -> None:
         """Take every edit back, after asking."""
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         count = len(self.editor.edits)
         if not count:

@@ -19,7 +19,7 @@ class WriteKeys(ParameterKeys):
 
     def action_write(self, *, only: str = "") -> None:
         """Say what will be written, and write it."""
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
         from .write_text import write_text
 
         edits = [e for e in self.editor.edits if not only or e.code == only]
@@ -61,7 +61,7 @@ class WriteKeys(ParameterKeys):
     def _memory(
         self, question: str, order_of: Callable[[Profile], MemoryOrder], work: Callable[[], None]
     ) -> None:
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         try:
             order = order_of(self.session.profile)
@@ -81,7 +81,7 @@ class WriteKeys(ParameterKeys):
 
     def offer_to_follow(self) -> None:
         """Ask once whether to go where the drive answers now."""
-        from .confirm import Confirm
+        from .dialogs.confirm import Confirm
 
         moved = self.editor.moved
         if moved is None or self.editor.busy:

@@ -26,7 +26,7 @@ NAME_WIDTH = 30
 class PickParameter(ModalScreen[str | None]):
     """Gives the code of a parameter back, `none`, or None when it was left."""
 
-    CSS_PATH = "blocks.tcss"
+    CSS_PATH = "pick_parameter.tcss"
     BINDINGS: ClassVar = [
         Binding("escape", "dismiss(None)", "cancel", show=False),
         Binding("up", "step(-1)", "up", show=False, priority=True),
