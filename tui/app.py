@@ -17,6 +17,7 @@ from textual.screen import Screen
 from textual.widgets import Input
 
 from tui.bus.errors import LineClosed
+from tui.drive.plain import plain
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line, state_folder
 from tui.widgets.clock import Clock
@@ -253,7 +254,10 @@ class DrivePanelApp(LeanApp, Leaving):
         super()._handle_exception(error)
         place = state_folder() / "drivepanel.log"
         self._exit_renderables[:] = [
-            Text(f"The panel had to stop: an error of its own ({error}). More is in {place}.")
+            Text(
+                f"The panel had to stop: an error of its own ({plain(str(error), lines=True)})."
+                f" More is in {place}."
+            )
         ]
 
     async def connect(self, text: str) -> None:

@@ -8,6 +8,7 @@ import click
 
 from .errors import told
 from .options import Target, line_argument, settings_options
+from .say import say
 from .sets import file_argument, force_option, refuse_existing, set_of_drive, write_down
 
 
@@ -28,6 +29,6 @@ def backup(target: Target, file: Path, force: bool) -> None:
     refuse_existing(file, force=force)
     session, values = set_of_drive(target)
     write_down(file, dumps(session.profile, values), force=force)
-    click.echo(f"{file}: {len(values.raws)} parameters of {session.profile.name}")
+    say(f"{file}: {len(values.raws)} parameters of {session.profile.name}")
     for code, why in values.absent.items():
-        click.echo(f"drivepanel: {code} could not be read: {why}", err=True)
+        say(f"drivepanel: {code} could not be read: {why}", err=True)

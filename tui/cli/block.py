@@ -20,6 +20,7 @@ from .options import (
     settings_options,
 )
 from .orders import arm_option, close_journal, need_arming, permit_of
+from .say import say
 from .sets import dry_run_option, write_down
 
 if TYPE_CHECKING:
@@ -158,7 +159,7 @@ def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
         raise Failure("Not every slot could be read; nothing was saved.", DRIVE_REFUSED)
     note = f"{session.profile.name}, device {session.device}, {session.line_text}"
     write_down(file, dumps(session.profile, plans, note))
-    click.echo(f"{file}: {sum(len(plan.raws) for plan in plans)} slots of {session.profile.name}")
+    say(f"{file}: {sum(len(plan.raws) for plan in plans)} slots of {session.profile.name}")
     return DONE
 
 
@@ -179,12 +180,12 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
         refused += [problem.text for problem in refusing(found)]
         for problem in found:
             if not problem.refuses:
-                click.echo(problem.text, err=wanted.as_json)
+                say(problem.text, err=wanted.as_json)
         if not wanted.dry_run:
             continue
         for change in changes(held, plan):
             was, will = (describe(session.profile, plan.block, r) for r in (change.old, change.new))
-            click.echo(f"write  {change.slot}: {was} -> {will}")
+            say(f"write  {change.slot}: {was} -> {will}")
     if refused:
         raise Failure(" ".join(refused), REFUSED_HERE)
     if wanted.dry_run:
@@ -195,7 +196,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
             done = await write_assignment(
                 session, journal, plan, permit=permit_of(session), expected=held
             )
-            click.echo(f"{plan.block.name}: {done.text}", err=wanted.as_json)
+            say(f"{plan.block.name}: {done.text}", err=wanted.as_json)
     except AssignmentRefused as error:
         by_drive = isinstance(error.__cause__, DeviceException | NotTaken)
         if by_drive:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
-import click
+from .say import say
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -40,13 +40,13 @@ def show_blocks(
     for view in views:
         out.print(_table(session, view))
         if view.trouble:
-            click.echo(view.trouble)
+            say(view.trouble)
         if view.block.effective == "after-reset" and view.raws:
-            click.echo(AFTER_RESET)
+            say(AFTER_RESET)
         if frame_text := _frame(session, view):
-            click.echo(f"Request: {frame_text}")
-        click.echo("")
-    click.echo(
+            say(f"Request: {frame_text}")
+        say()
+    say(
         f"The monitoring set takes {costs[0] / 1000:.1f} ms a cycle on the wire read directly,"
         f" {costs[1] / 1000:.1f} ms with this assignment."
     )
@@ -170,10 +170,10 @@ def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> 
         reads = [stretch_json(stretch) for stretch in found]
         print_json({**_head(session, line_text), "blocks": [], "why": text, "reads": reads})
         return
-    click.echo(text)
+    say(text)
     for stretch in found:
         request = stretch.request
-        click.echo(
+        say(
             f"{request.count:2d} words from {request.address} (16#{request.address:04X}):"
             f" {', '.join(stretch.brings)}; {stretch.cost / 1000:.1f} ms,"
             f" one by one {stretch.alone / 1000:.1f} ms"

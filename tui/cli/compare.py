@@ -9,6 +9,7 @@ import click
 
 from .errors import USAGE, Failure, told
 from .options import Target, devices_option
+from .say import say
 from .sets import set_in, set_of_drive
 
 if TYPE_CHECKING:
@@ -74,7 +75,7 @@ def compare(
         for text, found in zip((a, b), sets, strict=True)
     ]
     rows = rows_of(profile, *sides, all_rows=all_rows)
-    click.echo(table(rows, (a, b), format_), nl=False)
+    say(table(rows, (a, b), format_).removesuffix("\n"))
     if any(row.differs for row in rows):
         raise click.exceptions.Exit(DIFFERENT)
 

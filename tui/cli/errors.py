@@ -12,6 +12,8 @@ from typing import ParamSpec, TypeVar
 
 import click
 
+from .say import say
+
 DONE, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE = 0, 2, 3, 4, 5
 
 P = ParamSpec("P")
@@ -32,7 +34,7 @@ class Failure(click.ClickException):
 
     def show(self, file: object = None) -> None:
         """Print the message on standard error."""
-        click.echo(f"drivepanel: {self.message}", err=True)
+        say(f"drivepanel: {self.message}", err=True)
 
 
 @contextmanager

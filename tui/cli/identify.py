@@ -6,8 +6,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.drive.plain import plain
+
 from .errors import told
 from .options import device_option, json_option, line_argument, on_line, read_only_option
+from .say import say
 
 if TYPE_CHECKING:
     from tui.session.identify import DriveIdentity
@@ -34,7 +37,7 @@ def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> Non
         keys = ("device", "vendor", "reference", "version", "name", "profile")
         print_json({key: getattr(found, key) for key in keys})
         return
-    click.echo(f"Device     {found.device}")
+    say(f"Device     {found.device}")
     for title, text in (
         ("Vendor", found.vendor),
         ("Reference", found.reference),
@@ -42,7 +45,7 @@ def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> Non
         ("Name", found.name),
         ("Profile", found.profile or _choices(found)),
     ):
-        click.echo(f"{title:<10} {text or '-----'}")
+        say(f"{title:<10} {plain(text) or '-----'}")
 
 
 def _choices(found: DriveIdentity) -> str:

@@ -15,6 +15,7 @@ from tui.session.work import Kind, Outcome
 
 from .errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
 from .options import Target, connect, drive_options, line_argument, on_line, read_only_option
+from .say import say
 
 if TYPE_CHECKING:
     from tui.session.command import Commander
@@ -47,7 +48,7 @@ arm_option = click.option(
 def complain(text: str) -> None:
     """Say something on standard error, if anybody is there: what is under way goes on."""
     with suppress(OSError):
-        click.echo(f"drivepanel: {text}", err=True)
+        say(f"drivepanel: {text}", err=True)
 
 
 def close_journal(journal: Journal) -> None:
@@ -202,7 +203,7 @@ def _ordered(
             arm_drive(console)
             return await work(console)
 
-    click.echo(on_line(target.line_text, at_console, read_only=read_only))
+    say(on_line(target.line_text, at_console, read_only=read_only))
 
 
 @click.command()

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from datetime import UTC, datetime
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal
 
+from tui.drive.plain import commands, plain
+
 if TYPE_CHECKING:
     from rich.console import Console
+    from rich.segment import Segment
     from rich.table import Table
 
     from tui.session.drive import DriveSession
@@ -37,9 +40,16 @@ PIPE_WIDTH = 200
 
 def print_json(data: object, *, compact: bool = False) -> None:
     """Print JSON on standard output, at once."""
-    text = json.dumps(data, ensure_ascii=False, indent=None if compact else 2)
-    sys.stdout.write(text + "\n")
+    sys.stdout.write(json_text(data, compact=compact) + "\n")
     sys.stdout.flush()
+
+
+def json_text(data: object, *, compact: bool = True) -> str:
+    """JSON that a terminal may be given: every character that could command one is escaped."""
+    text = json.dumps(data, ensure_ascii=False, indent=None if compact else 2)
+    if text.replace("\n", "").isprintable():
+        return text
+    return "".join(json.dumps(c)[1:-1] if c != "\n" and commands(c) else c for c in text)
 
 
 def readings_json(
@@ -84,15 +94,26 @@ def iso_time(wall: float) -> str:
 def console() -> Console:
     """A console on standard output, wide where that is no terminal, so that no line is folded.
 
+    Nothing that is printed on it is markup, and no control character of a text reaches it.
     Raises BrokenPipeError where its reader went away.
     """
     from rich.console import Console
+    from rich.segment import Segment
 
     class Plain(Console):
         def on_broken_pipe(self) -> None:
             raise BrokenPipeError
 
-    return Plain(width=None if sys.stdout.isatty() else PIPE_WIDTH, highlight=False)
+        def render(self, *args: Any, **how: Any) -> Iterator[Segment]:
+            for text, style, control in super().render(*args, **how):
+                yield Segment(text if control else plain(text, lines=True), style, control)
+
+    return Plain(
+        width=None if sys.stdout.isatty() else PIPE_WIDTH,
+        highlight=False,
+        markup=False,
+        emoji=False,
+    )
 
 
 def print_readings(readings: Mapping[str, Reading]) -> None:

@@ -6,6 +6,7 @@ import click
 
 from .errors import told
 from .options import json_option
+from .say import say
 
 
 @click.command()
@@ -24,9 +25,7 @@ def ports(as_json: bool) -> None:
         )
         return
     if not found:
-        click.echo(
-            "No serial port found. Plug in the adapter, or use tcp:HOST or rtu-tcp:HOST:PORT."
-        )
+        say("No serial port found. Plug in the adapter, or use tcp:HOST or rtu-tcp:HOST:PORT.")
     for port, by in found:
         used = f"  in use by {by}" if by else ""
-        click.echo(f"{port.path:<20} {port.description}{used}")
+        say(f"{port.path:<20} {port.description}{used}")

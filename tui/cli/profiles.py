@@ -9,6 +9,7 @@ import click
 
 from .errors import told
 from .options import json_option
+from .say import say
 
 if TYPE_CHECKING:
     from tui.drive.profile import Profile
@@ -31,7 +32,7 @@ def profiles(profile_id: str | None, file: Path | None, as_json: bool) -> None:
 
     if file is not None:
         checked = library.load_file(file)
-        click.echo(f"{file}: {checked.name}, {len(checked.parameters)} parameters, no fault found.")
+        say(f"{file}: {checked.name}, {len(checked.parameters)} parameters, no fault found.")
     elif profile_id is not None:
         _show(library.load(profile_id), as_json)
     else:
@@ -50,7 +51,7 @@ def _list(as_json: bool) -> None:
         return
     for listing in found:
         own = "  (your own)" if listing.own else ""
-        click.echo(
+        say(
             f"{listing.id:<12} {listing.vendor:<20} {listing.name:<22}"
             f" {listing.parameters:>4} parameters{own}"
         )

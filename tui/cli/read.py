@@ -16,6 +16,7 @@ from .options import (
     on_line,
     read_only_option,
 )
+from .say import say
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
@@ -57,6 +58,6 @@ def read(
         print_readings(readings)
     refused = [reading for reading in readings.values() if reading.raw is None]
     for reading in refused:
-        click.echo(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
+        say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
     if refused:
         raise click.exceptions.Exit(DRIVE_REFUSED)

@@ -8,6 +8,7 @@ import click
 
 from .errors import told
 from .options import Target, line_argument, settings_options
+from .say import say
 from .sets import file_argument, force_option, refuse_existing, set_of_drive, write_down
 
 
@@ -31,4 +32,4 @@ def report(target: Target, file: Path, force: bool) -> None:
     session, values = set_of_drive(target)
     entries = entries_of(Journal(), session.line_text, target.device)
     write_down(file, text_of(session.profile, values, entries), force=force)
-    click.echo(f"{file}: report on {session.profile.name} at address {target.device}")
+    say(f"{file}: report on {session.profile.name} at address {target.device}")

@@ -19,6 +19,7 @@ from .options import (
     read_only_option,
 )
 from .orders import arm_option, close_journal, need_arming, permit_of
+from .say import say
 from .sets import (
     codes_of,
     confirm_option,
@@ -110,7 +111,7 @@ async def _in_turn(
     opened: OpenLine, device: int, one: Callable[[OpenLine, int], Awaitable[int]]
 ) -> int:
     """One of several drives; what is wrong with it is told, and the next one is tried."""
-    click.echo(f"Device {device}:")
+    say(f"Device {device}:")
     try:
         return await one(opened, device)
     except click.ClickException as error:
@@ -120,7 +121,7 @@ async def _in_turn(
         if known is None:
             raise
         status, text = known, str(error)
-    click.echo(f"drivepanel: device {device}: {text}", err=True)
+    say(f"drivepanel: device {device}: {text}", err=True)
     return status
 
 
@@ -142,19 +143,17 @@ def say_plan(session: DriveSession, plan: RestorePlan) -> None:
     held = {edit.code: edit.old for edit in plan.edits if edit.old is not None}
     for edit in ordered(session.profile, plan.edits, held):
         item = items[edit.code]
-        click.echo(f"write  {item.code}: {item.old} -> {item.new}  {item.text}".rstrip())
+        say(f"write  {item.code}: {item.old} -> {item.new}  {item.text}".rstrip())
     for item in plan.of_kind("skip"):
         if item.reason != "no setting":
             value = f" {item.new}" if item.new else ""
-            click.echo(f"leave  {item.code}{value}: {item.text}")
+            say(f"leave  {item.code}{value}: {item.text}")
     if plan.same_rating is False and not plan.across:
-        click.echo("The set is of another model or rating than this drive.")
+        say("The set is of another model or rating than this drive.")
     if plan.across:
-        click.echo(
-            "The set is of another family: common quantities are carried over in their units."
-        )
+        say("The set is of another family: common quantities are carried over in their units.")
     stop = " Some of it needs the motor stopped." if plan.needs_stop else ""
-    click.echo(
+    say(
         f"{plan.count('write')} to write, {plan.count('equal')} equal already,"
         f" {plan.count('skip')} left out.{stop}"
     )
@@ -171,7 +170,7 @@ async def _restore(
 
     source = library.load(values.head.profile)
     if told_before := Mark.of(session).interrupted:
-        click.echo(told_before)
+        say(told_before)
     journal, permit = Journal(), permit_of(session)
     try:
         done = await bring_back(
@@ -180,16 +179,16 @@ async def _restore(
         )  # fmt: skip
         say_plan_left_out(done.plan)
         for link in done.links:
-            click.echo(link.text)
+            say(link.text)
         saved = save and done.complete
         if saved:
-            click.echo(await save_to_eeprom(session, journal, permit))
+            say(await save_to_eeprom(session, journal, permit))
         say_afterwards(done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
-        click.echo(f"{written} written and read back, {len(done.left)} not.")
+        say(f"{written} written and read back, {len(done.left)} not.")
         if done.complete:
             return DONE
-        click.echo("drivepanel: The same command writes what is missing.", err=True)
+        say("drivepanel: The same command writes what is missing.", err=True)
         return status_of_results(done.results) or DRIVE_REFUSED
     finally:
         close_journal(journal)
@@ -203,4 +202,4 @@ def say_plan_left_out(plan: RestorePlan) -> None:
             reasons.setdefault(item.reason, []).append(item.code)
     for reason, codes in reasons.items():
         more = f" and {len(codes) - NAMED} more" if len(codes) > NAMED else ""
-        click.echo(f"left out, {reason}: {', '.join(codes[:NAMED])}{more}")
+        say(f"left out, {reason}: {', '.join(codes[:NAMED])}{more}")

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import asyncio
-import json
 import os
 import queue
 import signal
@@ -41,6 +40,7 @@ from .orders import (
     watch_of,
     watched,
 )
+from .say import printable
 from .status import fault_text, shown_values, values_json
 
 if TYPE_CHECKING:
@@ -123,7 +123,7 @@ class Voice:
 
     def say(self, text: str) -> None:
         """Put a line out as soon as the reader takes it."""
-        line = f"{text}{os.linesep}".encode(self._encoding, errors="replace")
+        line = f"{printable(text, self._encoding)}{os.linesep}".encode(self._encoding)
         while True:
             try:
                 return self._lines.put_nowait(line)
@@ -278,7 +278,7 @@ class Run:
         return "  ".join([latest.state.headline, *(f"{k} {v}" for k, v in values.items())])
 
     def _tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
-        from .output import iso_time
+        from .output import iso_time, json_text
 
         now = time.time()
         if not self.wish.as_json:
@@ -295,7 +295,7 @@ class Run:
                 "values": values_json(self.console.session.profile, latest.readings),
                 "error": latest.error or None,
             }
-        self.voice.say(json.dumps(data, ensure_ascii=False))
+        self.voice.say(json_text(data))
 
     async def _bring_to_rest(self) -> None:
         """Stop the motor and see it stand; on a lost line as soon as that is back.

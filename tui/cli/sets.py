@@ -13,6 +13,7 @@ import click
 
 from .errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, USAGE, Failure
 from .options import Target, connect, on_line
+from .say import say, say_over
 
 if TYPE_CHECKING:
     from tui.drive.parameter_set import ParameterSet
@@ -127,9 +128,7 @@ def counter(what: str) -> Callable[[int, int], None] | None:
         return None
 
     def show(done: int, of: int) -> None:
-        end = "\n" if done >= of else ""
-        click.echo(f"\r{what}: {done} of {of}", err=True, nl=False)
-        click.echo(end, err=True, nl=False)
+        say_over(f"{what}: {done} of {of}", last=done >= of)
 
     return show
 
@@ -137,7 +136,7 @@ def counter(what: str) -> Callable[[int, int], None] | None:
 def say_result(done: int, of: int, result: Result) -> None:
     """One written or refused setting: on standard output, or as an error."""
     text = f"{done}/{of}  {result.text}"
-    click.echo(text if result.done else f"drivepanel: {text}", err=not result.done)
+    say(text if result.done else f"drivepanel: {text}", err=not result.done)
 
 
 def status_of_results(results: Iterable[Result]) -> int:
@@ -160,6 +159,6 @@ def status_of_results(results: Iterable[Result]) -> int:
 def say_afterwards(after_reset: Iterable[str], unsaved: Iterable[str], *, saved: bool) -> None:
     """What a person has to know once settings are written."""
     if waiting := ", ".join(after_reset):
-        click.echo(f"In force only after the next reset of the drive: {waiting}.")
+        say(f"In force only after the next reset of the drive: {waiting}.")
     if any(True for _ in unsaved) and not saved:
-        click.echo("Lost at power-off until they are saved: --save does that, motor stopped.")
+        say("Lost at power-off until they are saved: --save does that, motor stopped.")

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .errors import told
+from .say import say
 
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, FaultRates, Simulation
@@ -94,7 +95,7 @@ def simulate(
     with simulation:
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
-        click.echo(f"Ready: {names} on {where}. Ctrl-C ends it.")
+        say(f"Ready: {names} on {where}. Ctrl-C ends it.")
         stop.wait()
 
 

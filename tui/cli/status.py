@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tui.drive.plain import plain
+
 from .errors import told
 from .options import (
     Target,
@@ -18,6 +20,7 @@ from .options import (
     on_line,
     read_only_option,
 )
+from .say import say
 
 if TYPE_CHECKING:
     from tui.drive.profile import Profile
@@ -234,4 +237,4 @@ def status(
         print_json(status_json(target.line_text, found))
         return
     for title, text in status_lines(found):
-        click.echo(f"{title:<17} {text or '-----'}")
+        say(f"{title:<17} {plain(text) or '-----'}")

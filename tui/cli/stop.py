@@ -21,6 +21,7 @@ from .options import (
     unidentified,
 )
 from .orders import close_journal, complain
+from .say import say
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
@@ -148,7 +149,7 @@ async def _seen_through(stopper: Stopper, found: Found, order: OrderId) -> int:
     who = f"Device {session.device}, {found.name}"
     if report.phase is Phase.STOPPED:
         with suppress(OSError):  # a reader that went away must not end the other stops
-            click.echo(f"{who}: {report.text}.")
+            say(f"{who}: {report.text}.")
         return 0
     complain(f"{who}: {report.text}")
     return await _why(session)

@@ -9,10 +9,9 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TextIO
 
-import click
-
 from .errors import USAGE, Failure
 from .output import console, iso_time, print_json, readings_json, readings_table
+from .say import say
 
 if TYPE_CHECKING:
     from rich.live import Live
@@ -42,7 +41,7 @@ class JsonOutput:
         data = readings_json(self._line_text, self._session, snapshot.readings)
         print_json({"time": iso_time(snapshot.wall), **data}, compact=True)
         if snapshot.error and not self._trouble:
-            click.echo(f"drivepanel: {snapshot.error}", err=True)
+            say(f"drivepanel: {snapshot.error}", err=True)
         self._trouble = bool(snapshot.error)
 
 
@@ -53,7 +52,7 @@ class LineOutput:
         """Print one cycle as a line; a value that is not good is in brackets."""
         values = "  ".join(_shown(code, one) for code, one in snapshot.readings.items())
         parts = (_clock(snapshot), snapshot.state.headline, values, snapshot.error)
-        print("  ".join(part for part in parts if part), flush=True)
+        say("  ".join(part for part in parts if part))
 
 
 class TableOutput:

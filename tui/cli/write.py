@@ -9,6 +9,7 @@ import click
 from .errors import DONE, told
 from .options import Target, connect, line_argument, on_line, read_only_option, settings_options
 from .orders import arm_option, close_journal, need_arming, permit_of
+from .say import say
 from .sets import (
     codes_of,
     confirm_option,
@@ -58,7 +59,7 @@ def write(
         edits = await _staged(session, typed)
         if dry_run:
             for edit in edits:
-                click.echo(f"write  {edit.code}: {edit.old_text} -> {edit.text}")
+                say(f"write  {edit.code}: {edit.old_text} -> {edit.text}")
             return DONE
         return await _write(session, edits, confirmed, save=save)
 
@@ -98,9 +99,9 @@ async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
         edits = edits.stage(profile, code, value, asker.raws, asker.lacking)
     for edit in edits.asked:
         if edit.remark:
-            click.echo(edit.remark)
+            say(edit.remark)
     for text in consequences(profile, edits, asker.raws, asker.lacking):
-        click.echo(text)
+        say(text)
     return edits
 
 
@@ -112,7 +113,7 @@ async def _write(
     from tui.session.memory import save_to_eeprom
 
     if not len(edits):
-        click.echo("The drive holds these values already.")
+        say("The drive holds these values already.")
     journal, permit = Journal(), permit_of(session)
     try:
         done = await apply_edits(
@@ -124,10 +125,10 @@ async def _write(
             progress=say_result,
         )
         for link in done.links:
-            click.echo(link.text)
+            say(link.text)
         saved = save and len(done.written) == len(done.results) and not done.stopped
         if saved:
-            click.echo(await save_to_eeprom(session, journal, permit))
+            say(await save_to_eeprom(session, journal, permit))
         say_afterwards(done.after_reset, done.unsaved, saved=saved)
         return status_of_results(done.results)
     finally:

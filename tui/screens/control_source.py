@@ -7,7 +7,6 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.widgets import OptionList
-from textual.widgets.option_list import Option
 
 from tui.bus.errors import LineError
 from tui.drive.control_source import changes, source_codes, source_in_force
@@ -18,6 +17,7 @@ from tui.widgets.drawing import armed_text, rule
 from tui.widgets.lines import Lines
 from tui.widgets.monitor_orders import outcome_lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.plain import entry
 
 from .actions import SOURCES, bindings
 from .orders import OrderKeys
@@ -79,7 +79,7 @@ class ControlSourceScreen(OrderKeys):
             text.append(" ● " if source is today else " · ", STRONG if source is today else FAINT)
             text.append(source.name, STRONG if source is today else PLAIN)
             text.append("   today" if source is today else "", FAINT)
-            options.add_option(Option(text))
+            options.add_option(entry(text))
         options.highlighted = at
 
     @property

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 from rich.text import Text
 from textual.widgets import OptionList
-from textual.widgets.option_list import Option
+
+from tui.widgets.plain import entry
 
 from .found import State, drive_line
 
@@ -35,6 +36,6 @@ class DriveList(OptionList):
             return
         chosen = self.highlighted
         self.clear_options()
-        self.add_options(Option(line, id=id) for id, line in lines.items())
+        self.add_options(entry(line, id=id) for id, line in lines.items())
         if lines:
             self.highlighted = min(chosen or 0, len(lines) - 1)

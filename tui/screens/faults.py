@@ -9,7 +9,6 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
 from textual.widgets import OptionList
-from textual.widgets.option_list import Option
 
 from tui.bus.errors import LineError
 from tui.session.console import DriveConsole
@@ -20,6 +19,7 @@ from tui.widgets.drawing import rule
 from tui.widgets.fault_view import fault_lines, history_line, record_lines, stored_lines
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, STRONG
+from tui.widgets.plain import entry
 
 from .actions import FAULTS, bindings
 from .base import PanelScreen
@@ -93,13 +93,11 @@ class FaultsScreen(PanelScreen):
         profile = self.session.profile
         options.clear_options()
         for number, code in enumerate(profile.data.faults.history, start=1):
-            options.add_option(
-                Option(history_line(profile, number, code, self._readings, LEFT - 2))
-            )
+            options.add_option(entry(history_line(profile, number, code, self._readings, LEFT - 2)))
         if profile.data.faults.history:
             options.highlighted = at
         else:
-            options.add_option(Option(Text(" not known on this drive"), disabled=True))
+            options.add_option(entry(Text(" not known on this drive"), disabled=True))
 
     def on_option_list_option_highlighted(self) -> None:
         """Another fault of the history is looked at."""

@@ -10,9 +10,9 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
-from textual.widgets import Static
 
 from tui.widgets.palette import ALARM, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
+from tui.widgets.plain import Plain
 
 from .actions import of_screen
 
@@ -43,14 +43,16 @@ class HelpScreen(ModalScreen[None]):
     def compose(self) -> ComposeResult:
         """One text that scrolls where the terminal is small."""
         with VerticalScroll(id="help"):
-            yield Static(help_text(self._of))
+            yield Plain(help_text(self._of))
 
 
 def help_text(screen: str) -> Table:
     """Keys and signs of a screen, each sentence in a column of its own."""
     table = Table.grid(padding=(0, 2, 0, 0))
-    head = Text.assemble((f"Keys on {screen.capitalize()}", TITLE), ("   Esc closes", FAINT))
-    table.add_row(Text("", no_wrap=True), head)
+    table.add_row(
+        Text("", no_wrap=True),
+        Text.assemble((f"Keys on {screen.capitalize()}", TITLE), ("   Esc closes", FAINT)),
+    )
     for action in of_screen(screen):
         table.add_row(Text(action.shown, KEY, no_wrap=True), Text(action.help, PLAIN))
     table.add_row("", "")

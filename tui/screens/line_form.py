@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
-from textual.widgets import Input, Label
+from textual.widgets import Input
 
 from tui.session.addresses import parse_addresses
+from tui.widgets.fields import NumberInput
+from tui.widgets.plain import Plain
 
 BAUD, FORMAT = "19200", "8E1"
 
@@ -17,15 +19,15 @@ class LineForm(Vertical):
     def compose(self) -> ComposeResult:
         """The fields with their names."""
         with Horizontal(classes="settings"):
-            yield Label("Baud")
-            yield Input(BAUD, id="baud", type="integer", max_length=6, compact=True)
-            yield Label("Format")
-            yield Input(FORMAT, id="format", max_length=3, compact=True)
+            yield Plain("Baud")
+            yield NumberInput(BAUD, id="baud", type="integer", max_length=6)
+            yield Plain("Format")
+            yield NumberInput(FORMAT, id="format", max_length=3)
         with Horizontal(classes="settings"):
-            yield Label("Ask")
-            yield Input("1-10", id="addresses", compact=True)
-            yield Label("Profile")
-            yield Input("", id="profile", placeholder="identify", compact=True)
+            yield Plain("Ask")
+            yield NumberInput("1-10", id="addresses")
+            yield Plain("Profile")
+            yield NumberInput("", id="profile", placeholder="identify")
 
     def line_at(self, path: str) -> str:
         """The LINE of a serial port with these settings."""

@@ -8,6 +8,7 @@ from textual.widgets.option_list import Option
 
 from tui.session.state import recent_lines
 from tui.widgets.palette import FAINT
+from tui.widgets.plain import entry
 
 from .choices import Group, LineChoice, choice_line, groups
 
@@ -68,11 +69,11 @@ class LineList(OptionList):
 
     def _rows(self, group: Group, width: int) -> list[Option]:
         """A heading with its lines, or with what is said of none."""
-        found = [Option(Text(group.title, FAINT), disabled=True)]
+        found = [entry(Text(group.title, FAINT), disabled=True)]
         for choice in group.choices:
             key = f"{group.title} {choice.text}"
             self._choices[key] = choice
-            found.append(Option(choice_line(choice, width), id=key))
+            found.append(entry(choice_line(choice, width), id=key))
         if not group.choices:
-            found.append(Option(Text(f"  {group.empty}", FAINT), disabled=True))
+            found.append(entry(Text(f"  {group.empty}", FAINT), disabled=True))
         return found

@@ -7,7 +7,11 @@ from typing import TYPE_CHECKING
 
 from textual.app import App
 
+from tui.drive.plain import plain
+
 if TYPE_CHECKING:
+    from textual.notifications import SeverityLevel
+
     from tui.drive.schema import OrderId
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
@@ -35,6 +39,28 @@ class Panel(App[None]):
     @abstractmethod
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
         """Stop one drive, in its own way."""
+
+    def notify(
+        self,
+        message: str,
+        *,
+        title: str = "",
+        severity: SeverityLevel = "information",
+        timeout: float | None = None,
+        markup: bool = False,
+    ) -> None:
+        """Show a notice, which is text and never markup."""
+        super().notify(
+            plain(message, lines=True),
+            title=plain(title),
+            severity=severity,
+            timeout=timeout,
+            markup=False,
+        )
+
+    def action_help_quit(self) -> None:
+        """Ctrl+C ends nothing here."""
+        self.notify("Ctrl+C ends nothing here: q leaves the panel.", timeout=5)
 
     @property
     def line_text(self) -> str:

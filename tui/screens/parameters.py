@@ -10,6 +10,7 @@ from textual.containers import Horizontal
 from textual.widgets import Input
 
 from tui.widgets.drawing import rule
+from tui.widgets.fields import Field
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, STRONG
 from tui.widgets.parameter_view import (
@@ -45,7 +46,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         """The search above, the table, the details below."""
         with Horizontal(id="top"):
             yield Lines(id="title")
-            yield Input(placeholder="/ search", id="search", compact=True)
+            yield Field(placeholder="/ search", id="search")
         yield Lines(id="head")
         yield Lines(id="table")
         yield Lines(id="detail")

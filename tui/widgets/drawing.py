@@ -9,6 +9,8 @@ from decimal import Decimal
 from rich.style import Style
 from rich.text import Text
 
+from tui.drive.plain import plain
+
 from .palette import (
     ALARM,
     ATTENTION_BLOCK,
@@ -41,6 +43,7 @@ def rule(title: str, width: int, right: str = "") -> Text:
 
 def short(text: str, width: int) -> str:
     """The text in at most so many cells, with an ellipsis where it is too long."""
+    text = plain(text)
     return f"{text[: width - 1]}…" if len(text) > width else text
 
 
@@ -53,6 +56,7 @@ def wrapped(text: str, width: int, most: int) -> list[str]:
     """The text in lines of that width, at most so many."""
     if not text or most < 1:
         return []
+    text = plain(text, lines=True)
     return textwrap.wrap(text, width, max_lines=most, placeholder=" …")
 
 

@@ -18,6 +18,8 @@ from textual.app import App
 from textual.screen import Screen
 from textual.strip import Strip
 
+from tui.drive.plain import commands
+
 Cell = tuple[str, str]
 """A character and its colours; none where the one to the left takes two cells."""
 
@@ -111,7 +113,7 @@ def cells_of(strip: Strip, colours: ColorSystem) -> list[Cell]:
             width = get_character_cell_size(character)
             if width:
                 found += [(character, ansi), *[("", ansi)] * (width - 1)]
-            elif found:
+            elif found and not commands(character):
                 found[-1] = (found[-1][0] + character, found[-1][1])
     return found
 

@@ -10,6 +10,8 @@ from textual.geometry import Region, Size
 from textual.strip import Strip
 from textual.widget import Widget
 
+from tui.drive.plain import plain
+
 
 class Lines(Widget):
     """Text lines at fixed places; showing the same lines again costs nothing."""
@@ -76,7 +78,7 @@ class Lines(Widget):
             return Strip.blank(width, style)
         line = self._lines[y]
         # rich drops the style of a text that has no spans
-        styled = Text(line.plain, end="")
+        styled = Text(plain(line.plain), end="")
         styled.stylize(line.style)
         for span in line.spans:
             styled.stylize(span.style, span.start, span.end)

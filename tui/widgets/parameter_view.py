@@ -221,7 +221,9 @@ def news_lines(editor: Editor, code: str, message: Text, width: int) -> list[Tex
 
 
 def _wrapped(text: Text, width: int, most: int) -> list[Text]:
-    lines: list[Text] = list(text.wrap(Console(width=width), width - 3)) if text.plain else []
+    lines: list[Text] = (
+        list(text.wrap(Console(width=width, markup=False), width - 3)) if text.plain else []
+    )
     if len(lines) > most > 0:
         lines[most - 1].append(" …")
     return lines[:most]

@@ -9,7 +9,10 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Input, Label
+from textual.widgets import Input
+
+from tui.widgets.fields import Field
+from tui.widgets.plain import Plain
 
 Check = Callable[[str], str]
 """What is wrong with a text, or nothing."""
@@ -31,16 +34,16 @@ class Ask(ModalScreen[str | None]):
     def compose(self) -> ComposeResult:
         """A field, room for what is wrong, and what an answer looks like."""
         with Vertical(id="dialog"):
-            yield Label(self._question, id="question")
-            yield Input(self._text, id="answer", compact=True)
-            yield Label("", id="fault")
-            yield Label(self._about, id="about")
-            yield Label("Enter accept   Esc cancel", id="hint")
+            yield Plain(self._question, id="question")
+            yield Field(self._text, id="answer")
+            yield Plain("", id="fault")
+            yield Plain(self._about, id="about")
+            yield Plain("Enter accept   Esc cancel", id="hint")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Give the answer back if nothing is wrong with it."""
         fault = self._check(event.value)
         if fault:
-            self.query_one("#fault", Label).update(fault)
+            self.query_one("#fault", Plain).update(fault)
         else:
             self.dismiss(event.value.strip())

@@ -8,7 +8,8 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Label
+
+from tui.widgets.plain import Plain
 
 
 class Confirm(ModalScreen[bool]):
@@ -29,6 +30,6 @@ class Confirm(ModalScreen[bool]):
     def compose(self) -> ComposeResult:
         """What is asked, what follows, and the keys."""
         with Vertical(id="dialog"):
-            yield Label(self._question, id="question")
-            yield Label(self._follows, id="follows")
-            yield Label(self._keys, id="hint")
+            yield Plain(self._question, id="question")
+            yield Plain(self._follows, id="follows")
+            yield Plain(self._keys, id="hint")

@@ -11,15 +11,16 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Input, Label, OptionList
-from textual.widgets.option_list import Option
+from textual.widgets import Input, OptionList
 
 from tui.drive.errors import DriveError
 from tui.drive.schema import Parameter
 from tui.drive.values import encode
 from tui.session.editor import Editor
+from tui.widgets.fields import Field
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.parameter_view import factory_text, range_text, value_text
+from tui.widgets.plain import Plain, entry
 
 
 class EditNumber(ModalScreen[str | None]):
@@ -46,16 +47,14 @@ class EditNumber(ModalScreen[str | None]):
         value = editor.value(parameter.code, raw) if raw is not None else None
         limits, factory = range_text(editor, parameter), factory_text(editor, parameter)
         with Vertical(id="dialog"):
-            yield Label(f"{parameter.code}  {parameter.name}", id="question")
-            yield Input(
-                value.text if value else "", id="answer", compact=True, select_on_focus=True
-            )
-            yield Label("", id="held")
+            yield Plain(f"{parameter.code}  {parameter.name}", id="question")
+            yield Field(value.text if value else "", id="answer", select_on_focus=True)
+            yield Plain("", id="held")
             about = [f"now {value_text(editor, parameter.code)}"]
             about += [f"range {limits}"] if limits else []
             about += [f"factory {factory}"] if factory else []
-            yield Label("   ".join(about), id="about")
-            yield Label("Enter stages it   Up Down one step   Esc cancel", id="hint")
+            yield Plain("   ".join(about), id="about")
+            yield Plain("Enter stages it   Up Down one step   Esc cancel", id="hint")
 
     def on_mount(self) -> None:
         """Tell what stands there."""
@@ -67,7 +66,7 @@ class EditNumber(ModalScreen[str | None]):
 
     def _check(self, text: str) -> bool:
         """Show what the text comes to; whether it may be staged."""
-        held = self.query_one("#held", Label)
+        held = self.query_one("#held", Plain)
         editor, parameter = self._editor, self._parameter
         try:
             edits = editor.edits.stage(
@@ -124,13 +123,13 @@ class PickValue(ModalScreen[int | None]):
     def compose(self) -> ComposeResult:
         """The list with the held value marked."""
         with Vertical(id="dialog"):
-            yield Label(f"{self._parameter.code}  {self._parameter.name}", id="question")
+            yield Plain(f"{self._parameter.code}  {self._parameter.name}", id="question")
             yield OptionList(
-                *(Option(self._line(raw, name)) for raw, name in self._names),
+                *(entry(self._line(raw, name)) for raw, name in self._names),
                 id="choices",
                 compact=True,
             )
-            yield Label("Enter stages it   Esc cancel", id="hint")
+            yield Plain("Enter stages it   Esc cancel", id="hint")
 
     def on_mount(self) -> None:
         """Begin at the staged or held value."""
@@ -176,10 +175,10 @@ class EditBits(ModalScreen[int | None]):
         """Every named bit; reserved ones cannot be chosen."""
         parameter = self._parameter
         with Vertical(id="dialog"):
-            yield Label(f"{parameter.code}  {parameter.name}", id="question")
+            yield Plain(f"{parameter.code}  {parameter.name}", id="question")
             yield OptionList(id="choices", compact=True)
-            yield Label("", id="held")
-            yield Label("Enter turns a bit   s stages the word   Esc cancel", id="hint")
+            yield Plain("", id="held")
+            yield Plain("Enter turns a bit   s stages the word   Esc cancel", id="hint")
 
     def on_mount(self) -> None:
         """Show the word."""
@@ -195,10 +194,10 @@ class EditBits(ModalScreen[int | None]):
             text.append(f"{bit.name}", STRONG if on != was else PLAIN)
             words = bit.on if on else bit.off
             text.append(f": {words}" if words else "", FAINT)
-            options.add_option(Option(text, disabled=bit.bit in self._parameter.reserved))
+            options.add_option(entry(text, disabled=bit.bit in self._parameter.reserved))
         options.highlighted = at
         shown = f"16#{self._held:04X} → 16#{self._word:04X}"
-        self.query_one("#held", Label).update(Text(shown, STRONG))
+        self.query_one("#held", Plain).update(Text(shown, STRONG))
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Turn the bit over."""

@@ -8,7 +8,8 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Label
+
+from tui.widgets.plain import Plain
 
 Choice = Literal["stop", "leave", "stay"]
 
@@ -30,6 +31,6 @@ class Leave(ModalScreen[Choice]):
     def compose(self) -> ComposeResult:
         """What runs, what happens when it is left, and the keys."""
         with Vertical(id="dialog"):
-            yield Label("A motor runs by your order", id="question")
-            yield Label(self._follows, id="follows")
-            yield Label("s or Enter: stop and leave   l: leave it running   Esc: stay", id="hint")
+            yield Plain("A motor runs by your order", id="question")
+            yield Plain(self._follows, id="follows")
+            yield Plain("s or Enter: stop and leave   l: leave it running   Esc: stay", id="hint")

@@ -10,11 +10,11 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Label, OptionList
-from textual.widgets.option_list import Option
+from textual.widgets import OptionList
 
 from tui.drive.schema import CommandOption
 from tui.widgets.palette import FAINT, PLAIN, STRONG
+from tui.widgets.plain import Plain, entry
 
 
 class OptionsScreen(ModalScreen[tuple[CommandOption, int] | None]):
@@ -34,13 +34,13 @@ class OptionsScreen(ModalScreen[tuple[CommandOption, int] | None]):
     def compose(self) -> ComposeResult:
         """The list and its keys."""
         with Vertical(id="dialog"):
-            yield Label("Options of the commands", id="question")
+            yield Plain("Options of the commands", id="question")
             yield OptionList(
-                *(Option(line, id=str(at)) for at, (_, _, line) in enumerate(self._choices)),
+                *(entry(line, id=str(at)) for at, (_, _, line) in enumerate(self._choices)),
                 id="choices",
                 compact=True,
             )
-            yield Label("Enter sets it   Esc cancel", id="hint")
+            yield Plain("Enter sets it   Esc cancel", id="hint")
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Give the choice back."""

@@ -9,14 +9,15 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
 from textual.screen import ModalScreen
-from textual.widgets import Input, Label, OptionList
-from textual.widgets.option_list import Option
+from textual.widgets import Input, OptionList
 
 from tui.drive.mapping import choices
 from tui.drive.profile import Profile, is_verified
 from tui.drive.schema import Block, Parameter
 from tui.widgets.drawing import cut
+from tui.widgets.fields import Field
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.plain import Plain, entry
 
 MOST = 100
 """Parameters that are listed at once; a search brings the others."""
@@ -41,11 +42,11 @@ class PickParameter(ModalScreen[str | None]):
     def compose(self) -> ComposeResult:
         """A search, and what it finds."""
         with Vertical(id="dialog"):
-            yield Label(f"{self._slot} stands for", id="question")
-            yield Input(placeholder="code, number, address or name", id="search", compact=True)
+            yield Plain(f"{self._slot} stands for", id="question")
+            yield Field(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
-            yield Label("", id="count")
-            yield Label("Enter takes it   Up, Down   Esc cancel", id="hint")
+            yield Plain("", id="count")
+            yield Plain("Enter takes it   Up, Down   Esc cancel", id="hint")
 
     def on_mount(self) -> None:
         """Everything that the slot can stand for."""
@@ -64,11 +65,11 @@ class PickParameter(ModalScreen[str | None]):
         options.clear_options()
         lines = [self._line(parameter) for parameter in self._found]
         unused = [] if search else [Text(" none      the slot is unused", FAINT)]
-        options.add_options([Option(line) for line in (*unused, *lines)])
+        options.add_options([entry(line) for line in (*unused, *lines)])
         options.highlighted = 0 if options.option_count else None
         more = f", the first {MOST} shown" if len(every) > MOST else ""
         text = f"{len(every)} fit{more}" if every else "Nothing fits; clear some letters."
-        self.query_one("#count", Label).update(text)
+        self.query_one("#count", Plain).update(text)
 
     def _line(self, parameter: Parameter) -> Text:
         text = Text(no_wrap=True)

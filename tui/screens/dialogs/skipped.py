@@ -11,10 +11,11 @@ from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
-from textual.widgets import Label, Static
 
+from tui.drive.plain import plain
 from tui.drive.restore_plan import Item
 from tui.widgets.palette import FAINT, PLAIN, STRONG
+from tui.widgets.plain import Plain
 
 
 class Skipped(ModalScreen[None]):
@@ -32,8 +33,10 @@ class Skipped(ModalScreen[None]):
         """Each with its reason."""
         table = Table.grid(padding=(0, 2, 0, 0))
         for item in self._left:
-            table.add_row(Text(item.code, STRONG, no_wrap=True), Text(item.text, PLAIN))
+            table.add_row(
+                Text(plain(item.code), STRONG, no_wrap=True), Text(plain(item.text), PLAIN)
+            )
         with VerticalScroll(id="dialog"):
-            yield Label(self._head, id="question")
-            yield Static(table)
-            yield Static(Text("Up and Down scroll   Esc closes", FAINT))
+            yield Plain(self._head, id="question")
+            yield Plain(table)
+            yield Plain(Text("Up and Down scroll   Esc closes", FAINT))

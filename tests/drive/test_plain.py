@@ -1,0 +1,38 @@
+"""Control characters as signs: what a drive calls itself must not command a terminal."""
+
+from __future__ import annotations
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.drive.plain import commands, plain
+
+
+@pytest.mark.parametrize(
+    ("text", "shown"),
+    [
+        ("MACHINE 4 · µ → 30 °C", "MACHINE 4 · µ → 30 °C"),
+        ("\x1b]0;x\x07[red]", "␛]0;x␇[red]"),
+        ("a\nb\r\tc\0\x7f", "a␊b␍␉c␀␡"),
+        ("\x9b31m", "\ufffd31m"),
+        ("safe\u202egpj.exe", "safe\ufffdgpj.exe"),
+        ("broken \udcff name", "broken \ufffd name"),
+        ("one\u2028two", "one\ufffdtwo"),
+    ],
+)
+def test_signs_stand_for_what_commands_a_terminal(text: str, shown: str) -> None:
+    assert plain(text) == shown
+
+
+def test_line_feeds_stay_where_lines_are_meant() -> None:
+    assert plain("one\ntwo\x1b[2J", lines=True) == "one\ntwo␛[2J"
+
+
+@given(st.text(st.characters()))
+def test_one_for_one_and_nothing_left_that_commands(text: str) -> None:
+    shown = plain(text)
+    assert len(shown) == len(text)
+    assert not any(commands(character) for character in shown)
+    assert plain(shown) == shown
+    shown.encode("utf-8")

@@ -1,0 +1,119 @@
+"""No text of a person, a drive, a file or a profile is ever markup: held for the whole code."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+PACKAGE = Path(__file__).resolve().parent.parent / "tui"
+TEXTS = PACKAGE / "widgets" / "plain.py"
+"""The one module that makes labels and entries of lists, with markup off."""
+FIELDS = PACKAGE / "widgets" / "fields.py"
+PRINTS = {PACKAGE / "cli" / "say.py", PACKAGE / "cli" / "output.py"}
+"""The modules that print for the commands, control characters as signs."""
+MADE_ELSEWHERE = {
+    "Label": "Plain",
+    "Static": "Plain",
+    "Option": "entry",
+    "Input": "Field or NumberInput",
+    "MaskedInput": "Field or NumberInput",
+    "TextArea": "Field",
+    "RichLog": "Lines",
+    "Log": "Lines",
+    "Markdown": "Plain",
+    "Button": "a key",
+    "DataTable": "Lines",
+    "Content": "Text",
+}
+"""What Textual would read as markup or send as it is, and what to take instead."""
+READ_AS_MARKUP = {"border_title", "border_subtitle", "tooltip"}
+PRINTING = {"print", "echo", "secho", "click.echo", "click.secho"}
+
+
+def faults(source: str, path: Path) -> Iterator[str]:
+    """What in a module could take a text for markup, or print it as it is."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call):
+            yield from _of_call(node, path)
+        elif isinstance(node, ast.Attribute | ast.Name):
+            name = node.attr if isinstance(node, ast.Attribute) else node.id
+            if name in ("from_markup", "render_markup"):
+                yield f"{name} reads markup"
+        elif isinstance(node, ast.Assign):
+            for target in node.targets:
+                if isinstance(target, ast.Attribute) and target.attr in READ_AS_MARKUP:
+                    yield f"{target.attr} is read as markup"
+
+
+def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
+    name = _name(call.func)
+    off = any(_is(k, "markup", value=False) for k in call.keywords)
+    if any(k.arg == "markup" and not _is(k, "markup", value=False) for k in call.keywords):
+        yield f"{name} with markup"
+    if name in MADE_ELSEWHERE and path not in (TEXTS, FIELDS):
+        yield f"{name}: take {MADE_ELSEWHERE[name]}"
+    if name == "Console" and not off:
+        yield "a console with markup"
+    if ast.unparse(call.func) in PRINTING and path not in PRINTS:
+        yield f"{name}: take say"
+    if name == "add_row" and path.parent.name != "cli":
+        for cell in call.args:
+            if not (isinstance(cell, ast.Constant) or _name(cell) in ("Text", "assemble")):
+                yield "a cell that may be a str"
+
+
+def _name(node: ast.expr) -> str:
+    """The last name of what is called, or of what calls it: `Text` of `Text.assemble(x)`."""
+    if isinstance(node, ast.Call):
+        node = node.func
+    if isinstance(node, ast.Attribute):
+        return node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _is(keyword: ast.keyword, name: str, *, value: bool) -> bool:
+    return (
+        keyword.arg == name
+        and isinstance(keyword.value, ast.Constant)
+        and keyword.value.value is value
+    )
+
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+
+
+@pytest.mark.parametrize("path", MODULES, ids=lambda p: p.relative_to(PACKAGE).as_posix())
+def test_no_text_is_markup(path: Path) -> None:
+    assert list(faults(path.read_text("utf-8"), path)) == []
+
+
+@pytest.mark.parametrize(
+    "line",
+    [
+        'Label(f"{name}", id="x")',
+        "widgets.Static(question)",
+        "Option(drive.name)",
+        "Input(value)",
+        'app.notify("[b]", markup=True)',
+        "Label('x', markup=flag)",
+        "Text.from_markup(name)",
+        "self.border_title = name",
+        "rich.console.Console()",
+        "Console(markup=True)",
+        "click.echo(name)",
+        "print(name)",
+        "table.add_row(name)",
+        "table.add_row(Text(code), f'{name}')",
+    ],
+)
+def test_the_check_sees_what_it_is_for(line: str) -> None:
+    assert list(faults(line, PACKAGE / "screens" / "new.py"))
+
+
+def test_what_is_right_passes() -> None:
+    assert list(faults("console().print(table)", PACKAGE / "cli" / "new.py")) == []
+    right = 'Plain(name); entry(Text(name)); table.add_row(Text(name), ""); app.notify(name)'
+    assert list(faults(right, PACKAGE / "screens" / "new.py")) == []

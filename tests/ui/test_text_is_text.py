@@ -1,0 +1,253 @@
+"""What people, drives, files and profiles write is text: no markup, no command to the terminal."""
+
+from __future__ import annotations
+
+import ast
+import os
+import pty
+import select
+import signal
+import sys
+import time
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+
+import pytest
+from rich.text import Text
+from textual.widgets import Input
+
+from tui.app import DrivePanelApp
+from tui.drive.restore_plan import Item
+from tui.screens.blocks import BlocksScreen
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.edit_value import EditNumber
+from tui.screens.dialogs.pick_parameter import PickParameter
+from tui.screens.dialogs.skipped import Skipped
+from tui.screens.faults import FaultsScreen
+from tui.screens.parameters import ParametersScreen
+from tui.widgets.lean import cells_of
+from tui.widgets.plain import entry
+
+from . import fakes
+from .test_command_flows import Bench, bench
+from .test_flows import shown, until
+
+ROOT = Path(__file__).resolve().parents[2]
+MARKUP = ("[/]", "[bold]", "[@click=app.quit]x[/]", "[")
+NAME = "\x1b]0;x\x07[red]"
+SHOWN = "␛]0;x␇[red]"
+PATIENCE = 40.0
+Way = Callable[[Bench], Awaitable[None]]
+
+
+@pytest.fixture(autouse=True)
+def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.chdir(tmp_path)
+
+
+async def dialog(made: Bench, key: str, kind: type = Ask) -> None:
+    """Open a dialog, and type markup into its field."""
+    for text in MARKUP:
+        await made.pilot.press(key)
+        await until(made.pilot, lambda: isinstance(made.app.screen, kind))
+        await typed(made, text)
+        if isinstance(made.app.screen, kind):
+            await made.pilot.press("escape")
+        await until(made.pilot, lambda: not isinstance(made.app.screen, kind))
+
+
+async def typed(made: Bench, text: str) -> None:
+    """Type a text into the field that has the focus, and press Enter."""
+    field = made.app.focused
+    assert isinstance(field, Input)
+    for value in (text, text * 9):
+        field.value = value
+        await made.pilot.pause()
+    field.value = text
+    await made.pilot.press("enter")
+    await made.pilot.pause()
+    assert made.app.is_running
+
+
+async def monitor(made: Bench) -> None:
+    await made.armed()
+    await dialog(made, "f")
+
+
+async def rating(made: Bench) -> None:
+    await dialog(made, "i")
+
+
+async def parameters(made: Bench) -> None:
+    await made.pilot.press("3")
+    await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+    await until(made.pilot, lambda: bool(shown(made.app, "table")))
+    for text in MARKUP:
+        await made.pilot.press("slash")
+        await typed(made, text)
+    made.app.screen.query_one("#search", Input).value = ""
+    await made.pilot.press("slash", *"acc", "enter")
+    await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
+    await dialog(made, "enter", EditNumber)
+    for key in "bpo":
+        await dialog(made, key)
+
+
+async def blocks(made: Bench) -> None:
+    for slot, code in {"NCA1": "ACC", "NCA2": "DEC"}.items():
+        made.drive().set(slot, made.drive().profile[code].address)
+    await made.pilot.press("4", "a")
+    await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))
+    await until(made.pilot, lambda: "DEC" in shown(made.app, "second"))
+    await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
+    for key in "slmx":
+        await dialog(made, key)
+    await dialog(made, "enter", PickParameter)
+
+
+async def faults(made: Bench) -> None:
+    made.drive().provoke(18)
+    await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
+    await made.pilot.press("h")
+    await until(made.pilot, lambda: isinstance(made.app.screen, FaultsScreen))
+    screen = made.app.screen
+    await until(made.pilot, lambda: screen._recorder.latest is not None)  # type: ignore[attr-defined]
+    await dialog(made, "s")
+
+
+async def connection(made: Bench) -> None:
+    await made.pilot.press("1")
+    await until(made.pilot, lambda: made.app.screen is made.app.connection)
+    for name in ("baud", "format", "addresses", "profile"):
+        for text in MARKUP:
+            field = made.app.connection.query_one(f"#{name}", Input)
+            field.disabled = False
+            field.focus()
+            field.value = text
+            await made.pilot.pause()
+            made.app.connection.action_scan()
+            await made.pilot.pause()
+            field.value = ""
+    made.app.connection.drives.focus()
+    await dialog(made, "n")
+
+
+WAYS: dict[str, tuple[str, Way]] = {
+    "monitor": ("atv71", monitor),
+    "rating": ("atv21", rating),
+    "parameters": ("atv71", parameters),
+    "blocks": ("atv71", blocks),
+    "faults": ("atv71", faults),
+    "connection": ("atv71", connection),
+}
+ASKED = {"f", "i", "b and p", "o", "s of Blocks", "l", "m", "x", "s of Faults", "n"}
+
+
+@pytest.mark.parametrize("name", WAYS)
+async def test_markup_in_every_field_is_text(name: str) -> None:
+    family, way = WAYS[name]
+    async with bench(family) as made:
+        await way(made)
+        assert made.app._exception is None
+
+
+def test_every_field_that_asks_is_one_of_these() -> None:
+    calls = [
+        node
+        for path in (ROOT / "tui").rglob("*.py")
+        for node in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Ask"
+    ]
+    assert len(calls) == len(ASKED), "a new question: type markup into it here too"
+
+
+async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written() -> None:
+    app = fakes.app_of()
+    async with app.run_test(size=(80, 24), notifications=True) as pilot:
+        for text in (*MARKUP, NAME):
+            as_shown = text.replace(NAME, SHOWN)
+            await app.push_screen(Confirm(text, text, text))
+            for place in ("#question", "#follows", "#hint"):
+                assert str(app.screen.query_one(place).render()) == as_shown
+            app.screen.dismiss()
+            await pilot.pause()
+            await app.push_screen(Skipped(1, text, [Item(text, "skip", text=text)]))
+            await pilot.pause()
+            assert as_shown in picture(app)
+            app.screen.dismiss()
+            await pilot.pause()
+            app.notify(text, title=text)
+            app.connection.notify(text)
+            await until(pilot, lambda text=as_shown: picture(app).count(text) >= 3)  # type: ignore[misc]
+            app.clear_notifications()
+            assert str(entry(Text(text)).prompt) == as_shown.replace("␇", "")
+            app.connection.form.query_one("#profile", Input).value = f"<{text}>"
+            in_field = f"<{as_shown}>".replace("␇", "")[:12]
+            await until(pilot, lambda text=in_field: text in picture(app))  # type: ignore[misc]
+        assert app._exception is None
+
+
+def picture(app: DrivePanelApp) -> str:
+    """What stands on the screen, as text."""
+    lines = app.screen._compositor.render_strips()
+    return "\n".join(strip.text for strip in lines)
+
+
+def test_a_cell_never_holds_a_command() -> None:
+    from rich.color import ColorSystem
+    from rich.segment import Segment
+    from textual.strip import Strip
+
+    cells = cells_of(Strip([Segment("a\x1b[2Jb\x9b\u0301")]), ColorSystem.TRUECOLOR)
+    assert [text for text, _ in cells] == ["a", "[", "2", "J", "b\u0301"]
+
+
+def panel() -> None:
+    """The panel on a drive with a name that no drive should have."""
+    from tui.session.lines import OpenLine, open_line
+    from tui.simulator import DriveSpec, Simulation
+
+    simulation = Simulation([DriveSpec("atv71", 1, identity={0: NAME, 6: NAME})])
+    simulation.start()
+    line = f"serial:{simulation.serve_pty()},19200,8N1"
+
+    def opener(_: str, **how: object) -> OpenLine:
+        opened = open_line(line, **how)  # type: ignore[arg-type]
+        opened.devices = (1,)
+        return opened
+
+    DrivePanelApp(open_line=opener, start=line).run()
+
+
+@pytest.mark.skipif(not hasattr(pty, "fork"), reason="no pseudo-terminals here")
+def test_a_drives_name_reaches_the_terminal_as_signs_only() -> None:
+    process, terminal = pty.fork()
+    if process == 0:
+        code = "from tests.ui.test_text_is_text import panel; panel()"
+        environment = os.environ | {"TERM": "xterm-256color", "PYTHONPATH": str(ROOT)}
+        os.chdir(ROOT)
+        os.execve(sys.executable, [sys.executable, "-c", code], environment)
+    try:
+        seen = read_until(terminal, SHOWN.encode(), b"Enter watches")
+        os.write(terminal, b"\r")
+        seen += read_until(terminal, SHOWN.encode(), b"ARMED")
+    finally:
+        os.kill(process, signal.SIGTERM)
+        os.close(terminal)
+        os.waitpid(process, 0)
+    assert b"]0;x" in seen
+    assert b"\x1b]0;" not in seen
+    assert b"x\x07" not in seen
+
+
+def read_until(terminal: int, *wanted: bytes) -> bytes:
+    """What a program writes until all of this is in it."""
+    seen = b""
+    end = time.monotonic() + PATIENCE
+    while not all(part in seen for part in wanted):
+        assert time.monotonic() < end, seen[-2000:]
+        if select.select([terminal], [], [], 0.2)[0]:
+            seen += os.read(terminal, 65536)
+    return seen

@@ -1,0 +1,38 @@
+"""Text that a person, a drive, a file or a profile brings, as it may be shown to a person.
+
+A drive's name with an escape sequence in it must neither command the terminal nor hide there:
+each character that is no sign of its own is replaced by one that is, one for one, so that what
+was laid out by its length stays so.
+"""
+
+from __future__ import annotations
+
+import unicodedata
+
+PICTURES = 0x2400
+"""Where Unicode has the pictures of the first 32 control characters: ␀ to ␟."""
+DELETE = "␡"
+UNSHOWN = "\ufffd"
+"""For what has no picture: C1 controls, marks of direction, halves of characters."""
+COMMANDING = frozenset({"Cc", "Cf", "Cs", "Zl", "Zp"})
+"""Categories of characters that a terminal takes as commands, or that show nothing."""
+
+
+def plain(text: str, *, lines: bool = False) -> str:
+    """The text with control characters as visible signs; with `lines` line feeds stay."""
+    if text.isprintable():
+        return text
+    return "".join(c if lines and c == "\n" else _sign(c) for c in text)
+
+
+def commands(character: str) -> bool:
+    """Whether a character could command a terminal, or show nothing at all."""
+    return unicodedata.category(character) in COMMANDING
+
+
+def _sign(character: str) -> str:
+    if not commands(character):
+        return character
+    if character < " ":
+        return chr(PICTURES + ord(character))
+    return DELETE if character == "\x7f" else UNSHOWN

@@ -1,0 +1,25 @@
+"""Fields to type into: a text as it is written, and numbers in which Space is no letter."""
+
+from __future__ import annotations
+
+from typing import Any, ClassVar
+
+from textual.widgets import Input
+
+from .plain import Signs
+
+
+class Field(Input):
+    """A field of one line; a space belongs to the text."""
+
+    takes_space: ClassVar[bool] = True
+    """Whether Space is typed into it; where it is not, Space stops the motor there too."""
+
+    def __init__(self, value: str = "", **how: Any) -> None:
+        super().__init__(value, highlighter=Signs(), compact=True, **how)
+
+
+class NumberInput(Field):
+    """A field for a number, a reference, an address: Space stops the motor here too."""
+
+    takes_space = False
