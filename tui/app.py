@@ -121,10 +121,12 @@ class DrivePanelApp(LeanApp, Leaving):
         return True
 
     def _is_typing(self) -> bool:
-        """Whether a space would go into a text."""
+        """Whether a space would go into a text; a field for a number takes none."""
         # TextArea by its name: to import it takes longer than the whole first picture may
-        kinds = type(self.focused).__mro__
-        return Input in kinds or any(kind.__name__ == "TextArea" for kind in kinds)
+        focused = self.focused
+        kinds = type(focused).__mro__
+        is_text = Input in kinds or any(kind.__name__ == "TextArea" for kind in kinds)
+        return is_text and bool(getattr(focused, "takes_space", True))
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A space belongs to the text that is being typed."""

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 from typing import NamedTuple
 
 import pytest
@@ -24,9 +26,11 @@ from tui.session.lines import OpenLine, open_line
 from tui.session.stop import Phase
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
+from tui.widgets.fields import NumberInput
 
 from .test_flows import shown, until
 
+SOURCES = Path(__file__).parents[2] / "tui" / "screens"
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 
 
@@ -227,13 +231,47 @@ def told(app: DrivePanelApp) -> str:
 async def test_space_stops_outside_texts_only() -> None:
     async with bench("atv71") as made:
         await made.running()
-        await made.pilot.press("f", *"3 0")
+        await made.pilot.press("3", "slash", *"a c")
         field = made.app.screen.query_one(Input)
-        assert field.value == "3 0"
+        assert field.value == "a c"
         assert made.speed() > 2
         assert not (made.app.fleet and made.app.fleet.stopper.reports)
         await made.pilot.press("escape", "space")
         await made.stopped()
+
+
+@pytest.mark.parametrize("typed", ["", "4x"])
+@pytest.mark.parametrize("way", ["f", "3 slash a c c enter enter", "1 tab tab tab"])
+async def test_space_stops_where_a_number_is_typed(way: str, typed: str) -> None:
+    """A reference, a value, an address: no space is ever typed there."""
+    async with bench("atv71") as made:
+        await made.running()
+        await made.pilot.press(*way.split(), *typed)
+        await until(made.pilot, lambda: isinstance(made.app.focused, NumberInput))
+        field = made.app.focused
+        assert isinstance(field, NumberInput)
+        before = field.value
+        await made.pilot.press("space")
+        await made.stopped()
+        assert field.value == before
+
+
+def test_numbers_references_and_addresses_take_no_space() -> None:
+    """Each field says whether a space is a text there; a new one has to be thought of."""
+    fields = {
+        path.stem: {name for name in ("Field", "NumberInput") if f"{name}(" in text}
+        for path in SOURCES.rglob("*.py")
+        if (text := path.read_text("utf-8"))
+    }
+    assert {name: kinds for name, kinds in fields.items() if kinds} == {
+        "edit_value": {"NumberInput"},
+        "line_form": {"NumberInput"},
+        "parameters": {"Field"},
+        "pick_parameter": {"Field"},
+    }
+    asked = "".join(path.read_text("utf-8") for path in SOURCES.glob("*.py"))
+    for question in ('"Reference"', '"Rated current in A"'):
+        assert re.search(rf"Ask\({question}.*number=True", asked)
 
 
 async def test_stop_works_in_the_palette() -> None:

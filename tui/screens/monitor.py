@@ -295,7 +295,8 @@ class MonitorScreen(OrderKeys):
         about = f"100 % of {current.code}, from the nameplate of the drive; base: " + (
             current.base or "not confirmed by a manual"
         )
-        self.app.push_screen(Ask("Rated current in A", fault_of_rating, about=about), told)
+        asked = Ask("Rated current in A", fault_of_rating, about=about, number=True)
+        self.app.push_screen(asked, told)
 
     def action_faults(self) -> None:
         """The last trip and the drive's history."""

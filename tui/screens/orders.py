@@ -129,7 +129,7 @@ class OrderKeys(Arming):
             return ""
 
         if self._armed_or_told():
-            self.app.push_screen(Ask("Reference", wrong, about=about), given)
+            self.app.push_screen(Ask("Reference", wrong, about=about, number=True), given)
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""

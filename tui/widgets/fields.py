@@ -23,3 +23,7 @@ class NumberInput(Field):
     """A field for a number, a reference, an address: Space stops the motor here too."""
 
     takes_space = False
+
+    def check_consume_key(self, key: str, character: str | None) -> bool:
+        """Space is left to the stop."""
+        return key != "space" and super().check_consume_key(key, character)

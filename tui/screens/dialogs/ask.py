@@ -11,7 +11,7 @@ from textual.containers import Vertical
 from textual.screen import ModalScreen
 from textual.widgets import Input
 
-from tui.widgets.fields import Field
+from tui.widgets.fields import Field, NumberInput
 from tui.widgets.plain import Plain
 
 Check = Callable[[str], str]
@@ -19,13 +19,25 @@ Check = Callable[[str], str]
 
 
 class Ask(ModalScreen[str | None]):
-    """Asks a question; gives the answer back once it is right, or None."""
+    """Asks a question; gives the answer back once it is right, or None.
+
+    A `number` has no spaces in it: Space stops there, as outside of texts.
+    """
 
     CSS_PATH = "ask.tcss"
     BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", show=False)]
 
-    def __init__(self, question: str, check: Check, *, text: str = "", about: str = "") -> None:
+    def __init__(
+        self,
+        question: str,
+        check: Check,
+        *,
+        text: str = "",
+        about: str = "",
+        number: bool = False,
+    ) -> None:
         super().__init__()
+        self._field = NumberInput if number else Field
         self._question = question
         self._check = check
         self._text = text
@@ -35,7 +47,7 @@ class Ask(ModalScreen[str | None]):
         """A field, room for what is wrong, and what an answer looks like."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
-            yield Field(self._text, id="answer")
+            yield self._field(self._text, id="answer")
             yield Plain("", id="fault")
             yield Plain(self._about, id="about")
             yield Plain("Enter accept   Esc cancel", id="hint")

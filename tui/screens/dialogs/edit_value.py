@@ -17,7 +17,7 @@ from tui.drive.errors import DriveError
 from tui.drive.schema import Parameter
 from tui.drive.values import encode
 from tui.session.editor import Editor
-from tui.widgets.fields import Field
+from tui.widgets.fields import NumberInput
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.parameter_view import factory_text, range_text, value_text
 from tui.widgets.plain import Plain, entry
@@ -48,7 +48,7 @@ class EditNumber(ModalScreen[str | None]):
         limits, factory = range_text(editor, parameter), factory_text(editor, parameter)
         with Vertical(id="dialog"):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
-            yield Field(value.text if value else "", id="answer", select_on_focus=True)
+            yield NumberInput(value.text if value else "", id="answer", select_on_focus=True)
             yield Plain("", id="held")
             about = [f"now {value_text(editor, parameter.code)}"]
             about += [f"range {limits}"] if limits else []
