@@ -29,7 +29,8 @@ STEPS: tuple[tuple[list[str], float, str], ...] = (
     (["a", "a", "w"], 0.5, "parameters-write"),
     (["escape", "4"], 3.0, ""),
     (["down", "down", "enter", *"lcr"], 0.5, "blocks-pick"),
-    (["enter", "down", "enter", *"uln", "enter"], 1.0, "blocks"),
+    (["enter", "down", "enter", *"uln"], 0.5, ""),
+    (["enter"], 1.0, "blocks"),
     (["u", "escape"], 0.5, ""),
 )
 """Keys pressed on Monitor, the seconds to wait, and the name of the picture taken then."""

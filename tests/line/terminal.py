@@ -3,11 +3,15 @@
 from __future__ import annotations
 
 import subprocess
+import time
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
 from tests.programs import PATIENCE, wait_until
+
+A_MOMENT = 0.4
+"""Seconds, more than those in which a question takes no answer yet."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +38,11 @@ class Terminal:
     def press(self, *keys: str) -> None:
         """Press keys, by tmux's names."""
         self.run("send-keys", *keys)
+
+    def answer(self, key: str) -> None:
+        """Press a key that answers a question which is seen: too early it would not count."""
+        time.sleep(A_MOMENT)
+        self.press(key)
 
     def wait_for(self, *words: str) -> None:
         """Wait until all the words stand on it."""

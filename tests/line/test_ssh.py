@@ -112,7 +112,7 @@ def test_the_demo_over_ssh(
     terminal.wait_for("ATV71", "device 4", "RUNNING", "Hz")
     terminal.press("q")
     terminal.wait_for("Leave the panel?", "Device 1, Altivar 21: left alone it acts 3 s after")
-    terminal.press("q")
+    terminal.answer("y")
     pid = int((tmp_path / "pid").read_text())
     wait_until(lambda: not runs(pid), "the panel left on its key")
 

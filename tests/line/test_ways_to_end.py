@@ -48,8 +48,12 @@ def running(start: Start, *options: str, family: str = "atv71") -> Iterator[Runn
         line = f"serial:{simulation.serve_pty()},19200,8N1"
         terminal = start([sys.executable, "-m", "tui", line, "-d", "1", *options])
         terminal.wait_for("NOT ARMED", "READY")
-        # all at once: what is typed ahead goes where it was meant to go
-        terminal.press("a", "f", "3", "0", "Enter", "r")
+        terminal.press("a", "f")
+        terminal.wait_for("Enter writes it")
+        terminal.press("3", "0")
+        terminal.answer("Enter")
+        terminal.wait_for("DONE Reference")
+        terminal.press("r")
         wait_until(lambda: simulation.drive(1).motor.frequency > 2, "the motor runs")
         terminal.wait_for("RUNNING")
         yield Running(simulation, terminal, terminal.client(), line)
@@ -96,8 +100,8 @@ def test_ctrl_c_in_the_terminal_ends_nothing(terminal_with: Start) -> None:
 def test_leaving_by_key_asks_and_stops(terminal_with: Start) -> None:
     with running(terminal_with) as made:
         made.terminal.press("q")
-        made.terminal.wait_for("A motor runs by your order", "s or Enter")
-        made.terminal.press("s")
+        made.terminal.wait_for("A motor runs by your command", "s or Enter")
+        made.terminal.answer("s")
         made.ended()
         assert made.speed == 0
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import re
+import ast
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -19,6 +19,7 @@ from tui.screens.control_source import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.options import OptionsScreen
+from tui.screens.dialogs.question import Question
 from tui.screens.faults import FaultsScreen
 from tui.screens.help import HelpScreen
 from tui.screens.monitor import MonitorScreen
@@ -30,6 +31,7 @@ from tui.widgets.fields import NumberInput
 
 from .test_flows import shown, until
 
+IS_EARLY = Question._is_early
 SOURCES = Path(__file__).parents[2] / "tui" / "screens"
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 
@@ -188,13 +190,19 @@ async def test_reference_by_steps_and_its_limit() -> None:
         assert made.drive().raw("LFR") == 160
 
 
-async def test_what_is_typed_ahead_reaches_the_dialog_that_it_was_meant_for() -> None:
+async def test_what_is_typed_ahead_reaches_the_dialog_but_commands_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setattr(Question, "_is_early", IS_EARLY)
     async with bench("atv71") as made:
         for key, character in [("a", "a"), ("f", "f"), ("3", "3"), ("0", "0"), ("enter", "\r")]:
             made.app.post_message(Key(key, character))
         made.app.post_message(Key("r", "r"))
-        await until(made.pilot, lambda: made.speed() > 2)
-        assert made.drive().raw("LFR") == 300
+        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+        await until(made.pilot, lambda: made.app.screen.query_one(Input).value == "30r")
+        assert isinstance(made.app.screen, Ask)
+        assert made.drive().raw("LFR") == 0
+        assert made.drive().raw("CMD") == 0
 
 
 SCREENS = {
@@ -269,9 +277,14 @@ def test_numbers_references_and_addresses_take_no_space() -> None:
         "parameters": {"Field"},
         "pick_parameter": {"Field"},
     }
-    asked = "".join(path.read_text("utf-8") for path in SOURCES.glob("*.py"))
-    for question in ('"Reference"', '"Rated current in A"'):
-        assert re.search(rf"Ask\({question}.*number=True", asked)
+    asked = {
+        ast.unparse(call.args[0]): any(keyword.arg == "number" for keyword in call.keywords)
+        for path in SOURCES.glob("*.py")
+        for call in ast.walk(ast.parse(path.read_text("utf-8")))
+        if isinstance(call, ast.Call) and ast.unparse(call.func) == "Ask"
+    }
+    numbers = {question for question, number in asked.items() if number}
+    assert numbers == {"'Reference'", "'Rated current in A'"}
 
 
 async def test_stop_works_in_the_palette() -> None:

@@ -168,8 +168,9 @@ async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written(
     async with app.run_test(size=(80, 24), notifications=True) as pilot:
         for text in (*MARKUP, NAME):
             as_shown = text.replace(NAME, SHOWN)
-            await app.push_screen(Confirm(text, text, text))
-            for place in ("#question", "#follows", "#hint"):
+            await app.push_screen(Confirm(text, text, yes=text, no=text, loses=True))
+            assert as_shown in str(app.screen.query_one("#hint").render())
+            for place in ("#question", "#follows"):
                 assert str(app.screen.query_one(place).render()) == as_shown
             app.screen.dismiss()
             await pilot.pause()

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 from tui.drive.orders import OrderRefused
 from tui.session.command import Commander
 from tui.session.console import DriveConsole
@@ -9,6 +11,9 @@ from tui.session.drive import DriveSession
 from tui.session.work import Outcome
 
 from .base import PanelScreen
+
+if TYPE_CHECKING:
+    from .dialogs.now import MotorsNow
 
 NOT_ARMED = "Not armed: a arms this drive."
 
@@ -29,6 +34,12 @@ class Arming(PanelScreen):
     def _refuse(self, text: str) -> None:
         """Tell on this screen why something was not done."""
         raise NotImplementedError
+
+    def motor_now(self) -> MotorsNow:
+        """What the motor does now, for a question about this drive."""
+        from .dialogs.now import MotorsNow
+
+        return MotorsNow(self.app, [self.console])
 
     def _armed(self) -> bool:
         return self.commander.armed_for is not None

@@ -71,11 +71,18 @@ class BlockKeys(Arming):
                     desk.exchange(agreed)
                 self.look()
 
-            keys = "y or Enter writes, read back   Esc writes nothing"
-            question = "Write through the outputs?"
-            self.app.push_screen(Confirm(question, agreed.follows, keys), told)
+            asked = Confirm(
+                "Write through the outputs?",
+                agreed.follows,
+                yes="writes, read back",
+                no="writes nothing",
+                loses=True,
+                now=self.motor_now(),
+            )
+            self.app.push_screen(asked, told)
 
-        self.app.push_screen(Ask("Write through the outputs", wrong, about=about), given)
+        asked = Ask("Write through the outputs", wrong, about=about, takes="goes on to a question")
+        self.app.push_screen(asked, given)
 
     # Files and user words
 
@@ -95,7 +102,8 @@ class BlockKeys(Arming):
         proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
         about = "The assignment shown, proposals included; one slot a line (TOML)."
         text = str(Path.cwd() / proposed)
-        self.app.push_screen(Ask("Save to", fault_of_new, text=text, about=about), given)
+        asked = Ask("Save to", fault_of_new, text=text, about=about, takes="writes the file")
+        self.app.push_screen(asked, given)
 
     def _save(self, path: Path) -> None:
         from tui.drive.mapping_file import dumps
@@ -120,7 +128,8 @@ class BlockKeys(Arming):
                 self._try(lambda: self._load(Path(name).expanduser()))
 
         about = "A file saved here. It is proposed, not written."
-        self.app.push_screen(Ask("Load from", fault_of_known, about=about), given)
+        asked = Ask("Load from", fault_of_known, about=about, takes="proposes what it holds")
+        self.app.push_screen(asked, given)
 
     def _load(self, path: Path) -> None:
         from tui.drive.mapping import MappingError

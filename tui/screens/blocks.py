@@ -214,9 +214,16 @@ class BlocksScreen(BlockKeys):
                 desk.write()
             self.look()
 
-        keys = "y or Enter writes, each slot read back   Esc writes nothing"
         count = sum(len(desk.changes(block)) for block in todo.values())
-        self.app.push_screen(Confirm(f"Write {count} slots?", self._follows(), keys), told)
+        asked = Confirm(
+            f"Write {count} slots?",
+            self._follows(),
+            yes="writes, each slot read back",
+            no="writes nothing",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
 
     def _follows(self) -> str:
         """What would be written, and what that means for others."""

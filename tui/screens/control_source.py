@@ -142,6 +142,13 @@ class ControlSourceScreen(OrderKeys):
                 if sure:
                     self._give(lambda: self.commander.configure(source))
 
-            keys = "y or Enter writes   Esc leaves all as it is"
-            self.app.push_screen(Confirm(f"{source.name}?", follows, keys), told)
+            asked = Confirm(
+                f"{source.name}?",
+                follows,
+                yes="writes",
+                no="leaves all as it is",
+                loses=True,
+                now=self.motor_now(),
+            )
+            self.app.push_screen(asked, told)
         self.look()

@@ -152,9 +152,10 @@ class FaultsScreen(PanelScreen):
                 self._write(Path(name).expanduser(), record)
 
         about = "Markdown, with the values, what the drive stored, and what was written."
-        self.app.push_screen(
-            Ask("Save the trip as", fault_of_new, text=proposed, about=about), told
+        asked = Ask(
+            "Save the trip as", fault_of_new, text=proposed, about=about, takes="writes the file"
         )
+        self.app.push_screen(asked, told)
 
     def _write(self, path: Path, record: FaultRecord) -> None:
         stored = self.session.profile.data.faults.stored

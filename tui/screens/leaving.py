@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING
 
 from .dialogs.confirm import Confirm
 from .dialogs.leave import Choice, Leave
+from .dialogs.now import MotorsNow
+from .dialogs.question import Question
 from .panel import Panel
 
 if TYPE_CHECKING:
@@ -27,17 +29,18 @@ class Leaving(Panel):
 
     async def action_quit(self) -> None:
         """Leave; where a motor runs by a command from here, or a drive trips, not unasked."""
-        if isinstance(self.screen, Leave | Confirm):
+        if isinstance(self.screen, Question):
             return  # one question at a time
         if running := self._motors():
             follows = [self._left_running(running), *self._tripping(running), *self._unfinished()]
-            self.push_screen(Leave("\n".join(follows)), self._leave_motors)
+            asked = Leave("\n".join(follows), self._now(running))
+            self.push_screen(asked, self._leave_motors)
             return
-        asked = self._question("Leave the panel?", "y leaves   Esc stays")
-        if asked is None:
+        question = self._question("Leave the panel?", yes="leaves", no="stays")
+        if question is None:
             self.exit()
         else:
-            self.push_screen(asked, self._leave)
+            self.push_screen(question, self._leave)
 
     def _motors(self) -> list[DriveSession]:
         """Drives commanded from here whose motors do not surely stand."""
@@ -123,12 +126,13 @@ class Leaving(Panel):
         if sure:
             self.exit()
 
-    async def may_let_go(self, question: str, keys: str) -> bool:
+    async def may_let_go(self, question: str, *, yes: str, no: str, always: str = "") -> bool:
         """Whether the drives of the line may be left alone; asks where that trips one that runs.
 
-        Belongs into a worker: it waits for the answer.
+        With `always` it asks in any case, and says that. Belongs into a worker: it waits for
+        the answer.
         """
-        asked = self._question(question, keys)
+        asked = self._question(question, yes=yes, no=no, always=always)
         if asked is None:
             return True
         answer: asyncio.Future[bool | None] = asyncio.get_running_loop().create_future()
@@ -140,13 +144,26 @@ class Leaving(Panel):
         self.push_screen(asked, told)
         return bool(await answer)
 
-    def _question(self, question: str, keys: str) -> Confirm | None:
-        """What to ask before the drives are left alone; None where that trips none."""
+    def _question(self, question: str, *, yes: str, no: str, always: str = "") -> Confirm | None:
+        """What to ask before the drives are left alone; None where nothing is to be said."""
         running = self._motors()
         told = [*self._tripping(running), *self._unfinished()]
         if running:
             told.insert(0, self._left_running(running))
-        return Confirm(question, "\n".join(told), keys) if told else None
+        if always:
+            told.insert(0, always)
+        if not told:
+            return None
+        now = self._now(running)
+        return Confirm(question, "\n".join(told), yes=yes, no=no, loses=True, now=now)
+
+    def _now(self, running: Sequence[DriveSession]) -> MotorsNow | None:
+        """What the motors do that are left, and those of drives that act on being left."""
+        if self.fleet is None:
+            return None
+        left = {session.device for session in running} | self.fleet.keeper.left_alone().keys()
+        consoles = [console for console in self.fleet.consoles if console.device in left]
+        return MotorsNow(self, consoles) if consoles else None
 
     def _unfinished(self) -> list[str]:
         """What would be lost of the work on parameters."""

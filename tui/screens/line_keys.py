@@ -10,8 +10,6 @@ from tui.drive.errors import DriveError
 from .choices import LINE_FORMS, LineChoice, fault_of_line
 from .scanning import Scanning
 
-CLOSE_KEYS = "y or Enter closes it   Esc keeps it"
-
 
 class LineKeys(Scanning):
     """A line that was opened is searched for drives at once."""
@@ -34,13 +32,16 @@ class LineKeys(Scanning):
                 self.open_line(text)
 
         about = "\n".join(LINE_FORMS)
-        dialog = Ask("Line to open", fault_of_line, text=self.app.line_text, about=about)
+        dialog = Ask(
+            "Line to open", fault_of_line, text=self.app.line_text, about=about, takes="opens it"
+        )
         self.app.push_screen(dialog, typed)
 
     @work(exclusive=True, group="line", exit_on_error=False)
     async def open_line(self, text: str) -> None:
         """Open a line and ask for its drives."""
-        if not await self.app.may_let_go("Close the line for another?", CLOSE_KEYS):
+        question = "Close the line for another?"
+        if not await self.app.may_let_go(question, yes="closes it", no="keeps it"):
             return
         self.forget_drives()
         self.say(f"Opening {text}", "")
@@ -76,7 +77,7 @@ class LineKeys(Scanning):
     @work(exclusive=True, group="line", exit_on_error=False)
     async def action_disconnect(self) -> None:
         """Close the line; where that trips a running drive, only after saying so."""
-        if not await self.app.may_let_go("Close the line?", CLOSE_KEYS):
+        if not await self.app.may_let_go("Close the line?", yes="closes it", no="keeps it"):
             return
         self.forget_drives()
         await self.app.disconnect()

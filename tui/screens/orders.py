@@ -75,8 +75,15 @@ class OrderKeys(Arming):
                 starts.unrecorded = True
                 self._give(lambda: self.commander.order(order))
 
-        keys = "y runs it without a record   Esc does not run it"
-        self.app.push_screen(Confirm(f"Run {order} unrecorded?", str(outcome.error), keys), told)
+        asked = Confirm(
+            f"Run {order} unrecorded?",
+            str(outcome.error),
+            yes="runs it without a record",
+            no="does not run it",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
 
     def _refuse(self, text: str) -> None:
         self.commander.refuse(text)
@@ -102,8 +109,15 @@ class OrderKeys(Arming):
             "This is no stop. Command and reference go back to the terminals or the keypad:"
             " a run order that waits there starts the motor."
         )
-        keys = "y or Enter gives it back   Esc keeps it"
-        self.app.push_screen(Confirm("Give the control back?", follows, keys), told)
+        asked = Confirm(
+            "Give the control back?",
+            follows,
+            yes="gives it back",
+            no="keeps it",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
 
     def action_stop_as(self, id: OrderId) -> None:
         """Stop the drive in another way than on its ramp; needs no arming."""
@@ -129,7 +143,15 @@ class OrderKeys(Arming):
             return ""
 
         if self._armed_or_told():
-            self.app.push_screen(Ask("Reference", wrong, about=about, number=True), given)
+            asked = Ask(
+                "Reference",
+                wrong,
+                about=about,
+                takes="writes it",
+                number=True,
+                now=self.motor_now(),
+            )
+            self.app.push_screen(asked, given)
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""
@@ -145,7 +167,7 @@ class OrderKeys(Arming):
             if choice is not None:
                 self._give(lambda: self.commander.choose_option(*choice))
 
-        self.app.push_screen(OptionsScreen(chart.options, raws), chosen)
+        self.app.push_screen(OptionsScreen(chart.options, raws, self.motor_now()), chosen)
 
     def _give(self, order: Callable[[], None]) -> None:
         try:

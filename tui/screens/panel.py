@@ -81,10 +81,11 @@ class Panel(App[None]):
         """Close the open line, if there is one."""
 
     @abstractmethod
-    async def may_let_go(self, question: str, keys: str) -> bool:
+    async def may_let_go(self, question: str, *, yes: str, no: str, always: str = "") -> bool:
         """Whether the drives of the line may be left alone; asks where that trips one that runs.
 
-        Belongs into a worker: it waits for the answer.
+        With `always` it asks in any case, and says that. Belongs into a worker: it waits for
+        the answer.
         """
 
     @abstractmethod

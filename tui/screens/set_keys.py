@@ -59,7 +59,8 @@ class SetKeys(ParameterKeys):
                 self.run_worker(work, exclusive=True, group="sets")
 
         proposed = str(Path.cwd() / name)
-        self.app.push_screen(Ask(question, fault_of_new, text=proposed, about=about), told)
+        asked = Ask(question, fault_of_new, text=proposed, about=about, takes="writes the file")
+        self.app.push_screen(asked, told)
 
     async def _read_to_file(self, path: Path, text: Callable[[ParameterSet], str]) -> None:
         from tui.drive.set_file import write_file
@@ -95,7 +96,8 @@ class SetKeys(ParameterKeys):
             "A file of a backup, the address of another drive found on this line, or `factory`."
             " What it has otherwise is shown; n stages it."
         )
-        self.app.push_screen(Ask("Compare with", self._nameable, about=about), told)
+        asked = Ask("Compare with", self._nameable, about=about, takes="compares")
+        self.app.push_screen(asked, told)
 
     def _nameable(self, text: str) -> str:
         """What is wrong with what was typed, or nothing."""

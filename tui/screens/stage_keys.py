@@ -82,8 +82,15 @@ class StageKeys(ParameterKeys):
             " Read it at the keypad: only if both show the same, confirm it."
             f" Here it reads {self.editor.raws.get(code, 'nothing')}."
         )
-        keys = "y or Enter: the keypad shows the same   Esc: not confirmed"
-        self.app.push_screen(Confirm(f"Confirm {code}?", follows, keys), told)
+        asked = Confirm(
+            f"Confirm {code}?",
+            follows,
+            yes="the keypad shows the same",
+            no="not confirmed",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
 
     def action_undo(self) -> None:
         """Take the edit under the cursor back."""
@@ -104,7 +111,15 @@ class StageKeys(ParameterKeys):
                 self.list_again()
 
         follows = f"{count} staged edits are dropped; the drive is not touched."
-        self.app.push_screen(Confirm("Undo all edits?", follows, "y or Enter drops   Esc"), told)
+        asked = Confirm(
+            "Undo all edits?",
+            follows,
+            yes="drops them",
+            no="keeps them",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
 
     def action_favourite(self) -> None:
         """Mark or unmark the parameter."""

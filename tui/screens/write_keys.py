@@ -35,9 +35,16 @@ class WriteKeys(ParameterKeys):
                 self.editor.apply((only,) if only else ())
                 self.look()
 
-        codes = f"Write {only}?" if only else f"Write {len(edits)} parameters?"
-        keys = "y or Enter writes, each read back   Esc writes nothing"
-        self.app.push_screen(Confirm(codes, write_text(self.editor, edits), keys), told)
+        many = f"{len(edits)} parameters" if len(edits) > 1 else "1 parameter"
+        asked = Confirm(
+            f"Write {only or many}?",
+            write_text(self.editor, edits),
+            yes="writes, each read back",
+            no="writes nothing",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
 
     def action_write_one(self) -> None:
         """Write the edit under the cursor."""
@@ -76,8 +83,15 @@ class WriteKeys(ParameterKeys):
                 work()
                 self.look()
 
-        keys = "y or Enter does it   Esc leaves all as it is"
-        self.app.push_screen(Confirm(question, order.does, keys), told)
+        asked = Confirm(
+            question,
+            order.does,
+            yes="does it",
+            no="leaves all as it is",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
 
     def offer_to_follow(self) -> None:
         """Ask once whether to go where the drive answers now."""
@@ -95,5 +109,14 @@ class WriteKeys(ParameterKeys):
             if sure:
                 self.app.follow(moved.line, moved.device)
 
-        keys = "y or Enter follows it   Esc stays"
-        self.app.push_screen(Confirm("Follow the drive?", moved.text, keys), told)
+        # the line is opened anew as this drive wants it: others on it are not asked meanwhile
+        found = self.app.fleet.consoles if self.app.fleet else ()
+        asked = Confirm(
+            "Follow the drive?",
+            moved.text,
+            yes="follows it",
+            no="stays",
+            loses=len(found) > 1,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)

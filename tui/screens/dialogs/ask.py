@@ -3,29 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import ClassVar
+from typing import TYPE_CHECKING
 
 from textual.app import ComposeResult
-from textual.binding import Binding
 from textual.containers import Vertical
-from textual.screen import ModalScreen
 from textual.widgets import Input
 
 from tui.widgets.fields import Field, NumberInput
 from tui.widgets.plain import Plain
 
+from .question import Question, hint
+
+if TYPE_CHECKING:
+    from .now import MotorsNow
+
 Check = Callable[[str], str]
 """What is wrong with a text, or nothing."""
 
 
-class Ask(ModalScreen[str | None]):
-    """Asks a question; gives the answer back once it is right, or None.
+class Ask(Question[str | None]):
+    """Asks for a text; gives it back once it is right, or None.
 
-    A `number` has no spaces in it: Space stops there, as outside of texts.
+    `takes` says what Enter does with it. A `number` has no spaces in it: Space stops there, as
+    outside of texts.
     """
-
-    CSS_PATH = "ask.tcss"
-    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", show=False)]
 
     def __init__(
         self,
@@ -34,28 +35,32 @@ class Ask(ModalScreen[str | None]):
         *,
         text: str = "",
         about: str = "",
+        takes: str = "takes it",
         number: bool = False,
+        now: MotorsNow | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(now)
         self._field = NumberInput if number else Field
         self._question = question
         self._check = check
         self._text = text
         self._about = about
+        self._takes = takes
 
     def compose(self) -> ComposeResult:
         """A field, room for what is wrong, and what an answer looks like."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
+            yield from self.now_lines()
             yield self._field(self._text, id="answer")
             yield Plain("", id="fault")
             yield Plain(self._about, id="about")
-            yield Plain("Enter accept   Esc cancel", id="hint")
+            yield Plain(hint(("Enter", self._takes), ("Esc", "takes nothing")), id="hint")
 
     def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Give the answer back if nothing is wrong with it."""
+        """Give the text back if nothing is wrong with it."""
         fault = self._check(event.value)
         if fault:
             self.query_one("#fault", Plain).update(fault)
         else:
-            self.dismiss(event.value.strip())
+            self.answer(event.value.strip())

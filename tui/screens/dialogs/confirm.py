@@ -2,34 +2,77 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
+from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
-from textual.screen import ModalScreen
+from textual.containers import Vertical, VerticalScroll
 
+from tui.widgets.palette import ALARM
 from tui.widgets.plain import Plain
 
+from .question import KeyQuestion, hint
 
-class Confirm(ModalScreen[bool]):
-    """Says what follows; True for the keys that go on, False for Esc."""
+if TYPE_CHECKING:
+    from .now import MotorsNow
 
-    CSS_PATH = "ask.tcss"
+
+class Confirm(KeyQuestion[bool]):
+    """Says what follows; True for `y`, False for Esc, `q` and `n`.
+
+    `yes` and `no` say what the keys do. Where it `loses` nothing, because nothing is written,
+    moved or deleted, Enter is yes too.
+    """
+
+    NO = False
     BINDINGS: ClassVar = [
-        Binding("escape,n", "dismiss(False)", "stay", show=False),
-        Binding("enter,q,y", "dismiss(True)", "leave", show=False),
+        Binding("y", "yes", show=False),
+        Binding("enter", "enter", show=False),
     ]
 
-    def __init__(self, question: str, follows: str, keys: str) -> None:
-        super().__init__()
+    def __init__(
+        self,
+        question: str,
+        follows: str,
+        *,
+        yes: str,
+        no: str,
+        loses: bool,
+        now: MotorsNow | None = None,
+    ) -> None:
+        super().__init__(now)
         self._question = question
         self._follows = follows
-        self._keys = keys
+        self._loses = loses
+        self._keys = hint(("y" if loses else "y or Enter", yes), ("Esc or q", no))
 
     def compose(self) -> ComposeResult:
-        """What is asked, what follows, and the keys."""
+        """What is asked, what the motor does, what follows, and the keys."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
-            yield Plain(self._follows, id="follows")
+            yield from self.now_lines()
+            with VerticalScroll(id="says"):
+                yield Plain(self._follows, id="follows")
             yield Plain(self._keys, id="hint")
+
+    def on_mount(self) -> None:
+        """What is too long for the terminal can be scrolled; that is told."""
+        self.call_after_refresh(self._tell_scrolling)
+
+    def _tell_scrolling(self) -> None:
+        if self.query_one("#says").max_scroll_y:
+            self._keys.append("   ").append_text(hint(("Up, Down", "scroll")))
+            self.query_one("#hint", Plain).update(self._keys)
+
+    def action_yes(self) -> None:
+        """Go on."""
+        self.answer(True)
+
+    def action_enter(self) -> None:
+        """Go on where nothing can be lost; elsewhere say that Enter is no answer."""
+        if not self._loses:
+            self.answer(True)
+            return
+        told = Text("Enter is no answer here.   ", ALARM)
+        self.query_one("#hint", Plain).update(told.append_text(self._keys))

@@ -10,7 +10,6 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
-from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList
 
 from tui.drive.errors import DriveError
@@ -22,13 +21,15 @@ from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.parameter_view import factory_text, range_text, value_text
 from tui.widgets.plain import Plain, entry
 
+from .question import KeyQuestion, Question, hint
 
-class EditNumber(ModalScreen[str | None]):
+STAGES_NOTHING = ("Esc", "stages nothing")
+
+
+class EditNumber(Question[str | None]):
     """A number with its unit: checked while it is typed, shown as the drive will hold it."""
 
-    CSS_PATH = "edit_value.tcss"
     BINDINGS: ClassVar = [
-        Binding("escape", "dismiss(None)", "cancel", show=False),
         Binding("up", "step(1)", "one step up", show=False),
         Binding("down", "step(-1)", "one step down", show=False),
         Binding("pageup", "step(10)", "ten steps up", show=False),
@@ -54,7 +55,8 @@ class EditNumber(ModalScreen[str | None]):
             about += [f"range {limits}"] if limits else []
             about += [f"factory {factory}"] if factory else []
             yield Plain("   ".join(about), id="about")
-            yield Plain("Enter stages it   Up Down one step   Esc cancel", id="hint")
+            keys = (("Enter", "stages it"), ("Up Down", "one step"), STAGES_NOTHING)
+            yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:
         """Tell what stands there."""
@@ -106,14 +108,11 @@ class EditNumber(ModalScreen[str | None]):
     def on_input_submitted(self, event: Input.Submitted) -> None:
         """Give it back once nothing is wrong with it."""
         if self._check(event.value):
-            self.dismiss(event.value.strip())
+            self.answer(event.value.strip())
 
 
-class PickValue(ModalScreen[int | None]):
+class PickValue(KeyQuestion[int | None]):
     """One of the names of an enumeration."""
-
-    CSS_PATH = "edit_value.tcss"
-    BINDINGS: ClassVar = [Binding("escape", "dismiss(None)", "cancel", show=False)]
 
     def __init__(self, editor: Editor, parameter: Parameter) -> None:
         super().__init__()
@@ -129,7 +128,7 @@ class PickValue(ModalScreen[int | None]):
                 id="choices",
                 compact=True,
             )
-            yield Plain("Enter stages it   Esc cancel", id="hint")
+            yield Plain(hint(("Enter", "stages it"), STAGES_NOTHING), id="hint")
 
     def on_mount(self) -> None:
         """Begin at the staged or held value."""
@@ -151,15 +150,13 @@ class PickValue(ModalScreen[int | None]):
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
         """Give the raw value back."""
-        self.dismiss(self._names[event.option_index][0])
+        self.answer(self._names[event.option_index][0])
 
 
-class EditBits(ModalScreen[int | None]):
+class EditBits(KeyQuestion[int | None]):
     """The bits of a word, one by one."""
 
-    CSS_PATH = "edit_value.tcss"
     BINDINGS: ClassVar = [
-        Binding("escape", "dismiss(None)", "cancel", show=False),
         Binding("s", "take", "stage", show=False),
     ]
 
@@ -178,7 +175,8 @@ class EditBits(ModalScreen[int | None]):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="held")
-            yield Plain("Enter turns a bit   s stages the word   Esc cancel", id="hint")
+            keys = (("Enter", "turns a bit"), ("s", "stages the word"), STAGES_NOTHING)
+            yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:
         """Show the word."""
@@ -206,7 +204,7 @@ class EditBits(ModalScreen[int | None]):
 
     def action_take(self) -> None:
         """Give the word back."""
-        self.dismiss(self._word)
+        self.answer(self._word)
 
 
 Dialog = EditNumber | PickValue | EditBits

@@ -1,36 +1,53 @@
-"""Leaving while a motor runs by an order from here: stop it, or leave it running knowingly."""
+"""Leaving while a motor runs by a command from here: stop it, or leave it running knowingly."""
 
 from __future__ import annotations
 
-from typing import ClassVar, Literal
+from typing import TYPE_CHECKING, ClassVar, Literal
 
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.containers import Vertical
-from textual.screen import ModalScreen
+from textual.containers import Vertical, VerticalScroll
 
 from tui.widgets.plain import Plain
+
+from .question import KeyQuestion, hint
+
+if TYPE_CHECKING:
+    from .now import MotorsNow
 
 Choice = Literal["stop", "leave", "stay"]
 
 
-class Leave(ModalScreen[Choice]):
-    """Asks what becomes of the motors."""
+class Leave(KeyQuestion[Choice]):
+    """Asks what becomes of the motors; to stop them is safe, so Enter does that too."""
 
-    CSS_PATH = "ask.tcss"
+    NO: ClassVar[Choice] = "stay"
+    GUARDED = "enter,l"
     BINDINGS: ClassVar = [
-        Binding("s,enter", "dismiss('stop')", "stop and leave", show=False),
-        Binding("l", "dismiss('leave')", "leave running", show=False),
-        Binding("escape,n", "dismiss('stay')", "stay", show=False),
+        Binding("s,enter", "choose('stop')", show=False),
+        Binding("l", "choose('leave')", show=False),
     ]
 
-    def __init__(self, follows: str) -> None:
-        super().__init__()
+    def __init__(self, follows: str, now: MotorsNow | None = None) -> None:
+        super().__init__(now)
         self._follows = follows
 
     def compose(self) -> ComposeResult:
         """What runs, what happens when it is left, and the keys."""
         with Vertical(id="dialog"):
-            yield Plain("A motor runs by your order", id="question")
-            yield Plain(self._follows, id="follows")
-            yield Plain("s or Enter: stop and leave   l: leave it running   Esc: stay", id="hint")
+            yield Plain("A motor runs by your command", id="question")
+            yield from self.now_lines()
+            with VerticalScroll(id="says"):
+                yield Plain(self._follows, id="follows")
+            yield Plain(
+                hint(
+                    ("s or Enter", "stops and leaves"),
+                    ("l", "leaves it running"),
+                    ("Esc or q", "stays"),
+                ),
+                id="hint",
+            )
+
+    def action_choose(self, choice: Choice) -> None:
+        """Give the choice back."""
+        self.answer(choice)

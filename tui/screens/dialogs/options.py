@@ -3,28 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
-from textual.screen import ModalScreen
 from textual.widgets import OptionList
 
 from tui.drive.schema import CommandOption
-from tui.widgets.palette import FAINT, PLAIN, STRONG
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
+from .question import KeyQuestion, hint
 
-class OptionsScreen(ModalScreen[tuple[CommandOption, int] | None]):
-    """A list of every choice; gives the chosen one back, or None."""
+if TYPE_CHECKING:
+    from .now import MotorsNow
 
-    CSS_PATH = "ask.tcss"
-    BINDINGS: ClassVar = [Binding("escape,o", "dismiss(None)", "cancel", show=False)]
+KEYS = hint(("Up, Down", "choose"), ("y", "writes it"), ("Esc or q", "writes nothing"))
 
-    def __init__(self, options: Sequence[CommandOption], raws: Mapping[str, int]) -> None:
-        super().__init__()
+
+class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
+    """A list of every choice; gives the one under the cursor back for `y`, or None."""
+
+    BINDINGS: ClassVar = [Binding("y", "yes", show=False), Binding("o", "no", show=False)]
+
+    def __init__(
+        self,
+        options: Sequence[CommandOption],
+        raws: Mapping[str, int],
+        now: MotorsNow | None = None,
+    ) -> None:
+        super().__init__(now)
         self._choices = [
             (option, choice.bits, choice_line(option, choice.bits, choice.name, raws))
             for option in options
@@ -35,17 +45,25 @@ class OptionsScreen(ModalScreen[tuple[CommandOption, int] | None]):
         """The list and its keys."""
         with Vertical(id="dialog"):
             yield Plain("Options of the commands", id="question")
+            yield from self.now_lines()
             yield OptionList(
                 *(entry(line, id=str(at)) for at, (_, _, line) in enumerate(self._choices)),
                 id="choices",
                 compact=True,
             )
-            yield Plain("Enter sets it   Esc cancel", id="hint")
+            yield Plain(KEYS, id="hint")
 
-    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+    def on_option_list_option_selected(self) -> None:
+        """Enter writes nothing: say which key does."""
+        told = Text("Enter is no answer here.   ", ALARM)
+        self.query_one("#hint", Plain).update(told.append_text(KEYS))
+
+    def action_yes(self) -> None:
         """Give the choice back."""
-        option, bits, _ = self._choices[int(event.option.id or 0)]
-        self.dismiss((option, bits))
+        at = self.query_one(OptionList).highlighted
+        if at is not None:
+            option, bits, _ = self._choices[at]
+            self.answer((option, bits))
 
 
 def choice_line(option: CommandOption, bits: int, name: str, raws: Mapping[str, int]) -> Text:

@@ -8,7 +8,6 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import Vertical
-from textual.screen import ModalScreen
 from textual.widgets import Input, OptionList
 
 from tui.drive.mapping import choices
@@ -19,17 +18,18 @@ from tui.widgets.fields import Field
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
+from .question import Question, hint
+
 MOST = 100
 """Parameters that are listed at once; a search brings the others."""
 NAME_WIDTH = 30
+KEYS = hint(("Up, Down", "choose"), ("Enter", "proposes it"), ("Esc", "proposes nothing"))
 
 
-class PickParameter(ModalScreen[str | None]):
+class PickParameter(Question[str | None]):
     """Gives the code of a parameter back, `none`, or None when it was left."""
 
-    CSS_PATH = "pick_parameter.tcss"
     BINDINGS: ClassVar = [
-        Binding("escape", "dismiss(None)", "cancel", show=False),
         Binding("up", "step(-1)", "up", show=False, priority=True),
         Binding("down", "step(1)", "down", show=False, priority=True),
     ]
@@ -46,7 +46,7 @@ class PickParameter(ModalScreen[str | None]):
             yield Field(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
-            yield Plain("Enter takes it   Up, Down   Esc cancel", id="hint")
+            yield Plain(KEYS, id="hint")
 
     def on_mount(self) -> None:
         """Everything that the slot can stand for."""
@@ -99,6 +99,6 @@ class PickParameter(ModalScreen[str | None]):
         if at is None:
             return
         if not searched and at == 0:
-            self.dismiss("none")
+            self.answer("none")
             return
-        self.dismiss(self._found[at if searched else at - 1].code)
+        self.answer(self._found[at if searched else at - 1].code)

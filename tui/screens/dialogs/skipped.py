@@ -14,15 +14,17 @@ from textual.screen import ModalScreen
 
 from tui.drive.plain import plain
 from tui.drive.restore_plan import Item
-from tui.widgets.palette import FAINT, PLAIN, STRONG
+from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
+
+from .question import hint
 
 
 class Skipped(ModalScreen[None]):
     """A list to read through; scrolls."""
 
-    CSS_PATH = "skipped.tcss"
-    BINDINGS: ClassVar = [Binding("escape,enter,q", "dismiss(None)", "close", show=False)]
+    CSS_PATH = "dialogs.tcss"
+    BINDINGS: ClassVar = [Binding("escape,enter,q", "dismiss(None)", show=False)]
 
     def __init__(self, staged: int, label: str, left: Sequence[Item]) -> None:
         super().__init__()
@@ -39,4 +41,4 @@ class Skipped(ModalScreen[None]):
         with VerticalScroll(id="dialog"):
             yield Plain(self._head, id="question")
             yield Plain(table)
-            yield Plain(Text("Up and Down scroll   Esc closes", FAINT))
+            yield Plain(hint(("Up and Down", "scroll"), ("Esc", "closes")))

@@ -1,0 +1,387 @@
+"""What holds for every question: which keys are yes, when they count, what the motor does."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+import pytest
+from textual.screen import ModalScreen
+
+from tui.app import DrivePanelApp
+from tui.drive import library
+from tui.screens.blocks import BlocksScreen
+from tui.screens.control_source import ControlSourceScreen
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.leave import Leave
+from tui.screens.dialogs.now import MotorsNow
+from tui.screens.dialogs.options import OptionsScreen
+from tui.screens.dialogs.question import Question, void_questions
+from tui.screens.help import HelpScreen
+from tui.screens.parameters import ParametersScreen
+from tui.session.keeper import Look
+from tui.session.monitor import Snapshot
+from tui.widgets.motor_now import motor_now
+
+from . import fakes
+from .test_command_flows import Bench, bench
+from .test_flows import shown, until
+
+MOMENT = 0.3
+"""Seconds before which Enter and y are no answers, by the rules of the panel's hands."""
+
+
+class HandClock(fakes.StillClock):
+    """A clock that goes when it is told to."""
+
+    def __init__(self) -> None:
+        self.now = fakes.NOW
+
+    def monotonic(self) -> float:
+        """Seconds that the test has let go by."""
+        return self.now
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+IS_EARLY = Question._is_early
+
+
+@pytest.fixture
+def slow_hands(monkeypatch: pytest.MonkeyPatch, quick_hands: None) -> None:
+    """Questions as they are outside of tests."""
+    monkeypatch.setattr(Question, "_is_early", IS_EARLY)
+
+
+def confirm(*, loses: bool = True, now: MotorsNow | None = None) -> Confirm:
+    return Confirm("Write?", "It is written.", yes="writes", no="no", loses=loses, now=now)
+
+
+class Asked:
+    """A question on the screen of a panel without a line, and what became of it."""
+
+    def __init__(self, question: Question[Any]) -> None:
+        self.question = question
+        self.app = fakes.app_of()
+        self.clock = HandClock()
+        self.app.clock = self.clock
+        self.answers: list[object] = []
+
+    async def put(self, pilot: Any) -> None:
+        await self.app.push_screen(self.question, self.answers.append)
+        await until(pilot, lambda: self.question._drawn is not None)
+
+
+def test_the_moment_is_that_of_the_rules() -> None:
+    assert Question.SETTLED == MOMENT
+
+
+YES: dict[str, tuple[Callable[[], Question[Any]], str, object]] = {
+    "confirm": (confirm, "y", True),
+    "harmless": (lambda: confirm(loses=False), "enter", True),
+    "leave by enter": (lambda: Leave("it runs"), "enter", "stop"),
+    "leave running": (lambda: Leave("it runs"), "l", "leave"),
+    "reference": (lambda: Ask("Reference", lambda _: "", text="30", number=True), "enter", "30"),
+    "option": (
+        lambda: OptionsScreen(library.load("atv71").data.charts[0].options, {}),
+        "y",
+        "first",
+    ),
+}
+
+
+@pytest.mark.usefixtures("slow_hands")
+@pytest.mark.parametrize("name", YES)
+async def test_a_key_that_comes_too_early_is_no_answer(name: str) -> None:
+    make, key, answer = YES[name]
+    asked = Asked(make())
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        for passed in (0.0, 0.1, MOMENT - 0.01):
+            asked.clock.now = fakes.NOW + passed
+            await pilot.press(key, key)
+            assert asked.answers == []
+            assert asked.app.screen is asked.question
+        asked.clock.now = fakes.NOW + MOMENT + 0.01
+        await pilot.press(key)
+        await until(pilot, lambda: bool(asked.answers))
+        if answer == "first":
+            assert asked.answers[0] is not None
+        else:
+            assert asked.answers == [answer]
+
+
+@pytest.mark.usefixtures("slow_hands")
+@pytest.mark.parametrize(("key", "answer"), [("s", "stop"), ("escape", "stay"), ("q", "stay")])
+async def test_a_stop_and_a_no_count_at_once(key: str, answer: str) -> None:
+    asked = Asked(Leave("it runs"))
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        await pilot.press(key)
+        await until(pilot, lambda: asked.answers == [answer])
+
+
+@pytest.mark.parametrize("key", ["escape", "q", "n"])
+@pytest.mark.parametrize("loses", [True, False])
+async def test_no_is_no_on_three_keys(key: str, loses: bool) -> None:
+    asked = Asked(confirm(loses=loses))
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        await pilot.press(key)
+        await until(pilot, lambda: asked.answers == [False])
+
+
+async def test_enter_is_no_yes_where_something_is_lost_and_that_is_said() -> None:
+    asked = Asked(confirm())
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        hint = asked.question.query_one("#hint")
+        assert str(hint.render()).startswith("y writes")
+        await pilot.press("enter", "enter", "w", "s")
+        assert asked.answers == []
+        assert str(hint.render()).startswith("Enter is no answer here")
+        assert "y writes" in str(hint.render())
+    assert str(Confirm("", "", yes="goes", no="stays", loses=False)._keys).startswith("y or Enter")
+
+
+async def test_a_long_question_keeps_its_keys_in_sight_and_scrolls() -> None:
+    follows = "\n".join(f"line {number}" for number in range(40))
+    asked = Asked(Confirm("Write?", follows, yes="writes", no="writes nothing", loses=True))
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        hint = asked.question.query_one("#hint")
+        await until(pilot, lambda: "Up, Down scroll" in str(hint.render()))
+        await until(pilot, lambda: 0 < hint.region.bottom < 24)
+        says = asked.question.query_one("#says")
+        await pilot.press("down", "down")
+        await until(pilot, lambda: says.scroll_y == 2)
+
+
+# A stop of the drive ends the question
+
+
+async def test_a_voided_question_answers_no_and_takes_no_yes_any_more() -> None:
+    asked = Asked(confirm())
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        asked.question._voided = True
+        await pilot.press("y")
+        await until(pilot, lambda: asked.answers == [False])
+    for question, no in ((confirm(), False), (Leave("it runs"), "stay"), (ask(), None)):
+        asked = Asked(question)
+        async with asked.app.run_test(size=(80, 24)) as pilot:
+            await asked.put(pilot)
+            question.void()
+            question.void()
+            await until(pilot, lambda: bool(asked.answers))  # noqa: B023
+            await pilot.pause(0.1)
+            assert asked.app.screen is asked.app.connection
+            assert asked.answers == [no]
+
+
+def ask() -> Ask:
+    return Ask("Reference", lambda _: "", number=True)
+
+
+async def test_a_question_below_another_screen_is_voided_when_it_comes_up() -> None:
+    asked = Asked(confirm())
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        await asked.app.push_screen(HelpScreen("monitor"))
+        asked.question.void()
+        await pilot.pause()
+        assert asked.app.screen.query("#help")
+        await pilot.press("escape")
+        await until(pilot, lambda: asked.answers == [False])
+        assert asked.app.screen is asked.app.connection
+
+
+async def test_only_questions_about_the_stopped_drive_end() -> None:
+    app = fakes.app_of()
+    snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
+    async with app.run_test(size=(80, 24)) as pilot:
+        about = confirm(now=MotorsNow(app, [fakes.console_of(snapshot)]))
+        other = confirm()
+        await app.push_screen(other)
+        await app.push_screen(about)
+        void_questions(app, 5)
+        await pilot.pause()
+        assert app.screen is about
+        void_questions(app, 2)
+        await until(pilot, lambda: app.screen is other)
+
+
+# What the motor does now
+
+
+def now_text(snapshot: Snapshot | None, look: Look | None = None, passed: float = 0.0) -> str:
+    now = fakes.NOW + passed
+    return motor_now(library.load("atv71"), snapshot, 0.5, look, now).plain
+
+
+def test_what_the_motor_does_now_in_a_line() -> None:
+    profile = library.load("atv71")
+    running = fakes.snapshot_of(profile, fakes.RUNNING)
+    assert now_text(running).split() == ["▶", "running", "forward", "50.0", "Hz", "8.4", "A"]
+    assert now_text(fakes.snapshot_of(profile, fakes.FAULT)).startswith("■ fault ObF")
+    place = now_text(running).index("Hz")
+    assert now_text(fakes.snapshot_of(profile, fakes.READY)).index("Hz") == place
+    # three cycles later it is not the present any more
+    assert "▶" in now_text(running, passed=1.3)
+    assert now_text(running, passed=5.0) == "? not known now   5s ago: running forward"
+    lost = fakes.snapshot_of(profile, fakes.RUNNING, error="No answer.", age=2.0)
+    assert now_text(lost).startswith("? not known now   2s ago")
+    unplugged = fakes.snapshot_of(profile, fakes.RUNNING, line=fakes.LOST)
+    assert now_text(unplugged).startswith("? not known now")
+    assert now_text(None) == "? not known now"
+
+
+def test_where_nobody_watches_the_looks_of_the_line_tell_the_state() -> None:
+    profile = library.load("atv71")
+    state = fakes.snapshot_of(profile, fakes.RUNNING).state
+    look = Look(state, "", fakes.NOW, None)
+    assert now_text(None, look).strip() == "▶ running forward"
+    assert now_text(None, look, 20.0).startswith("? not known now   20s ago: running")
+    old = fakes.snapshot_of(profile, fakes.READY, age=60)
+    assert now_text(old, look).strip() == "▶ running forward"
+
+
+async def test_a_question_tells_what_the_motor_does_while_it_is_open() -> None:
+    asked = Asked(confirm())
+    profile = library.load("atv71")
+    console = fakes.console_of(fakes.snapshot_of(profile, fakes.RUNNING))
+    asked.question._now = MotorsNow(asked.app, [console])
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        now = asked.question.query_one("#now")
+        assert "running forward" in str(now.render())
+        stopped = fakes.snapshot_of(profile, fakes.READY)
+        console.monitor = fakes.StillMonitor(console.session, stopped, ())
+        await until(pilot, lambda: "ready" in str(now.render()))
+        two = MotorsNow(asked.app, [console, console])
+        assert [line.split()[:2] for line in two().plain.splitlines()] == [["Now", "2"]] * 2
+        six = MotorsNow(asked.app, [console] * 6)
+        assert six().plain.splitlines()[-1] == "and 2 more"
+
+
+# The real questions: nothing is written on any key but y
+
+
+async def write_parameters(made: Bench) -> None:
+    await made.pilot.press("3")
+    await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+    await until(made.pilot, lambda: bool(shown(made.app, "table")))
+    await made.pilot.press("slash", *"hsp", "enter")
+    await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
+    await made.pilot.press("minus")
+    await until(made.pilot, lambda: "1 staged" in shown(made.app, "status"))
+    await made.pilot.press("a", "w")
+
+
+async def factory(made: Bench) -> None:
+    made.drive().set("FRY", 1)
+    await made.pilot.press("3")
+    await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+    await until(made.pilot, lambda: bool(shown(made.app, "table")))
+    await made.pilot.press("a", "F")
+
+
+async def save(made: Bench) -> None:
+    await factory(made)
+    await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+    await made.pilot.press("escape", "s")
+
+
+async def write_block(made: Bench) -> None:
+    await made.pilot.press("4")
+    await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))
+    await until(made.pilot, lambda: "ETA" in shown(made.app, "first"))
+    await made.pilot.press("c", "a")
+    await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
+    await made.pilot.press("w")
+
+
+async def control_source(made: Bench) -> None:
+    await made.pilot.press("c")
+    await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))
+    await until(made.pilot, lambda: "reading" not in shown(made.app, "message"))
+    await made.pilot.press("down", "a", "enter")
+
+
+async def hand_back(made: Bench) -> None:
+    await made.armed()
+    await made.pilot.press("g")
+
+
+async def option(made: Bench) -> None:
+    await made.armed()
+    await made.pilot.press("o", "down")
+
+
+QUESTIONS: dict[str, tuple[Callable[[Bench], Awaitable[None]], type[ModalScreen[Any]]]] = {
+    "write": (write_parameters, Confirm),
+    "factory": (factory, Confirm),
+    "save": (save, Confirm),
+    "block": (write_block, Confirm),
+    "control source": (control_source, Confirm),
+    "hand back": (hand_back, Confirm),
+    "option": (option, OptionsScreen),
+}
+
+
+def writes(app: DrivePanelApp) -> list[bytes]:
+    """The requests that wrote anything, among the last frames of the line."""
+    assert app.opened is not None
+    frames = [frame for frame in app.opened.line.trace if frame.direction == "out"]
+    return [frame.data for frame in frames if frame.data[1] in (5, 6, 15, 16, 22, 23)]
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+async def test_nothing_is_written_on_any_key_but_y(name: str) -> None:
+    way, kind = QUESTIONS[name]
+    async with bench("atv21" if name == "hand back" else "atv71") as made:
+        for key in ("q", "n", "escape", "enter"):
+            await way(made)
+            await until(made.pilot, lambda: isinstance(made.app.screen, kind))
+            now = str(made.app.screen.query_one("#now").render())
+            assert "ready" in now or "not known" in now or "stopped" in now, now
+            await made.pilot.press(key)
+            await made.pilot.pause(0.3)
+            assert isinstance(made.app.screen, kind) is (key == "enter")
+            assert writes(made.app) == []
+            if key != "enter":
+                await back_to_monitor(made)
+        await made.pilot.press("y")
+        await until(made.pilot, lambda: not isinstance(made.app.screen, kind))
+        await until(made.pilot, lambda: bool(writes(made.app)))
+
+
+async def back_to_monitor(made: Bench) -> None:
+    """From where the question was asked; what was staged or armed there is let go."""
+    if isinstance(made.app.screen, ParametersScreen):
+        made.app.screen.action_undo()
+        made.app.screen.commander.disarm()
+        await made.pilot.press("2")
+    elif isinstance(made.app.screen, BlocksScreen | ControlSourceScreen):
+        made.app.screen.commander.disarm()
+        await made.pilot.press("2")
+    else:
+        await made.pilot.press("a")
+    await until(made.pilot, lambda: bool(shown(made.app, "state")))
+
+
+async def test_the_panel_is_not_left_past_a_question() -> None:
+    async with bench("atv71") as made:
+        await write_parameters(made)
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        asked = made.app.screen
+        await made.pilot.press("ctrl+q", "ctrl+c")
+        await made.app.action_quit()
+        await made.pilot.pause(0.2)
+        assert made.app.screen is asked
+        assert made.app._exit is False
+        assert writes(made.app) == []

@@ -1,0 +1,135 @@
+"""What every question has: no answer by accident, and what the motor does while it is asked.
+
+Enter and `y` count only once the question has stood on the screen for a moment: a key that was
+typed before it was there was meant for something else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
+
+from rich.text import Text
+from textual.binding import Binding
+from textual.screen import ModalScreen
+
+from tui.drive.plain import plain
+from tui.widgets.palette import FAINT, KEY
+from tui.widgets.plain import Plain
+
+if TYPE_CHECKING:
+    from tui.screens.panel import Panel
+
+    from .now import MotorsNow
+
+T = TypeVar("T")
+
+NOW_EVERY = 0.5
+"""Seconds between two looks at what the motor does."""
+
+
+class Question(ModalScreen[T]):
+    """A dialog that gives an answer back; Esc is no, as is a stop of the drive meanwhile."""
+
+    app: Panel
+    CSS_PATH = "dialogs.tcss"
+    SETTLED: ClassVar[float] = 0.3
+    """Seconds that a question has stood before Enter and `y` are answers."""
+    NO: ClassVar[Any] = None
+    """The answer that changes nothing."""
+    GUARDED: ClassVar[str] = "enter"
+    """Keys that are swallowed until the question has stood for that time."""
+    BINDINGS: ClassVar = [Binding("escape", "no", show=False)]
+
+    def __init_subclass__(cls, **how: Any) -> None:
+        """Guard the keys of each question: Textual lets a class replace those of its base."""
+        guard = Binding(cls.GUARDED, "swallow", show=False, priority=True)
+        cls.BINDINGS = [guard, *vars(cls).get("BINDINGS", ())]
+        super().__init_subclass__(**how)
+
+    def __init__(self, now: MotorsNow | None = None) -> None:
+        super().__init__()
+        self._now = now
+        self._drawn: float | None = None
+        self._voided = self._answered = False
+
+    def on_mount(self) -> None:
+        """From its first picture on it is asked."""
+        self.call_after_refresh(self._stands)
+        if self._now is not None:
+            self.set_interval(NOW_EVERY, self._tell_now)
+
+    def on_screen_resume(self) -> None:
+        """A question that was voided below another screen ends now."""
+        if self._voided:
+            self.call_later(self.answer, self.NO)
+
+    def now_lines(self) -> Iterable[Plain]:
+        """What the motors do, where the question is about drives."""
+        if self._now is not None:
+            yield Plain(self._now(), id="now")
+
+    def concerns(self, device: int) -> bool:
+        """Whether a stop of this drive voids the question."""
+        return self._now is not None and device in self._now.devices
+
+    def void(self) -> None:
+        """End with the answer that changes nothing; belongs to the loop of the screen."""
+        self._voided = True
+        if self.is_active:
+            self.answer(self.NO)
+
+    def answer(self, value: T) -> None:
+        """Give the answer back, once; a voided question has but one."""
+        if not self._answered:
+            self._answered = True
+            self.dismiss(self.NO if self._voided else value)
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """A key that comes too early is swallowed; later the binding does not count."""
+        if action == "swallow":
+            return self._is_early()
+        return super().check_action(action, parameters)
+
+    def action_swallow(self) -> None:
+        """Nothing is done."""
+
+    def action_no(self) -> None:
+        """Change nothing."""
+        self.answer(self.NO)
+
+    def _stands(self) -> None:
+        self._drawn = self.app.clock.monotonic()
+
+    def _is_early(self) -> bool:
+        return self._drawn is None or self.app.clock.monotonic() - self._drawn < self.SETTLED
+
+    def _tell_now(self) -> None:
+        if self._now is not None and self.is_active:
+            shown, now = self.query_one("#now", Plain), self._now()
+            if str(shown.render()) != now.plain:
+                shown.update(now, layout=False)
+
+
+class KeyQuestion(Question[T]):
+    """A question that keys alone answer: no text is typed, so `q` and `n` are no too."""
+
+    GUARDED = "enter,y"
+    BINDINGS: ClassVar = [Binding("q,n", "no", show=False)]
+
+
+def hint(*keys: tuple[str, str]) -> Text:
+    """The line of keys of a dialog: each key and what it does."""
+    text = Text()
+    for key, does in keys:
+        text.append("   " if text else "")
+        text.append(key, KEY)
+        text.append(f" {plain(does)}", FAINT)
+    return text
+
+
+def void_questions(app: Panel, device: int) -> None:
+    """End every open question about a drive that was stopped; belongs to the screen's loop."""
+    for screen in reversed(app.screen_stack):
+        if isinstance(screen, Question) and screen.concerns(device):
+            screen.void()

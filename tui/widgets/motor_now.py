@@ -1,0 +1,77 @@
+"""What a motor does now, in one line: for questions that are asked while it turns."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from tui.bus.line import LineStatus
+from tui.drive.profile import Profile
+from tui.drive.schema import Quantity
+from tui.session.keeper import GLANCE, Look
+from tui.session.monitor import STALE_CYCLES, Snapshot
+from tui.session.readings import Quality
+
+from .monitor_state import STATE_SIGNS, STATE_STYLES
+from .monitor_view import age_text
+from .palette import ALARM, FAINT, PLAIN, STALE, STRONG
+
+SHOWN: tuple[Quantity, ...] = ("output_frequency", "motor_current")
+"""What is told beside the state."""
+NUMBER_WIDTH = 7
+HEADLINE_WIDTH = 18
+"""Columns of the state's words, so that the numbers behind them stand still."""
+
+
+def motor_now(
+    profile: Profile, snapshot: Snapshot | None, period: float, look: Look | None, now: float
+) -> Text:
+    """State, frequency and current of the last cycle, or of the line watch's look at the drive.
+
+    `period` is the wished time of a cycle in seconds, `now` is monotonic. What is older than
+    three cycles, or came with an error, is told as what it was, with its age.
+    """
+    if snapshot is None or (look is not None and look.time > snapshot.time):
+        return _by_look(look, now)
+    age = max(0.0, now - snapshot.time)
+    cycle = max(period, 1 / snapshot.rate if snapshot.rate else period)
+    heard = not snapshot.error and snapshot.line.status is LineStatus.CONNECTED
+    if not heard or age > STALE_CYCLES * cycle or snapshot.state.kind == "unknown":
+        return _not_known(snapshot.state.headline, age)
+    text = _state(snapshot.state.headline, snapshot.state.kind)
+    for quantity in SHOWN:
+        parameter = profile.quantity(quantity)
+        reading = snapshot.readings.get(parameter.code) if parameter else None
+        if reading is None:
+            continue
+        value = reading.physical or reading.value
+        good = value is not None and reading.quality is Quality.GOOD
+        shown = value.text if value else reading.text
+        text.append(f"{shown:>{NUMBER_WIDTH}}", STRONG if good else STALE)
+        text.append(f" {(value.unit if value else reading.unit) or 'raw'} ", FAINT)
+    text.rstrip()
+    return text
+
+
+def _by_look(look: Look | None, now: float) -> Text:
+    """What the line watch saw, which reads the state and no values."""
+    if look is None or look.state is None:
+        return _not_known("", None)
+    age = max(0.0, now - look.time)
+    if look.error or age > STALE_CYCLES * GLANCE or look.state.kind == "unknown":
+        return _not_known(look.state.headline, age)
+    return _state(look.state.headline, look.state.kind)
+
+
+def _state(headline: str, kind: str) -> Text:
+    style = PLAIN if kind == "fault" else STATE_STYLES.get(kind, PLAIN)
+    sign = STATE_SIGNS.get(kind, "□")
+    text = Text(no_wrap=True)
+    text.append(f"{sign} {headline:<{HEADLINE_WIDTH}}", STATE_STYLES.get(kind, style))
+    return text
+
+
+def _not_known(was: str, age: float | None) -> Text:
+    text = Text("? not known now", ALARM, no_wrap=True)
+    if was and age is not None:
+        text.append(f"   {age_text(age)} ago: {was}", STALE)
+    return text
