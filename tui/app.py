@@ -5,15 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
-from textual.app import SystemCommand
 from textual.driver import Driver
 from textual.events import Event, Key
-from textual.screen import Screen
 from textual.widgets import Input
 
 from tui.bus.errors import LineClosed
@@ -24,7 +22,7 @@ from tui.widgets.clock import Clock
 from tui.widgets.lean import LeanApp
 from tui.widgets.palette import THEME
 
-from .screens.actions import ACTIONS, CONNECTION, bindings
+from .screens.actions import CONNECTION, bindings
 from .screens.connection import ConnectionScreen
 from .screens.in_turn import KeysInTurn
 from .screens.leaving import Leaving
@@ -61,9 +59,7 @@ class DrivePanelApp(LeanApp, Leaving):
 
     TITLE = "Drive Panel"
     BINDINGS: ClassVar = bindings(None)
-    ENABLE_COMMAND_PALETTE = True
-    COMMAND_PALETTE_BINDING = "ctrl+p"
-    CSS = "SearchIcon { display: none; }"
+    ENABLE_COMMAND_PALETTE = False  # Textual's own: its key stands in the table of actions
 
     def __init__(
         self,
@@ -330,22 +326,11 @@ class DrivePanelApp(LeanApp, Leaving):
     def _screen_name(self) -> str:
         return (self.screen.TITLE or CONNECTION).lower()
 
-    def get_system_commands(self, screen: Screen[object]) -> Iterable[SystemCommand]:
-        """Every action of the screen on top, for the command palette."""
-        name = (screen.TITLE or CONNECTION).lower()
-        for action in ACTIONS:
-            if name not in action.screens or action.id in ("command_palette", "stop_by_space"):
-                continue
-            owner = self if action.app else screen
-            yield SystemCommand(
-                action.help.rstrip("."),
-                f"Key {action.shown}",
-                lambda owner=owner, id=action.id: self.run_named(owner, id),
-            )
+    def action_command_palette(self) -> None:
+        """Find an action of any screen by its words."""
+        from .screens.choosing import open_palette
 
-    async def run_named(self, owner: object, action: str) -> None:
-        """Run an action of the table on the screen or the app."""
-        await self.run_action(action, owner)  # type: ignore[arg-type]
+        open_palette(self)
 
 
 def _close_unwanted(opening: asyncio.Future[OpenLine]) -> None:

@@ -274,6 +274,7 @@ def test_numbers_references_and_addresses_take_no_space() -> None:
     assert {name: kinds for name, kinds in fields.items() if kinds} == {
         "edit_value": {"NumberInput"},
         "line_form": {"NumberInput"},
+        "palette": {"Field"},
         "parameters": {"Field"},
         "pick_parameter": {"Field"},
     }

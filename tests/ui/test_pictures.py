@@ -205,6 +205,26 @@ def that_trip(shown: DriveConsole) -> fakes.StillFleet:
     return fakes.StillFleet(*drives, keeper=fakes.FakeKeeper(alone=alone))
 
 
+PALETTE = {"all": "", "elsewhere": "eeprom", "stop": "stop", "nothing": "xyz"}
+
+
+@SIZES
+@pytest.mark.parametrize("query", PALETTE)
+def test_palette(snap_compare: Compare, query: str, size: tuple[int, int]) -> None:
+    snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(MonitorScreen(fakes.console_of(snapshot)))
+        await pilot.pause()
+        app.screen.look()  # type: ignore[attr-defined]
+        await pilot.press("ctrl+p", *PALETTE[query])
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
 OVER_MONITOR = {"help": "question_mark", "frames": "l", "leave": "q"}
 
 

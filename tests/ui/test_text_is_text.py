@@ -22,6 +22,7 @@ from tui.screens.blocks import BlocksScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.edit_value import EditNumber
+from tui.screens.dialogs.palette import Palette
 from tui.screens.dialogs.pick_parameter import PickParameter
 from tui.screens.dialogs.skipped import Skipped
 from tui.screens.faults import FaultsScreen
@@ -74,6 +75,7 @@ async def typed(made: Bench, text: str) -> None:
 async def monitor(made: Bench) -> None:
     await made.armed()
     await dialog(made, "f")
+    await dialog(made, "ctrl+p", Palette)
 
 
 async def rating(made: Bench) -> None:

@@ -80,7 +80,7 @@ ACTIONS: tuple[Action, ...] = (
         ("leave", "escape,l,2", "back", "Go back to Monitor."),
         ("hold", "h", "hold", "Hold the list still, or let it run."),
     ),
-    of_app("command_palette", "ctrl+p", "all", "Find any action by its name."),
+    of_app("command_palette", "ctrl+p", "all", "Find any action by its words."),
     of_app("help", "?,f1", "help", "Show every key."),
     of_app("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
     of_app("quit", "q,ctrl+q", "leave", "Leave the panel."),

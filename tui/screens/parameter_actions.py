@@ -11,7 +11,7 @@ PARAMETER_ACTIONS = on(
     (PARAMETERS,),
     ("edit", "enter", "edit", "Edit the parameter under the cursor."),
     ("search", "/", "find", "Search code, name, address and values."),
-    ("filter(1)", "d", "show", "Show another selection: staged, all, ..."),
+    ("filter(1)", "d", "show", "Show another selection: staged, all, and more."),
     ("filter(-1)", "D", "", "The selection before."),
     ("undo", "u", "", "Take the edit under the cursor back."),
     ("undo_all", "U", "", "Take every edit back."),

@@ -1,0 +1,115 @@
+"""The palette: every action of the panel, found by its words."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.widgets import Input, OptionList
+
+from tui.screens.finding import Found, find
+from tui.widgets.drawing import cut
+from tui.widgets.fields import Field
+from tui.widgets.palette import FAINT, KEY, PLAIN
+from tui.widgets.plain import Plain, entry
+
+from .question import Question, hint
+
+NAME_WIDTH, PLACE_WIDTH, KEY_WIDTH = 48, 14, 5
+"""Columns; where an action can be done here, its name has those of the place too."""
+
+
+MORE = "Typed words find what other screens can do, too."
+
+
+class Palette(Question[Found | None]):
+    """Gives the chosen action back, or None.
+
+    Nothing stands ready by itself: only what begins with each word that was typed.
+    """
+
+    BINDINGS: ClassVar = [
+        Binding("up", "step(-1)", show=False, priority=True),
+        Binding("down", "step(1)", show=False, priority=True),
+    ]
+
+    def __init__(self, screen: str) -> None:
+        super().__init__()
+        self._of = screen
+        self._found: list[Found] = []
+
+    def compose(self) -> ComposeResult:
+        """A field, and what fits what is typed there."""
+        with Vertical(id="dialog"):
+            yield Plain("What shall be done?", id="question")
+            yield Field(placeholder="words of it: eeprom, ramp, frames ...", id="search")
+            yield OptionList(id="choices", compact=True)
+            yield Plain("", id="count")
+            yield Plain("", id="hint")
+
+    def on_mount(self) -> None:
+        """What can be done here."""
+        self.query_one(OptionList).can_focus = False
+        self._list("")
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """Less, as more is typed."""
+        self._list(event.value)
+
+    def _list(self, query: str) -> None:
+        self._found = find(query, self._of)
+        options = self.query_one(OptionList)
+        options.clear_options()
+        options.add_options([entry(self._line(found)) for found in self._found])
+        ready = bool(self._found) and self._found[0].ready
+        options.highlighted = 0 if ready else None
+        count = "Nothing fits; clear some letters."
+        if self._found:
+            many = len(self._found)
+            count = f"{many} {'fits' if many == 1 else 'fit'}" if query else MORE
+        self.query_one("#count", Plain).update(count)
+        self._tell_keys()
+
+    def _line(self, found: Found) -> Text:
+        text = Text(no_wrap=True)
+        if found.here:
+            text.append(cut(found.name, NAME_WIDTH + 1 + PLACE_WIDTH), PLAIN)
+        else:
+            text.append(f"{cut(found.name, NAME_WIDTH)} ", FAINT)
+            text.append(cut(found.screen.capitalize(), PLACE_WIDTH), FAINT)
+        text.append(f"{found.action.shown:>{KEY_WIDTH}} ", KEY)
+        return text
+
+    def action_step(self, step: int) -> None:
+        """Another one of the list; the first step chooses the first."""
+        options = self.query_one(OptionList)
+        if not options.option_count:
+            return
+        at = options.highlighted
+        at = 0 if at is None else at + step
+        options.highlighted = min(max(0, at), options.option_count - 1)
+        self._tell_keys()
+
+    def _tell_keys(self) -> None:
+        """What Enter does now."""
+        at = self.query_one(OptionList).highlighted
+        keys = [("Up, Down", "choose")] if self._found else []
+        if at is not None:
+            found = self._found[at]
+            keys.append(
+                ("Enter", "does it" if found.here else f"goes to {found.screen.capitalize()}")
+            )
+        self.query_one("#hint", Plain).update(hint(*keys, ("Esc", "does nothing")))
+
+    def on_input_submitted(self) -> None:
+        """Take the one that is marked; where none is, nothing is chosen."""
+        at = self.query_one(OptionList).highlighted
+        if at is not None:
+            self.answer(self._found[at])
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Take the one that was clicked."""
+        self.answer(self._found[event.option_index])
