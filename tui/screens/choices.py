@@ -62,6 +62,26 @@ def fault_of_line(text: str) -> str:
     return ""
 
 
+def same_line(one: str, other: str) -> bool:
+    """Whether two texts mean one line with the same settings, however they are spelled."""
+    if one == other:
+        return True
+    from tui.bus.link import SerialLink, parse_link
+    from tui.session.line_key import line_key
+
+    if line_key(one) != line_key(other):
+        return False
+    try:
+        links = [parse_link(one), parse_link(other)]
+    except LinkSyntaxError:
+        return True  # simulated: it has no settings
+    settings = [
+        (link.timeout, *((link.baud, link.format) if isinstance(link, SerialLink) else ()))
+        for link in links
+    ]
+    return settings[0] == settings[1]
+
+
 def choice_line(choice: LineChoice, width: int) -> Text:
     """A line that can be opened, with as much of its description as there is room for."""
     text = Text(" " + cut(choice.text, min(len(choice.text), width - 1)), PLAIN)

@@ -35,10 +35,21 @@ class ConnectionScreen(LineKeys):
         elif self.drives.has_focus and (drive := self.found.get(int(event.option.id or 0))):
             self.say(about_drive(drive), next_step(drive))
 
+    def on_input_submitted(self) -> None:
+        """Enter in a field."""
+        self.action_open_chosen()
+
     def action_open_chosen(self) -> None:
         """What Enter does in the lists; a field hands Enter over to the list of lines."""
         focused = self.focused
-        (focused if isinstance(focused, OptionList) else self.lines).action_select()
+        if isinstance(focused, OptionList):
+            focused.action_select()
+            return
+        self.lines.focus()
+        if self.is_on_open_line():
+            self.action_scan()  # by what was typed
+        else:
+            self.lines.action_select()
 
     def action_watch_chosen(self) -> None:
         """Watch the drive that is chosen in the list of drives."""

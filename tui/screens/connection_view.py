@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
@@ -33,6 +34,8 @@ log = logging.getLogger(__name__)
 ERROR_KIND, ALARM_KIND = "error", "alarm"
 STATES = 0.5
 """Seconds between two looks at the states that the keeper has seen."""
+QUIET = 1.0
+"""Seconds without a key after which drives go to their places in the list."""
 HEADS = 1.0
 """Seconds between two looks at the clock and the state of the line."""
 MESSAGE = 3
@@ -49,6 +52,8 @@ class ConnectionView(PanelScreen):
         self._happened: tuple[str, str, str] = ("", "", "")
         self._looking: list[Timer] = []
         self._away = False
+        self._key_at = -math.inf
+        """When the last key came, in seconds of the clock."""
 
     def compose(self) -> ComposeResult:
         """Two columns and the lines below."""
@@ -129,7 +134,14 @@ class ConnectionView(PanelScreen):
         looks = self.app.fleet.keeper.looks if self.app.fleet else {}
         connected = self._connected()
         states = {d: _state(drive, looks.get(d), connected) for d, drive in found.items()}
-        self.drives.fill(found, states)
+        self.drives.fill(found, states, sort=self._hands_are_quiet())
+
+    def on_key(self) -> None:
+        """While keys come, nothing changes its place under them."""
+        self._key_at = self.app.clock.monotonic()
+
+    def _hands_are_quiet(self) -> bool:
+        return self.app.clock.monotonic() - self._key_at >= QUIET
 
     # The titles
 

@@ -21,16 +21,16 @@ class LineList(OptionList):
         self._groups: list[Group] = []
         self._choices: dict[str, LineChoice] = {}
         self._shown: tuple[int, list[Group]] | None = None
-        self._tried = ""
-        """A line that could not be opened: it may be none of those used lately."""
+        self._named = ""
+        """A line that somebody has named: it may be none of those used lately."""
 
     def look_for_lines(self) -> None:
         """Find the serial ports there are now, and the lines used lately."""
         from tui.session.lines import serial_ports
 
         lately = recent_lines()
-        tried = [self._tried] if self._tried and self._tried not in lately else []
-        self._groups = groups(serial_ports(), [*tried, *lately])
+        named = [self._named] if self._named and self._named not in lately else []
+        self._groups = groups(serial_ports(), [*named, *lately])
 
     def choice(self, id: str | None) -> LineChoice | None:
         """The line of an option; None for a heading."""
@@ -42,9 +42,9 @@ class LineList(OptionList):
         at = self.highlighted
         return None if at is None else self.choice(self.get_option_at_index(at).id)
 
-    def offer_again(self, text: str) -> None:
-        """Put the cursor on a line that could not be opened, so that Enter tries it again."""
-        self._tried = text
+    def offer(self, text: str) -> None:
+        """Put the cursor on a line that was named, so that Enter means no other."""
+        self._named = text
         self.look_for_lines()
         self.fill()
         fits = [id for id, choice in self._choices.items() if choice.text == text]

@@ -20,6 +20,9 @@ if TYPE_CHECKING:
 class Scanning(ConnectionView):
     """Asks each address; a drive that answers gets its profile and is looked after."""
 
+    _led = False
+    """Whether the cursor was led to the drives of the open line."""
+
     def action_scan(self) -> None:
         """Look for drives at the addresses given."""
         opened = self.app.opened
@@ -31,6 +34,7 @@ class Scanning(ConnectionView):
         except LineError as error:
             self.fail(error)
             return
+        self._led = False
         self.scan(wanted)
 
     @work(exclusive=True, group="scan", exit_on_error=False)
@@ -66,7 +70,6 @@ class Scanning(ConnectionView):
             f"{len(self.found)} of {len(devices)} addresses answered.",
             "Choose a drive and press Enter to watch it.",
         )
-        self.drives.focus()
 
     async def _take(self, result: ScanResult) -> None:
         """Keep a drive that answered, with its profile and state."""
@@ -76,6 +79,18 @@ class Scanning(ConnectionView):
         await self._equip(result.identity)
         self.show_drives()
         self.show_heads()
+        self._lead_to_drives()
+
+    def _lead_to_drives(self) -> None:
+        """The cursor goes from the lines to the first drive that is found on the open one, once."""
+        if not self._led and self.focused in (None, self.lines):
+            self.drives.focus()
+        self._led = True
+
+    @property
+    def scanning(self) -> bool:
+        """Whether drives are looked for now."""
+        return any(w.group == "scan" and w.is_running for w in self.workers)
 
     async def _equip(self, identity: DriveIdentity) -> None:
         """Keep a drive that answered with its profile: the typed one, else the one that fits."""
@@ -124,7 +139,7 @@ class Scanning(ConnectionView):
 
     def action_stop_scan(self) -> None:
         """Stop looking for drives."""
-        stopped = [w for w in self.workers if w.group == "scan" and w.is_running]
+        stopped = self.scanning
         self.workers.cancel_group(self, "scan")
         if stopped:
             self.say("Stopped looking for drives.", "s looks again.")

@@ -1,0 +1,244 @@
+"""Connection: Enter leaves no good line unasked, and the cursor stays where it is meant to be."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field, replace
+
+import pytest
+from textual.app import ComposeResult
+from textual.pilot import Pilot
+from textual.screen import Screen
+from textual.widgets import Input
+
+from tui.app import DrivePanelApp
+from tui.screens.choices import same_line
+from tui.screens.connection_view import QUIET
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.drive_list import DriveList
+from tui.screens.found import State
+from tui.screens.monitor import MonitorScreen
+from tui.session.fleet import FoundDrive
+from tui.session.lines import OpenLine, open_line
+from tui.simulator import DriveSpec, Simulation
+
+from . import fakes
+from .test_flows import shown, until
+
+NAMED, OTHER = "serial:/dev/ttyUSB7,19200,8N1", "sim:atv312@5"
+PORTS = [("/dev/ttyUSB0", "another adapter"), ("/dev/ttyUSB1", "")]
+
+
+@pytest.fixture(autouse=True)
+def ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: list(PORTS))
+
+
+@dataclass
+class Line:
+    """The panel on a line with simulated drives that is searched slowly, and what was opened."""
+
+    app: DrivePanelApp
+    pilot: Pilot[None]
+    simulation: Simulation
+    opened: list[str] = field(default_factory=list)
+
+    async def searched(self) -> None:
+        """Wait until the search goes on."""
+        await until(self.pilot, lambda: "Asking address" in shown(self.app, "message"))
+
+    @property
+    def kept(self) -> bool:
+        return self.opened == [NAMED] and self.app.opened is not None
+
+
+@asynccontextmanager
+async def line(*, first: int = 3, family: str = "atv21") -> AsyncIterator[Line]:
+    """The panel that was started on a line; below the first drive nobody answers."""
+    simulation = Simulation([DriveSpec(family, first, run_hz=30.0), DriveSpec("atv71", first + 3)])
+    simulation.start()
+    real = f"serial:{simulation.serve_pty()},19200,8N1"
+    opened: list[str] = []
+
+    def opener(text: str, **how: object) -> OpenLine:
+        opened.append(text)
+        if text != NAMED:
+            return open_line(OTHER, **how)  # type: ignore[arg-type]
+        found = open_line(real, **how)  # type: ignore[arg-type]
+        found.text = NAMED
+        return found
+
+    app = DrivePanelApp(open_line=opener, start=NAMED)
+    try:
+        async with app.run_test(size=(80, 24)) as pilot:
+            yield Line(app, pilot, simulation, opened)
+    finally:
+        simulation.stop()
+
+
+async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips() -> None:
+    async with line() as made:
+        app, pilot = made.app, made.pilot
+        await made.searched()
+        chosen = app.connection.lines.chosen
+        assert chosen is not None
+        assert chosen.text == NAMED
+        for _ in range(3):
+            await pilot.press("enter")
+        await until(pilot, lambda: "drives are looked for" in shown(app, "message"))
+        assert app.screen is app.connection
+        await until(pilot, lambda: app.connection.drives.option_count == 1)
+        # the cursor went to the drive: Enter watches it
+        await until(pilot, lambda: app.connection.drives.has_focus)
+        await pilot.press("enter")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        assert made.kept
+        assert made.simulation.drive(3).fault is None
+
+
+async def test_another_line_is_opened_after_asking_only() -> None:
+    async with line() as made:
+        app, pilot = made.app, made.pilot
+        await until(pilot, lambda: app.connection.drives.option_count == 1)
+        for key in ("escape", "q", "n", "enter"):
+            app.connection.lines.focus()
+            app.connection.lines.offer("/dev/ttyUSB0")
+            await pilot.press("enter")
+            await until(pilot, lambda: isinstance(app.screen, Confirm))
+            follows = str(app.screen.query_one("#follows").render())
+            assert "is open, with" in follows
+            assert "/dev/ttyUSB0" in follows
+            await pilot.press(key)
+            if key == "enter":
+                assert isinstance(app.screen, Confirm)
+            else:
+                await until(pilot, lambda: app.screen is app.connection)
+            assert made.kept
+        await pilot.press("y")
+        await until(pilot, lambda: len(made.opened) == 2)
+        assert made.opened[1].startswith("serial:/dev/ttyUSB0")
+
+
+async def test_enter_in_a_field_looks_again_by_what_was_typed() -> None:
+    async with line() as made:
+        app, pilot = made.app, made.pilot
+        await until(pilot, lambda: app.connection.drives.option_count == 1)
+        addresses = app.connection.query_one("#addresses", Input)
+        addresses.focus()
+        addresses.value = "6"
+        await pilot.press("enter")
+        await until(pilot, lambda: app.connection.drives.option_count == 2)
+        await until(pilot, lambda: app.connection.drives.has_focus)
+        assert made.kept
+
+
+async def test_who_types_into_a_field_is_not_led_away() -> None:
+    async with line() as made:
+        app, pilot = made.app, made.pilot
+        await made.searched()
+        profile = app.connection.query_one("#profile", Input)
+        profile.focus()
+        await until(pilot, lambda: app.connection.drives.option_count == 2)
+        assert profile.has_focus
+        # nor who went back to the lines
+        app.connection.lines.focus()
+        app.connection.show_drives()
+        await pilot.pause()
+        assert app.connection.lines.has_focus
+
+
+@pytest.mark.parametrize(
+    ("one", "other", "same"),
+    [
+        (NAMED, NAMED, True),
+        ("/dev/ttyUSB0", "serial:/dev/ttyUSB0,19200,8E1", True),
+        ("/dev/ttyUSB0", "serial:/dev/ttyUSB0,9600,8E1", False),
+        ("serial:/dev/ttyUSB0,19200,8E1", "serial:/dev/ttyUSB0,19200,8N1", False),
+        ("tcp:Gateway", "tcp:gateway:502", True),
+        ("tcp:gateway", "rtu-tcp:gateway:502", False),
+        ("tcp:gateway", "tcp:gateway,timeout=2", False),
+        ("sim:atv71", "sim:atv71@1", True),
+        ("sim:atv71", "sim:atv21", False),
+        ("", "tcp:gateway", False),
+    ],
+)
+def test_lines_that_are_the_same(one: str, other: str, same: bool) -> None:
+    assert same_line(one, other) is same
+    assert same_line(other, one) is same
+
+
+class Listed(Screen[None]):
+    """The list of drives alone."""
+
+    def compose(self) -> ComposeResult:
+        """One list."""
+        yield DriveList(id="drives")
+
+
+def drives(*devices: int) -> dict[int, FoundDrive]:
+    return {d: FoundDrive(replace(fakes.ATV71, device=d)) for d in sorted(devices)}
+
+
+def states(*devices: int) -> dict[int, State]:
+    return dict.fromkeys(devices, ("ready", "ready"))
+
+
+async def test_the_cursor_stays_on_its_drive_not_on_its_row() -> None:
+    app = fakes.app_of()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await app.push_screen(Listed())
+        listed = app.screen.query_one(DriveList)
+        listed.fill(drives(4, 7), states(4, 7))
+        listed.highlighted = 1
+        listed.fill(drives(2, 4, 5, 7), states(2, 4, 5, 7))
+        assert listed.chosen == "7"
+        assert [option.id for option in listed.options] == ["2", "4", "5", "7"]
+        # while keys come nothing changes its place, new drives come last
+        listed.fill(drives(1, 2, 4, 5, 7), states(1, 2, 4, 5, 7), sort=False)
+        assert [option.id for option in listed.options] == ["2", "4", "5", "7", "1"]
+        assert listed.chosen == "7"
+        listed.fill(drives(1, 2, 4, 5, 7), states(1, 2, 4, 5, 7))
+        assert [option.id for option in listed.options] == ["1", "2", "4", "5", "7"]
+        assert listed.chosen == "7"
+        # a drive that is gone leaves the first one
+        listed.fill(drives(1, 2), states(1, 2))
+        assert listed.chosen == "1"
+        await pilot.pause()
+
+
+class HandClock(fakes.StillClock):
+    """A clock that goes when it is told to."""
+
+    now = fakes.NOW
+
+    def monotonic(self) -> float:
+        """Seconds that the test has let go by."""
+        return self.now
+
+
+async def test_sorting_waits_while_keys_come() -> None:
+    app = fakes.app_of()
+    clock = HandClock()
+    app.clock = clock
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.opened = fakes.opened()
+        app.fleet = fleet = fakes.StillFleet(*drives(4, 7).values())
+        app.connection.look()
+        listed = app.connection.drives
+        await until(pilot, lambda: listed.option_count == 2)
+        listed.focus()
+        await pilot.press("down")
+        fleet.hold(drives(2)[2])
+        app.connection.look()
+        assert [option.id for option in listed.options] == ["4", "7", "2"]
+        assert listed.chosen == "7"
+        clock.now += QUIET / 2
+        await pilot.press("up")
+        clock.now += QUIET / 2
+        app.connection.look()
+        assert [option.id for option in listed.options] == ["4", "7", "2"]
+        clock.now += QUIET
+        app.connection.look()
+        assert [option.id for option in listed.options] == ["2", "4", "7"]
+        assert listed.chosen == "4"
