@@ -1,0 +1,366 @@
+"""Keys out of what terminals send, whole and cut anywhere."""
+
+from __future__ import annotations
+
+import re
+import string
+from collections.abc import Iterator, Sequence
+from itertools import combinations, pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from textual._ansi_sequences import ANSI_SEQUENCES_KEYS, IGNORE_SEQUENCE
+from textual._xterm_parser import XTermParser
+
+from tui.terminal.dialects import APART, ESCAPE_DELAY, SEQUENCE_WITHIN, Tokenizer
+from tui.terminal.tokens import Key, Paste, Report, Token
+
+from .dialect_tables import DIALECTS, REPLIES, REPORTS, SHIFTED_AND_MORE
+
+STOPS = {"f9", "f12"}
+GAPS = [0.0, 0.02, APART + 0.01, ESCAPE_DELAY + 0.01, 0.9]
+"""Seconds between the two halves of a sequence."""
+AFTERWARDS = 10.0
+FUNCTION_KEYS = [
+    pytest.param(keys[number - 1], f"f{number}", id=f"{dialect} F{number}")
+    for dialect, keys in DIALECTS.items()
+    for number in range(1, 13)
+]
+
+
+def cuts(text: str, most: int = 2) -> Iterator[list[str]]:
+    """Every way to read a text in one to three reads."""
+    for count in range(most + 1):
+        for places in combinations(range(1, len(text)), count):
+            bounds = [0, *places, len(text)]
+            yield [text[a:b] for a, b in pairwise(bounds)]
+
+
+def tokens(reads: Sequence[str], gap: float = 0.0, *, mouse: bool = False) -> list[Token]:
+    """What reads come to, so many seconds apart, and when all that waited is over."""
+    tokenizer, found, now = Tokenizer(mouse=mouse), list[Token](), 0.0
+    for read in reads:
+        found += tokenizer.tick(now)
+        found += tokenizer.feed(read, now)
+        now += gap
+    found += tokenizer.tick(now + AFTERWARDS)
+    assert tokenizer.deadline is None
+    return found
+
+
+def names(found: Sequence[Token]) -> list[str]:
+    assert not [token for token in found if isinstance(token, Paste | Report)]
+    return [token.name for token in found if isinstance(token, Key)]
+
+
+@pytest.mark.parametrize(("sequence", "key"), FUNCTION_KEYS)
+def test_a_function_key_in_one_read_is_that_key_or_none(sequence: str, key: str) -> None:
+    found = names(tokens([sequence]))
+    assert found in ([key], []) if key not in STOPS else found == [key]
+
+
+@pytest.mark.parametrize(("sequence", "key"), FUNCTION_KEYS)
+@pytest.mark.parametrize("gap", GAPS)
+def test_a_function_key_in_several_reads_is_that_key_or_none(
+    sequence: str, key: str, gap: float
+) -> None:
+    for reads in cuts(sequence):
+        # an ESC that nothing followed in time is Escape, whatever comes then
+        late = ["escape"] if gap > ESCAPE_DELAY and reads[0] == "\x1b" else []
+        found = names(tokens(reads, gap))
+        assert found in ([*late, key], late), reads
+        if key in STOPS:
+            assert found == [*late, key], reads
+
+
+@pytest.mark.parametrize("dialect", SHIFTED_AND_MORE)
+@pytest.mark.parametrize("gap", GAPS)
+def test_other_keys_of_the_dialects_type_nothing_and_stop_nothing(dialect: str, gap: float) -> None:
+    for sequence in SHIFTED_AND_MORE[dialect]:
+        if sequence == "\x1b[O":
+            continue
+        for reads in cuts(sequence, 1):
+            for token in tokens(reads, gap):
+                if isinstance(token, Key):
+                    assert token.character in (None, "\x1b"), (reads, token)
+                    assert token.name not in STOPS | {"space", "enter"}, (reads, token)
+
+
+@pytest.mark.parametrize("sequence", REPORTS.values(), ids=REPORTS)
+@pytest.mark.parametrize("gap", GAPS)
+def test_a_report_is_passed_on_and_is_no_key(sequence: str, gap: float) -> None:
+    for reads in cuts(sequence):
+        found = [token for token in tokens(reads, gap) if token != _escape(token)]
+        assert found == [Report(sequence)], reads
+
+
+def _escape(token: Token) -> Token | None:
+    return token if isinstance(token, Key) and token.name == "escape" else None
+
+
+@pytest.mark.parametrize("sequence", REPLIES.values(), ids=REPLIES)
+def test_other_replies_are_neither_keys_nor_passed_on(sequence: str) -> None:
+    for reads in cuts(sequence):
+        for gap in (0.0, 0.02):
+            assert tokens(reads, gap) == [], (reads, gap)
+
+
+def test_without_mouse_esc_bracket_m_is_complete_and_takes_no_space_with_it() -> None:
+    assert names(tokens(["\x1b[M   "])) == ["f1", "space", "space", "space"]
+    assert tokens(["\x1b[M !!"], mouse=True) == [Report("\x1b[M !!")]
+    assert tokens(["\x1b[<0;3;4M"], mouse=True) == [Report("\x1b[<0;3;4M")]
+    assert tokens(["\x1b[<0;3;4M"]) == []
+
+
+@pytest.mark.parametrize(
+    "begin", ["\x1b", "\x1b[", "\x1b[2", "\x1bO", "\x1b[[", "\x1b\x1b[", "\x9b"]
+)
+@pytest.mark.parametrize("gap", GAPS)
+def test_a_space_stops_inside_of_any_sequence(begin: str, gap: float) -> None:
+    assert names(tokens([begin, " "], gap))[-1:] == ["space"]
+    assert names(tokens([begin + " "]))[-1:] == ["space"]
+
+
+@pytest.mark.parametrize("begin", ["\x1b[200~text", "\x1b]11;rgb:", "\x1bP>|"])
+def test_no_stop_key_is_lost_where_an_end_was_lost(begin: str) -> None:
+    for key in (" ", "\x1b[24~", "\x1bO[", "\x1b[U"):
+        found = tokens([begin, key], APART + 0.01)
+        assert next(t.name for t in found if isinstance(t, Key)) in STOPS | {"space"}, key
+    held_down = tokens([begin, *[" "] * 5], APART + 0.01)
+    assert sum(isinstance(token, Key) for token in held_down) == 5
+
+
+def test_a_reply_without_end_gives_its_space_late() -> None:
+    assert names(tokens(["\x1b]11; r"])) == ["space"]
+    assert names(tokens(["\x1b]11;" + " r" * 3000]))[0] == "space"
+
+
+@pytest.mark.parametrize("rest", ["[", "[2", "[24", "[1;5", "O", "[200"])
+def test_what_follows_a_lone_escape_is_no_key_up_to_its_final(rest: str) -> None:
+    for after in (0.1, 0.5, 0.95):
+        tokenizer = Tokenizer()
+        assert tokenizer.feed("\x1b", 0.0) == []
+        assert names(tokenizer.tick(ESCAPE_DELAY)) == ["escape"]
+        assert tokenizer.feed(rest, ESCAPE_DELAY + after) == []
+        assert tokenizer.feed("r", ESCAPE_DELAY + after + 0.5) == []
+        assert names(tokenizer.feed("r", ESCAPE_DELAY + after + 0.5)) == ["r"]
+
+
+def test_a_bracket_long_after_escape_is_a_key() -> None:
+    tokenizer = Tokenizer()
+    tokenizer.feed("\x1b", 0.0)
+    assert names(tokenizer.tick(ESCAPE_DELAY)) == ["escape"]
+    late = ESCAPE_DELAY + SEQUENCE_WITHIN + 0.01
+    assert names(tokenizer.feed("[", late)) == ["left_square_bracket"]
+
+
+def test_escape_alone_comes_after_its_delay_with_the_time_it_was_read() -> None:
+    tokenizer = Tokenizer(escape_delay=0.2)
+    tokenizer.feed("\x1b", 5.0, "then")
+    assert tokenizer.deadline == pytest.approx(5.2)
+    assert tokenizer.pending == 5.0
+    assert tokenizer.tick(5.19) == []
+    assert tokenizer.tick(5.21) == [Key("escape", "\x1b", 5.0, 5.0, "then")]
+
+
+def test_a_cut_key_tells_when_it_began_and_when_it_was_complete() -> None:
+    tokenizer = Tokenizer()
+    tokenizer.feed("\x1b[", 1.0, "first")
+    assert tokenizer.feed("A", 1.5, "second") == [Key("up", None, 1.0, 1.5, "first")]
+
+
+@pytest.mark.parametrize("letter", string.ascii_letters + string.digits + "[]\r\n+-/?")
+def test_alt_with_a_key_is_never_that_key_alone(letter: str) -> None:
+    if letter in "O[]P":
+        return  # these begin something else
+    for reads in (["\x1b" + letter], ["\x1b", letter]):
+        (found,) = tokens(reads, 0.02)
+        assert isinstance(found, Key)
+        assert found.name not in ("enter", letter)
+        assert found.character is None or found.character not in string.printable
+
+
+def test_escape_twice_is_two_keys_and_alt_with_an_arrow_is_one() -> None:
+    assert names(tokens(["\x1b", "\x1b"], 0.06)) == ["escape", "escape"]
+    assert names(tokens(["\x1b\x1b"])) == ["escape", "escape"]
+    assert names(tokens(["\x1b\x1b[A"])) == ["alt+up"]
+    assert names(tokens(["\x1b", "\x1b[A"], 0.06)) == ["escape", "up"]
+    assert names(tokens(["\x1b\x1b[24~"])) == ["f12"]
+
+
+TEXTUALS_OWN = {
+    sequence: value
+    for sequence, value in ANSI_SEQUENCES_KEYS.items()
+    if len(sequence) == 1 or (sequence[:2] in ("\x1b[", "\x1bO") and sequence[2:] != "~")
+}
+OTHER_HERE = {
+    "\x1b": "begins a sequence",
+    "\x9b": "ESC [ in eight bits",
+    "\x1b[1;2R": "a report of the cursor, for Textual too",
+    "\x1b[1;5R": "a report",
+    "\x1b[1;6R": "a report",
+    "\x1b[25~": "Textual's own parser takes the number for a character",
+    "\x1b[26~": "",
+    "\x1b[28~": "",
+    "\x1b[29~": "",
+    "\x1b[31~": "",
+    "\x1b[32~": "with Textual's own parser Shift and F8 of a PuTTY is a Space",
+    "\x1b[33~": "",
+    "\x1b[34~": "",
+    "\x1b[62~": "",
+    "\x1b[63~": "",
+    "\x1b[5A": "",
+    "\x1b[5B": "",
+    "\x1b[5C": "",
+    "\x1b[5D": "",
+    "\x1b[167;5u": "",
+}
+
+
+def test_every_other_key_has_the_name_it_has_in_textual() -> None:
+    parser, compared = XTermParser(), 0
+    for sequence, value in TEXTUALS_OWN.items():
+        theirs = [(k.key, k.character) for k in parser._sequence_to_key_events(sequence)]
+        if sequence in OTHER_HERE or value is IGNORE_SEQUENCE or len(theirs) > 1:
+            continue
+        if sequence[2:3] == "1" and sequence[-1] in "pqrstuvwxy":
+            continue  # digits with Ctrl, in mintty alone
+        (ours,) = tokens([sequence])
+        assert isinstance(ours, Key)
+        expected = ("enter", "\r") if sequence == "\x1bOM" else theirs[0]
+        assert (ours.name, ours.character) == expected, sequence
+        compared += 1
+    assert compared > 150
+
+
+@pytest.mark.parametrize(
+    ("sent", "key"),
+    [
+        ("\x7f", "backspace"),
+        ("\x08", "backspace"),
+        ("\x10", "ctrl+p"),
+        ("\x13", "ctrl+s"),
+        ("\x0f", "ctrl+o"),
+        ("\x0c", "ctrl+l"),
+        ("\x11", "ctrl+q"),
+        ("\t", "tab"),
+        ("\x1b[Z", "shift+tab"),
+        ("\x1b[H", "home"),
+        ("\x1bOH", "home"),
+        ("\x1b[1~", "home"),
+        ("\x1b[F", "end"),
+        ("\x1b[4~", "end"),
+        ("\x1b[3~", "delete"),
+        ("\x1b[5~", "pageup"),
+        ("\x1b[6~", "pagedown"),
+        ("\x1b[1;5A", "ctrl+up"),
+        ("\x1b[1;2C", "shift+right"),
+        ("\x1b[1;3D", "alt+left"),
+        ("\x1b[1;129A", "up"),
+        ("\x1b[24;65~", "f12"),
+        ("\x1b[32u", "space"),
+        ("\x1b[32;1;32u", "space"),
+        ("\x1b[32;2u", "space"),
+        ("\x1b[27;2;32~", "space"),
+        ("\x1b[114u", "r"),
+        ("\x1b[114;5u", "ctrl+r"),
+        ("\x1b[97:65;2u", "A"),
+        ("\x1b[13u", "enter"),
+        ("\x1b[27u", "escape"),
+        ("\r", "enter"),
+        ("é", "é"),
+        ("?", "question_mark"),
+        (" ", "space"),
+    ],
+)
+def test_the_keys_of_the_panel(sent: str, key: str) -> None:
+    assert names(tokens([sent])) == [key]
+
+
+def test_a_lock_that_is_on_changes_no_key() -> None:
+    for sent in ("\x1b[114;65u", "\x1b[114;129u", "\x1b[114;193:1;114u"):
+        (found,) = tokens([sent])
+        assert isinstance(found, Key)
+        assert (found.name, found.character) == ("r", "r"), sent
+
+
+@pytest.mark.parametrize("sent", ["\x1b[114;1:3u", "\x1b[24;1:3~", "\x1b[9999999u", "\x1b[55296u"])
+def test_a_key_that_is_let_go_or_that_does_not_exist_is_none(sent: str) -> None:
+    assert tokens([sent]) == []
+
+
+@given(st.text(max_size=40).filter(lambda text: "\x1b" not in text), st.floats(0, 0.9))
+def test_a_paste_is_one_token_wherever_it_is_cut(text: str, gap: float) -> None:
+    expected = text.replace("\x00", "").encode(errors="replace").decode()
+    for reads in cuts(f"\x1b[200~{text}\x1b[201~", 1):
+        if gap >= ESCAPE_DELAY and reads[0] == "\x1b":
+            continue
+        (found,) = tokens(reads, gap)
+        assert isinstance(found, Paste)
+        assert found.text == expected, reads
+
+
+@pytest.mark.parametrize("end", ["", *("\x1b[201~"[:n] for n in range(1, 6))])
+def test_a_paste_without_end_ends_after_a_while_and_types_nothing_of_its_end(end: str) -> None:
+    tokenizer = Tokenizer()
+    assert tokenizer.feed(f"\x1b[200~some text{end}", 0.0) == []
+    assert tokenizer.tick(SEQUENCE_WITHIN - 0.01) == []
+    assert tokenizer.tick(SEQUENCE_WITHIN) == [Paste("some text", 0.0)]
+    assert tokenizer.feed("\x1b[201~"[len(end) :] if end else "", SEQUENCE_WITHIN + 0.5) == []
+    assert names(tokenizer.feed("r", SEQUENCE_WITHIN + 0.5)) == ["r"]
+
+
+ACTS = {"r", "v", "enter"}
+TYPED = (string.digits + string.ascii_letters + string.punctuation).translate({92: None, 126: None})
+"""What a person types, but for what ends a reply or brackets a paste."""
+SEQUENCES = st.builds(
+    lambda begin, middle, final: begin + middle + final,
+    st.sampled_from(["\x1b[", "\x1bO", "\x1b[[", "\x1b\x1b[", "\x9b"]),
+    st.text("0123456789;:<=>?!\"#$%&'()*+,-./", max_size=8),
+    st.sampled_from([chr(code) for code in range(0x40, 0x7F)]),
+)
+
+
+def _is_more_than_one_sequence(sequence: str) -> bool:
+    """Whether it is a key that came as the number of its character, Enter of the keypad, or two."""
+    body = sequence.replace("\x1b\x1b[", "\x1b[").replace("\x9b", "\x1b[")
+    of_rxvt = re.match(r"\x1b\[\d{1,2}\$.", body)
+    return bool(body.endswith("u") or body.startswith("\x1b[27;") or body == "\x1bOM" or of_rxvt)
+
+
+@given(SEQUENCES, st.sampled_from(GAPS), st.data())
+def test_no_sequence_gives_a_key_that_acts(sequence: str, gap: float, data: st.DataObject) -> None:
+    if _is_more_than_one_sequence(sequence):
+        return
+    cut = data.draw(st.integers(1, len(sequence)))
+    found = tokens([sequence[:cut], sequence[cut:]], gap)
+    typed = [token for token in found if isinstance(token, Key)]
+    assert not ACTS & {token.name for token in typed}
+    # a keypad may type a digit; nothing else is typed out of a sequence
+    assert {token.character for token in typed} <= {None, "\x1b", *"0123456789*+-./"}
+
+
+@given(st.lists(st.tuples(st.binary(max_size=30), st.floats(0, 2)), max_size=8), st.booleans())
+def test_random_bytes_never_crash_and_always_come_to_an_end(
+    reads: list[tuple[bytes, float]], mouse: bool
+) -> None:
+    tokenizer, now, found = Tokenizer(mouse=mouse), 0.0, list[Token]()
+    for read, gap in reads:
+        now += gap
+        found += tokenizer.feed(read.decode("utf-8", "surrogateescape"), now)
+    found += tokenizer.tick(now + AFTERWARDS)
+    found += tokenizer.tick(now + 2 * AFTERWARDS)
+    assert tokenizer.deadline is None
+    keys = [token for token in found if isinstance(token, Key)]
+    times = [key.at for key in keys]
+    assert times == sorted(times)
+    assert all(key.began <= key.at for key in keys)
+
+
+@given(st.text(TYPED + " \r\t\x1b[O", max_size=30), st.sampled_from(GAPS), st.data())
+def test_a_space_is_never_lost(text: str, gap: float, data: st.DataObject) -> None:
+    cut = data.draw(st.integers(0, len(text)))
+    found = tokens([text[:cut], text[cut:]], gap)
+    spaces = [token for token in found if isinstance(token, Key) and token.name == "space"]
+    assert bool(spaces) == (" " in text)

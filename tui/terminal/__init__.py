@@ -1,0 +1,1 @@
+"""The terminal as the panel meets it: what its keys send, and Textual's private parts for that."""

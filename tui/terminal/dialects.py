@@ -1,0 +1,304 @@
+"""Keys out of what terminals send: PuTTY in its modes, rxvt, consoles, tmux, screen, xterm.
+
+A sequence that means a key gives that key, whole or cut anywhere; one that is not understood is
+swallowed whole. No stop key is lost in a sequence that does not end. Times are seconds of one
+clock, given with each read; nothing here looks at a clock.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Final
+
+from .names import STOP_KEYS, Named, of_character, of_sequence, with_alt
+from .tokens import Key, Paste, Report, Token
+
+ESCAPE_DELAY: Final = 0.1
+"""Seconds after which ESC alone is the key Escape, unless Textual is told another time."""
+
+SEQUENCE_WITHIN: Final = 1.0
+"""Seconds that a sequence which has begun may wait for its next character."""
+
+APART: Final = 0.05
+"""Seconds between two reads above which they are not one piece."""
+
+LONGEST_KEY: Final = 32
+"""Characters that no sequence of a key is longer than."""
+
+LONGEST_REPLY: Final = 4096
+"""Characters after which a reply without an end is none."""
+
+ESC: Final = "\x1b"
+PASTE_BEGINS: Final = "\x1b[200~"
+PASTE_ENDS: Final = "\x1b[201~"
+SPACE: Final = ("space", " ")
+
+_REPORT = re.compile(
+    r"\x1b\[(\d+;\d+R"  # where the cursor stands
+    r"|\?\d+;\d\$y"  # whether it knows a mode
+    r"|48;[\d:]+;[\d:]+;[\d:]+;[\d:]+t)",  # its new size
+    re.ASCII,
+)
+_MOUSE = re.compile(r"\x1b\[(<\d+;-?\d+;-?\d+[Mm]|\d+;\d+;\d+M|M...)", re.ASCII | re.DOTALL)
+_RXVT = re.compile(r"\x1b\[([2-8]|1[1-9]|2[0-9]|3[0-4])", re.ASCII)
+"""A key with Shift ends with $, which elsewhere stands before the end."""
+_EIGHT_BIT = {"\x9b": "[", "\x8f": "O", "\x90": "P", "\x9d": "]"}
+_EIGHT_BIT |= {chr(0xDC00 + ord(code)): same for code, same in _EIGHT_BIT.items()}
+"""ESC and what follows in one character, or in one byte that is no UTF-8."""
+_REPLY_BEGINS = {"]": "0123456789", "P": "0123456789;>!$+=?|", "_": "G"}
+"""Replies of any length, and how they go on: Alt+] and Alt+P begin the same."""
+_REPLY_ENDS = "\x07\x9c\udc9c\x18\x1a"
+
+
+class Tokenizer:
+    """Takes what was read, piece by piece, and gives tokens.
+
+    With `mouse` the terminal was asked to report its mouse and to speak the kitty protocol.
+    """
+
+    def __init__(self, *, mouse: bool = False, escape_delay: float = ESCAPE_DELAY) -> None:
+        self._mouse = mouse
+        self._escape_delay = escape_delay
+        self._state: Callable[[str], None] = self._ground
+        self._text = ""
+        self._long: list[str] = []
+        self._began = self._last = self._now = 0.0
+        self._mark: object = None
+        self._here: object = None
+        self._alt = self._mute = False
+        self._late_until = float("-inf")
+        self._found: list[Token] = []
+
+    def feed(self, text: str, now: float, mark: object = None) -> list[Token]:
+        """Take what was read at this time; what it comes to."""
+        self._end_waiting(now)
+        self._now, self._here = now, mark
+        if not self._stops_inside(text):
+            for character in text:
+                self._state(character)
+            self._last = now
+        return self._given()
+
+    def tick(self, now: float) -> list[Token]:
+        """What has come to its end by this time because nothing more was read."""
+        self._end_waiting(now)
+        return self._given()
+
+    @property
+    def deadline(self) -> float | None:
+        """The time at which `tick` has something to do; None where nothing waits."""
+        return None if self._state == self._ground else self._last + self._patience
+
+    @property
+    def pending(self) -> float | None:
+        """When a sequence began that may become a key, or None."""
+        may_be = self._state not in (self._ground, self._reply, self._paste)
+        return self._began if may_be and not self._mute else None
+
+    @property
+    def _patience(self) -> float:
+        short = self._state in (self._escape, self._opening)
+        return self._escape_delay if short else SEQUENCE_WITHIN
+
+    def _given(self) -> list[Token]:
+        found, self._found = self._found, []
+        return found
+
+    def _begin(self, text: str = "", *, mute: bool = False) -> None:
+        """A key or a sequence begins with what is read now."""
+        self._text, self._long = text, []
+        self._began, self._mark = self._now, self._here
+        self._alt, self._mute = False, mute
+
+    def _key(self, named: Named | None) -> None:
+        """Give a key out; the sequence that it came in is over."""
+        self._state = self._ground
+        if named is None or (self._mute and named[0] not in STOP_KEYS):
+            return
+        name, character = named
+        if self._alt and name not in STOP_KEYS:
+            name, character = f"alt+{name.removeprefix('alt+')}", None
+        self._found.append(Key(name, character, self._began, self._now, self._mark))
+
+    def _escape_key(self) -> None:
+        self._found.append(Key("escape", ESC, self._began, self._began, self._mark))
+
+    def _ground(self, character: str) -> None:
+        """Nothing has begun: a key, or the first character of a sequence."""
+        late, self._late_until = self._now <= self._late_until, float("-inf")
+        if late and character in "[O":
+            # the rest of a sequence whose ESC was taken for the key Escape
+            self._begin(ESC, mute=True)
+            self._introduce(character)
+        elif character == ESC:
+            self._begin(ESC)
+            self._state = self._escape
+        elif (second := _EIGHT_BIT.get(character)) is not None:
+            self._begin(ESC)
+            self._introduce(second)
+        else:
+            self._begin()
+            self._key(of_character(character))
+
+    def _escape(self, character: str) -> None:
+        """After ESC."""
+        if character == ESC:
+            together = self._now == self._began and not self._alt
+            if not together:
+                self._escape_key()
+            self._begin(ESC)
+            self._alt = together  # ESC twice at once is Alt with what follows
+        elif character in "[O" or character in _REPLY_BEGINS:
+            self._introduce(character)
+        else:
+            self._key(SPACE if character == " " else with_alt(character))
+
+    def _introduce(self, character: str) -> None:
+        self._text += character
+        states = {"[": self._csi, "O": self._ss3}
+        self._state = states.get(character, self._opening)
+
+    def _broken(self, character: str) -> bool:
+        """Whether a character ends a sequence of keys that it cannot belong to."""
+        if character == ESC:
+            self._state = self._ground
+            self._ground(character)
+        elif character == " ":
+            self._begin()
+            self._key(SPACE)
+        elif not "\x20" < character < "\x7f":
+            self._state = self._ground
+        else:
+            return False
+        return True
+
+    def _csi(self, character: str) -> None:
+        """After ESC [."""
+        if self._broken(character):
+            return
+        if character == "[" and self._text == "\x1b[":
+            self._state = self._linux
+        ends = character >= "\x40" or (character == "$" and _RXVT.fullmatch(self._text))
+        self._text += character
+        if self._text == "\x1b[M" and self._mouse:
+            self._state = self._mouse_place
+        elif ends and self._state == self._csi:
+            self._finish()
+
+    def _linux(self, character: str) -> None:
+        """After ESC [ [: the Linux console's F1 to F5 have one more character."""
+        if not self._broken(character):
+            self._text += character
+            if character >= "\x40":
+                self._finish()
+
+    def _ss3(self, character: str) -> None:
+        """After ESC O."""
+        if self._broken(character):
+            return
+        self._text += character
+        if character >= "\x40":
+            self._finish()
+
+    def _mouse_place(self, character: str) -> None:
+        """After ESC [ M where the mouse is reported: a button and a place."""
+        self._text += character
+        if len(self._text) == len("\x1b[M") + 3:
+            self._finish()
+
+    def _finish(self) -> None:
+        """A sequence is complete."""
+        text, self._state = self._text, self._ground
+        if text == PASTE_BEGINS:
+            self._state = self._paste
+        elif _REPORT.fullmatch(text) or (self._mouse and _MOUSE.fullmatch(text)):
+            self._found.append(Report(text))
+        else:
+            self._key(of_sequence(text[: LONGEST_KEY + 1], kitty=self._mouse))
+
+    def _opening(self, character: str) -> None:
+        """After ESC ], ESC P or ESC _: a reply, or a key with Alt."""
+        second = self._text[-1]
+        if character in _REPLY_BEGINS[second]:
+            self._state = self._reply
+        else:
+            self._key(with_alt(second))
+            self._state(character)
+
+    def _reply(self, character: str) -> None:
+        """In a reply; what it says is not looked at."""
+        if character == ESC:
+            self._state = self._reply_escape
+        elif character in _REPLY_ENDS:
+            self._state = self._ground
+        else:
+            self._long.append(character)
+            if len(self._long) > LONGEST_REPLY:
+                self._no_reply()
+
+    def _reply_escape(self, character: str) -> None:
+        """After ESC in a reply: its end, or the first of another sequence."""
+        self._state = self._ground
+        if character != "\\":
+            self._begin(ESC)
+            self._escape(character)
+
+    def _no_reply(self) -> None:
+        """What began like a reply has no end: a Space in it was typed."""
+        spaced = " " in self._long
+        self._begin()
+        self._key(SPACE if spaced else None)
+
+    def _paste(self, character: str) -> None:
+        """Inside of a paste."""
+        self._long.append(character)
+        if character == "~" and "".join(self._long[-len(PASTE_ENDS) :]) == PASTE_ENDS:
+            self._pasted(self._long[: -len(PASTE_ENDS)])
+
+    def _pasted(self, text: list[str]) -> None:
+        pasted = "".join(text).replace("\x00", "")
+        self._found.append(Paste(pasted.encode(errors="replace").decode(), self._now))
+        self._state = self._ground
+
+    def _stops_inside(self, text: str) -> bool:
+        """Whether a read is a stop key alone that was pressed while something has no end.
+
+        A Space that is read by itself, a while after the rest, was pressed: where the end of a
+        paste or of a reply was lost, no stop may be lost with it.
+        """
+        if self._state not in (self._paste, self._reply) or self._now - self._last <= APART:
+            return False
+        named = SPACE if text == " " else of_sequence(text[:LONGEST_KEY])
+        if named is None or named[0] not in STOP_KEYS:
+            return False
+        self._found.append(Key(*named, self._now, self._now, self._here))
+        return True
+
+    def _end_waiting(self, now: float) -> None:
+        """End what has waited too long for its next character."""
+        if (deadline := self.deadline) is None or now < deadline:
+            return
+        state, self._state = self._state, self._ground
+        if state == self._escape:
+            if self._alt:
+                self._escape_key()
+            self._escape_key()
+            self._late_until = deadline + SEQUENCE_WITHIN
+        elif state == self._opening:
+            self._key(with_alt(self._text[-1]))
+        elif state in (self._reply, self._reply_escape):
+            self._no_reply()
+        elif state == self._paste:
+            self._end_paste(now)
+
+    def _end_paste(self, now: float) -> None:
+        """The end of a paste did not come in time; the first part of it may have."""
+        whole = "".join(self._long)
+        cut = next(n for n in range(len(PASTE_ENDS) - 1, -1, -1) if whole.endswith(PASTE_ENDS[:n]))
+        self._pasted(self._long[: len(whole) - cut])
+        if cut == 1:
+            self._late_until = now + SEQUENCE_WITHIN
+        elif cut:
+            self._begin(PASTE_ENDS[:cut])
+            self._state, self._last = self._csi, now

@@ -1,0 +1,35 @@
+"""What comes out of the characters that a terminal sends."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Key:
+    """A key: its name in Textual, what it types, when its first and its last character was read."""
+
+    name: str
+    character: str | None
+    began: float
+    at: float
+    mark: object = None
+    """Whatever was given with the read in which it began."""
+
+
+@dataclass(frozen=True, slots=True)
+class Paste:
+    """A text that was pasted, with the brackets that terminals put around it."""
+
+    text: str
+    at: float
+
+
+@dataclass(frozen=True, slots=True)
+class Report:
+    """Something that the terminal says of itself and Textual wants to hear."""
+
+    text: str
+
+
+Token = Key | Paste | Report
