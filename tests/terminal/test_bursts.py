@@ -1,0 +1,285 @@
+"""Which keys are alone, which a piece, which held down."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.terminal.bursts import LONGEST, STEPPING, Bursts, Given
+from tui.terminal.dialects import APART
+from tui.terminal.tokens import Key, Paste
+
+QUIET = APART + 0.01
+CLOSE = 0.03
+STOPS = {"space", "f12", "f9"}
+
+
+def pressed(name: str, at: float) -> Key:
+    return Key(name, name if len(name) == 1 else None, at, at)
+
+
+class Bench:
+    """Reads at given times, and looks when there is something to know."""
+
+    def __init__(self) -> None:
+        self.bursts = Bursts()
+        self.now = 0.0
+        self.found: list[Given] = []
+
+    def read(self, *names: str, after: float = 1.0) -> list[Given]:
+        """Keys of one read, so long after the last; what is given out by then."""
+        self.now += after
+        before = len(self.found)
+        while (deadline := self.bursts.deadline()) is not None and deadline < self.now - 0.001:
+            self.found += self.bursts.given(deadline + 0.001)
+        for name in names:
+            key = pressed(name, self.now)
+            if name in STOPS:
+                self.bursts.stop(key)
+            else:
+                self.bursts.key(key)
+        self.found += self.bursts.given(self.now)
+        return self.found[before:]
+
+    def rest(self) -> list[Given]:
+        return self.read()
+
+    def names(self) -> list[str]:
+        return [given.what.name for given in self.found if isinstance(given.what, Key)]
+
+
+def test_a_key_alone_is_held_back_until_that_is_known() -> None:
+    bench = Bench()
+    assert bench.read("r") == []
+    assert bench.bursts.deadline() == pytest.approx(bench.now + APART)
+    assert bench.bursts.given(bench.now + APART - 0.001) == []
+    (given,) = bench.bursts.given(bench.now + APART + 0.001)
+    assert (given.alone, given.held, given.steps, given.piece) == (True, False, True, 1)
+    assert bench.bursts.deadline() is None
+
+
+def test_keys_of_one_read_are_a_piece() -> None:
+    bench = Bench()
+    bench.read("r", "enter")
+    found = bench.rest()
+    assert [(g.alone, g.held, g.steps, g.piece) for g in found] == [(False, False, False, 2)] * 2
+
+
+@pytest.mark.parametrize(
+    ("gap", "alone"), [(0.001, False), (CLOSE, False), (QUIET, True), (1.0, True)]
+)
+def test_keys_within_50_ms_are_a_piece(gap: float, alone: bool) -> None:
+    bench = Bench()
+    bench.read("r")
+    bench.read("enter", after=gap)
+    bench.rest()
+    assert [given.alone for given in bench.found] == [alone, alone]
+
+
+def test_a_chain_of_near_keys_is_one_piece() -> None:
+    bench = Bench()
+    for name in "drive":
+        bench.read(name, after=CLOSE)
+    bench.rest()
+    assert bench.names() == list("drive")
+    assert not any(given.alone for given in bench.found)
+
+
+def test_a_stop_voids_what_still_waits_and_is_part_of_the_piece() -> None:
+    bench = Bench()
+    bench.read("up", "r", "space", "v")
+    bench.read("f", after=CLOSE)
+    bench.rest()
+    assert bench.names() == ["v", "f"]
+    assert not any(given.alone or given.steps for given in bench.found)
+    bench.read("r")
+    assert [given.alone for given in bench.rest()] == [True]
+
+
+def test_a_stop_voids_a_key_whose_time_was_over_but_that_was_not_given_out() -> None:
+    bursts = Bursts()
+    bursts.key(pressed("r", 1.0))
+    bursts.stop(pressed("space", 1.2))
+    assert bursts.given(1.2) == []
+    assert bursts.given(5.0) == []
+
+
+def test_several_arrows_at_once_step_once() -> None:
+    bench = Bench()
+    bench.read("up", "up", "up")
+    found = bench.rest()
+    assert [given.steps for given in found] == [True, False, False]
+    assert not any(given.alone or given.held for given in found)
+    bench.read("up", "down")
+    assert not any(given.steps for given in bench.rest())
+
+
+def test_an_arrow_held_down_goes_on_at_its_pace_and_ends_with_the_key() -> None:
+    bench = Bench()
+    bench.read("up")
+    assert [given.alone for given in bench.rest()] == [True]
+    assert bench.read("up", after=0.5) == []
+    assert bench.read("up", after=0.033) == []
+    assert [given.held for given in bench.read("up", after=0.033)] == [True] * 3
+    for _ in range(50):
+        (given,) = bench.read("up", after=0.033)
+        assert given.held
+        assert given.steps
+    assert bench.rest() == []
+    bench.read("up")
+    assert [given.alone for given in bench.rest()] == [True]
+
+
+def test_a_slower_repeat_is_keys_alone() -> None:
+    bench = Bench()
+    for _ in range(5):
+        bench.read("down", after=0.09)
+    bench.rest()
+    assert [given.alone for given in bench.found] == [True] * 5
+
+
+def test_a_letter_held_down_is_a_piece() -> None:
+    bench = Bench()
+    for _ in range(40):
+        bench.read("r", after=0.033)
+    bench.rest()
+    assert not any(given.alone or given.held or given.steps for given in bench.found)
+    assert len(bench.found) == 40
+
+
+def test_arrows_at_an_uneven_pace_step_once() -> None:
+    bench = Bench()
+    for gap in (0.5, 0.006, 0.045, 0.006, 0.045, 0.006, 0.045):
+        bench.read("up", after=gap)
+    bench.rest()
+    assert sum(given.steps for given in bench.found) == 1
+
+
+def test_arrows_that_come_faster_than_any_keyboard_step_once() -> None:
+    bench = Bench()
+    for _ in range(300):
+        bench.read("up", after=0.001)
+    bench.rest()
+    assert sum(given.steps for given in bench.found) == 1
+    assert len(bench.found) == 300
+
+
+def test_what_a_link_gives_back_at_once_steps_once_a_read() -> None:
+    bench = Bench()
+    bench.read(*["up"] * 60)
+    for _ in range(3):
+        bench.read("up", after=0.033)
+    bench.read("up", "up", after=0.033)
+    bench.rest()
+    assert sum(given.steps for given in bench.found) == 1 + 3 + 1
+
+
+def test_another_key_ends_a_held_one() -> None:
+    bench = Bench()
+    for _ in range(4):
+        bench.read("up", after=0.033)
+    bench.read("down", after=0.033)
+    bench.read("up", after=0.033)
+    bench.rest()
+    assert [given.held for given in bench.found] == [True] * 4 + [False] * 2
+    assert not any(given.steps for given in bench.found[4:])
+
+
+def test_a_long_piece_is_not_held_back_to_its_end() -> None:
+    bench = Bench()
+    found = [given for _ in range(20) for given in bench.read("x", after=CLOSE)]
+    assert len(found) >= 20 - LONGEST / CLOSE - 2
+
+
+def test_a_paste_keeps_its_place_and_leaves_no_key_beside_it_alone() -> None:
+    bursts = Bursts()
+    bursts.key(pressed("slash", 1.0))
+    bursts.paste(Paste("text", 1.01))
+    bursts.key(pressed("enter", 1.02))
+    found = [*bursts.given(1.02), *bursts.given(2.0)]
+    assert [type(given.what) for given in found] == [Key, Paste, Key]
+    assert not any(given.alone for given in found)
+
+
+def test_a_stop_does_not_void_a_paste() -> None:
+    bursts = Bursts()
+    bursts.paste(Paste("text", 1.0))
+    bursts.stop(pressed("space", 1.0))
+    assert [given.what for given in bursts.given(2.0)] == [Paste("text", 1.0)]
+
+
+def test_a_key_waits_for_a_sequence_that_began_beside_it() -> None:
+    bursts = Bursts()
+    bursts.key(pressed("r", 1.0))
+    assert bursts.given(1.08, pending=1.03) == []
+    assert bursts.deadline(pending=1.03) is None
+    bursts.key(Key("escape", "\x1b", 1.03, 1.03))
+    assert [given.alone for given in bursts.given(1.13)] == [False, False]
+    bursts.key(pressed("r", 2.0))
+    assert [given.alone for given in bursts.given(2.1, pending=2.06)] == [True]
+
+
+NAMES = st.sampled_from(["r", "enter", "up", "up", "up", "down", "pageup", "space", "f12", "1"])
+READS = st.lists(
+    st.tuples(
+        st.lists(NAMES, min_size=1, max_size=4),
+        st.sampled_from([0.0005, 0.01, 0.033, 0.033, 0.033, 0.05, 0.06, 0.4]),
+    ),
+    max_size=25,
+)
+
+
+def _times(reads: Iterable[tuple[list[str], float]]) -> list[tuple[str, float]]:
+    now, found = 0.0, []
+    for names, gap in reads:
+        now += gap
+        found += [(name, now) for name in names]
+    return found
+
+
+@given(READS)
+def test_what_is_given_out_is_true(reads: list[tuple[list[str], float]]) -> None:
+    bench = Bench()
+    for names, gap in reads:
+        bench.read(*names, after=gap)
+    bench.rest()
+    typed = _times(reads)
+    keys = [given.what for given in bench.found if isinstance(given.what, Key)]
+    # in order, each once, none that was not typed
+    rest = iter(name for name, _ in typed)
+    assert all(any(name == key.name for name in rest) for key in keys)
+    for one in bench.found:
+        key = one.what
+        assert isinstance(key, Key)
+        near = [name for name, at in typed if abs(at - key.at) <= APART - 1e-6]
+        if one.alone:
+            assert near == [key.name]
+        if one.held:
+            assert key.name in STEPPING
+            assert near.count(key.name) > 1
+        assert one.steps <= (key.name in STEPPING or one.alone)
+    # a key that no stop came after is given out, alone where nothing is near
+    stops = [at for name, at in typed if name in STOPS]
+    for name, at in typed:
+        near = [other for other, time in typed if abs(time - at) <= APART + 1e-6]
+        if name not in STOPS and near == [name] and not [s for s in stops if s == at]:
+            assert any(isinstance(g.what, Key) and g.what.at == at and g.alone for g in bench.found)
+
+
+@given(
+    st.lists(st.sampled_from(["r", "v", "enter", "up", "3"]), min_size=2, max_size=30), st.data()
+)
+def test_a_paste_without_brackets_is_one_piece_at_every_cut(
+    names: list[str], data: st.DataObject
+) -> None:
+    cut = data.draw(st.integers(0, len(names)))
+    bench = Bench()
+    bench.read(*names[:cut])
+    bench.read(*names[cut:], after=data.draw(st.floats(0, CLOSE)))
+    bench.rest()
+    assert bench.names() == names
+    assert not any(given.alone or given.held for given in bench.found)
+    assert sum(given.steps for given in bench.found) <= 1

@@ -1,0 +1,157 @@
+"""Bytes to keys with their strokes: stop keys, stamps, company."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Sequence
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.terminal.reader import KeyReader, Pressed, Read
+from tui.terminal.tokens import Paste, Report
+
+from .dialect_tables import DIALECTS, REPLIES, REPORTS
+
+LATER = 10.0
+
+
+class Stops:
+    """An app that counts its stops; with a text field in focus, Space is text."""
+
+    def __init__(self, *, typing: bool = False) -> None:
+        self.typing = typing
+        self.taken: list[str] = []
+
+    def take_stop_key(self, key: str) -> bool:
+        if key == "space" and self.typing:
+            return False
+        self.taken.append(key)
+        return True
+
+    def stop_stamp(self) -> object:
+        return len(self.taken)
+
+
+def read(
+    *reads: tuple[float, bytes], typing: bool = False
+) -> tuple[list[str], list[Pressed], list[Read]]:
+    """What reads at these times come to: stops, keys, and all that the app is told."""
+    stops = Stops(typing=typing)
+    reader, found = KeyReader(stops), list[Read]()
+    for at, data in reads:
+        while (deadline := reader.deadline) is not None and deadline < at - 0.001:
+            found += reader.tick(deadline + 0.001)
+        found += reader.read(data, at, stops.stop_stamp())
+    found += reader.tick(LATER * 10)
+    found += reader.tick(LATER * 20)
+    assert reader.deadline is None
+    return stops.taken, [one for one in found if isinstance(one, Pressed)], found
+
+
+def acting(keys: Sequence[Pressed], stamp: object) -> list[str]:
+    """The keys that may act where no stop came since."""
+    return [key.name for key in keys if key.stroke.acts and key.stroke.stamp == stamp]
+
+
+def test_a_stop_in_one_write_with_a_run_leaves_nothing_that_acts() -> None:
+    for sent in (b"r ", b"r\r ", b"\x1b[A\x1b[Ar ", b"ar ", b"30\r\x1b[24~", b"r \r", b" r\r"):
+        taken, keys, _ = read((0.0, sent))
+        assert len(taken) == 1, sent
+        assert acting(keys, 1) == [], sent
+
+
+def test_a_key_before_a_stop_has_an_older_stamp_and_one_after_it_the_newer() -> None:
+    taken, keys, _ = read((0.0, b"r"), (1.0, b" "), (2.0, b"v"))
+    assert taken == ["space"]
+    assert [(key.name, key.stroke.stamp, key.stroke.alone) for key in keys] == [
+        ("r", 0, True),
+        ("v", 1, True),
+    ]
+
+
+def test_a_sequence_that_a_stop_falls_into_has_the_older_stamp() -> None:
+    stops = Stops()
+    reader = KeyReader(stops)
+    reader.read(b"\x1b[", 1.0, stops.stop_stamp())
+    stops.taken.append("f12")  # somebody else
+    reader.read(b"A", 1.5, stops.stop_stamp())
+    (key,) = [one for one in reader.tick(LATER) if isinstance(one, Pressed)]
+    assert (key.name, key.stroke.stamp, key.stroke.read_at) == ("up", 0, 1.0)
+
+
+def test_a_space_in_a_text_is_text() -> None:
+    taken, keys, _ = read((0.0, b"a b"), typing=True)
+    assert taken == []
+    assert [key.character for key in keys] == ["a", " ", "b"]
+
+
+def test_keys_of_a_piece_know_how_many_they_are() -> None:
+    _, keys, _ = read((0.0, b"bar"))
+    assert [(key.stroke.piece, key.stroke.acts) for key in keys] == [(3, False)] * 3
+
+
+@pytest.mark.parametrize("said", [*REPORTS.values(), *REPLIES.values()])
+def test_what_a_terminal_says_of_itself_is_no_part_of_a_piece(said: str) -> None:
+    for cut in range(len(said) + 1):
+        first, second = said[:cut].encode(), said[cut:].encode()
+        taken, keys, found = read((1.0, b"r" + first), (1.02, second))
+        assert taken == []
+        assert [(key.name, key.stroke.alone) for key in keys] == [("r", True)], (first, second)
+        assert [one for one in found if not isinstance(one, Pressed | Report)] == []
+
+
+def test_a_key_near_an_escape_is_not_alone() -> None:
+    _, keys, _ = read((1.0, b"r"), (1.03, b"\x1b"))
+    assert [(key.name, key.stroke.acts) for key in keys] == [("r", False), ("escape", False)]
+
+
+@pytest.mark.parametrize("dialect", DIALECTS)
+def test_f12_and_f9_are_taken_at_once_in_every_dialect(dialect: str) -> None:
+    for number, key in ((12, "f12"), (9, "f9")):
+        sent = DIALECTS[dialect][number - 1].encode()
+        taken, keys, _ = read((0.0, b"r" + sent + b"v"))
+        assert taken == [key]
+        assert acting(keys, 1) == []
+
+
+@pytest.mark.parametrize("code", [b"\x9b", b"\x8f"])
+def test_bytes_that_are_no_text_may_begin_a_sequence_and_are_never_a_key(code: bytes) -> None:
+    assert read((0.0, code + b"24~"))[0] == (["f12"] if code == b"\x9b" else [])
+    for byte in (b"\xff", b"\xe9", b"\xc3", b"\x80"):
+        taken, keys, _ = read((0.0, byte), (1.0, b" "), (2.0, b"\xc3"), (2.01, b"\xa9"))
+        assert taken == ["space"]
+        assert [key.name for key in keys] == ["é"]
+
+
+def test_a_paste_stops_nothing_and_is_text() -> None:
+    taken, keys, found = read((0.0, b"\x1b[200~a b\xff\nrun \x1b[201~"))
+    assert (taken, keys) == ([], [])
+    assert [one.text for one in found if isinstance(one, Paste)] == ["a b?\nrun "]
+
+
+def test_a_paste_of_random_keys_without_brackets_only_stops() -> None:
+    chance = random.Random(12)
+    typed = [bytes([code]) for code in range(32, 127)] + [b"\r", b"\t", b"\x7f"]
+    typed += [b"\x1b[A", b"\x1bOP", b"\x1b[24~", b"\x1b"]
+    for _ in range(50):
+        text = b"".join(chance.choice(typed) for _ in range(300))
+        cut = chance.randrange(len(text))
+        taken, keys, _ = read((0.0, text[:cut]), (0.02, text[cut:]))
+        assert taken
+        assert acting(keys, len(taken)) == []
+
+
+@given(
+    st.lists(st.tuples(st.floats(0, 0.3), st.binary(max_size=20)), max_size=10),
+    st.booleans(),
+)
+def test_random_bytes_never_crash(reads: list[tuple[float, bytes]], typing: bool) -> None:
+    now, timed = 0.0, []
+    for gap, data in reads:
+        now += gap
+        timed.append((now, data))
+    _, keys, _ = read(*timed, typing=typing)
+    for key in keys:
+        assert key.stroke.alone or key.stroke.held or key.stroke.piece > 1

@@ -1,0 +1,157 @@
+"""Which keys came alone, which together, and which because a key is held down.
+
+A person types one key after another; a paste without brackets, or a link that hung, brings many at
+once. Times are seconds of one clock, given with each key; nothing here looks at a clock.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Final
+
+from .dialects import APART
+from .tokens import Key, Paste
+
+SHORTEST_REPEAT: Final = 0.005
+"""Seconds between two keys below which no keyboard repeats."""
+
+UNEVEN: Final = 0.02
+"""Seconds by which the times between repeats of a held key differ at most."""
+
+REPEATS: Final = 3
+"""Keys at an even pace that make a held key."""
+
+LONGEST: Final = 0.15
+"""Seconds after which keys that are known not to be alone are held back no longer."""
+
+STEPPING: Final = frozenset({"up", "down", "left", "right", "pageup", "pagedown"})
+"""Keys that a person holds down to go on."""
+
+
+@dataclass(frozen=True, slots=True)
+class Given:
+    """A key, or a paste, and the company in which it came."""
+
+    what: Key | Paste
+    alone: bool = False
+    held: bool = False
+    steps: bool = False
+    """Whether it may step a value: alone, held, or the first of a piece of one arrow only."""
+    piece: int = 1
+    """How many keys came at once, as far as that is known."""
+
+
+class Bursts:
+    """Holds keys back until it is known whether they came alone."""
+
+    def __init__(self) -> None:
+        self._waiting: list[Key] = []
+        self._last = float("-inf")
+        self._members = 0
+        self._names: set[str] = set()
+        self._reads: list[list[Key]] = []
+        self._repeating: str | None = None
+        self._stepped = False
+        self._given: list[Given] = []
+
+    def key(self, key: Key) -> None:
+        """Take a key; `given` tells what becomes of it."""
+        self._join(key.began, key.at)
+        if not self._reads or self._reads[-1][-1].at != key.at:
+            self._reads = [*self._reads[1 - REPEATS :], []]
+        self._reads[-1].append(key)
+        self._names.add(key.name)
+        self._waiting.append(key)
+
+    def stop(self, key: Key) -> None:
+        """A stop key was taken: whatever was typed before it and still waits is void."""
+        self._waiting.clear()
+        self._given = [given for given in self._given if isinstance(given.what, Paste)]
+        self._join(key.began, key.at)
+        self._repeating, self._stepped, self._reads = None, True, []
+
+    def paste(self, paste: Paste) -> None:
+        """A paste keeps its place among the keys; those beside it are not alone."""
+        self._join(paste.at, paste.at)
+        self._give_parts()
+        self._given.append(Given(paste))
+
+    def given(self, now: float, pending: float | None = None) -> list[Given]:
+        """What is known by now; `pending` is when a sequence began that may become a key."""
+        self._give_repeats()
+        if not self._hangs_on(pending):
+            if now - self._last > APART:
+                self._close()
+            elif self._members > 1 and self._waiting and now - self._waiting[0].at > LONGEST:
+                self._give_parts()
+        found, self._given = self._given, []
+        return found
+
+    def deadline(self, pending: float | None = None) -> float | None:
+        """When it will be known whether what waits is alone; None where time tells nothing."""
+        return self._last + APART if self._waiting and not self._hangs_on(pending) else None
+
+    def _hangs_on(self, pending: float | None) -> bool:
+        return pending is not None and pending - self._last <= APART
+
+    def _join(self, began: float, at: float) -> None:
+        """One more member of the piece; a new piece where the last is over."""
+        if began - self._last > APART:
+            self._close()
+        self._members += 1
+        self._last = at
+
+    def _close(self) -> None:
+        """The piece is over."""
+        if self._members == 1 and self._waiting:
+            self._given.append(Given(self._waiting.pop(), alone=True, steps=True))
+        self._give_parts()
+        self._members, self._names, self._reads = 0, set(), []
+        self._repeating, self._stepped = None, False
+
+    def _give_parts(self) -> None:
+        """Give out what waits as parts of a piece; of arrows, the first steps once."""
+        steps = not self._stepped and len(self._names) == 1 and self._names <= STEPPING
+        for key in self._waiting:
+            self._given.append(Given(key, steps=steps, piece=self._members))
+            self._stepped, steps = self._stepped or steps, False
+        self._waiting.clear()
+
+    def _give_repeats(self) -> None:
+        """Give out what a held key repeats, one a read."""
+        if not self._waiting or not self._reads:
+            return
+        last = self._reads[-1]
+        if all(key.name == self._repeating for key in last):
+            self._give_held(1, len(last))
+        elif _even(self._reads):
+            self._repeating = last[0].name
+            self._give_held(REPEATS, REPEATS)
+        else:
+            self._repeating = None
+
+    def _give_held(self, count: int, run: int) -> None:
+        """Of the last keys that wait, give so many as held; the others as parts."""
+        first = max(0, len(self._waiting) - run)
+        ahead, held = self._waiting[:first], self._waiting[first : first + count]
+        behind = self._waiting[first + count :]
+        self._waiting = ahead
+        self._give_parts()
+        self._stepped = True
+        for key in held:
+            self._given.append(Given(key, held=True, steps=True, piece=self._members))
+        self._waiting = behind
+        self._give_parts()
+
+
+def _even(reads: Sequence[Sequence[Key]]) -> bool:
+    """Whether each of these reads is the same key, at an even pace."""
+    names = {key.name for read in reads for key in read}
+    if len(reads) < REPEATS or len(names) != 1 or not names <= STEPPING:
+        return False
+    times = [read[0].at for read in reads]
+    between = [later - earlier for earlier, later in pairwise(times)]
+    alone = all(len(read) == 1 for read in reads)
+    return alone and min(between) >= SHORTEST_REPEAT and max(between) - min(between) <= UNEVEN

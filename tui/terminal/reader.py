@@ -1,0 +1,95 @@
+"""From the bytes of a terminal to keys with their strokes; stop keys are taken on the way.
+
+Runs in the thread that reads the keys, so that a stop waits neither for the screen nor for what
+the terminal takes.
+"""
+
+from __future__ import annotations
+
+import codecs
+from dataclasses import dataclass
+from typing import Protocol
+
+from .bursts import Bursts, Given
+from .dialects import ESCAPE_DELAY, Tokenizer
+from .names import STOP_KEYS
+from .stroke import Stroke
+from .tokens import Key, Paste, Report, Token
+
+
+class Stops(Protocol):
+    """What the app is asked in the thread that reads the keys."""
+
+    def take_stop_key(self, key: str) -> bool:
+        """Stop, if the key means that now; True if it was taken."""
+
+    def stop_stamp(self) -> object:
+        """Another object after every stop."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pressed:
+    """A key for the app."""
+
+    name: str
+    character: str | None
+    stroke: Stroke
+
+
+Read = Pressed | Paste | Report
+
+
+class KeyReader:
+    """Takes bytes and times, gives what the app is to be told."""
+
+    def __init__(
+        self, stops: Stops, *, mouse: bool = False, escape_delay: float = ESCAPE_DELAY
+    ) -> None:
+        self._stops = stops
+        # a byte that is no text stays what it is: it may begin a sequence
+        self._decode = codecs.getincrementaldecoder("utf-8")("surrogateescape").decode
+        self._tokens = Tokenizer(mouse=mouse, escape_delay=escape_delay)
+        self._bursts = Bursts()
+
+    def read(self, data: bytes, now: float, stamp: object = None) -> list[Read]:
+        """Bytes that were read at this time, when the app's stamp of stops was this."""
+        return self._sorted(self._tokens.feed(self._decode(data), now, stamp), now)
+
+    def tick(self, now: float) -> list[Read]:
+        """What is known by this time because nothing more was read."""
+        return self._sorted(self._tokens.tick(now), now)
+
+    @property
+    def deadline(self) -> float | None:
+        """When `tick` has something to do, or None."""
+        found = [self._tokens.deadline, self._bursts.deadline(self._tokens.pending)]
+        return min((time for time in found if time is not None), default=None)
+
+    def _sorted(self, tokens: list[Token], now: float) -> list[Read]:
+        reports: list[Read] = []
+        for token in tokens:
+            if isinstance(token, Report):
+                reports.append(token)
+            elif isinstance(token, Paste):
+                self._bursts.paste(token)
+            elif token.name in STOP_KEYS and self._stops.take_stop_key(token.name):
+                self._bursts.stop(token)
+            else:
+                self._bursts.key(token)
+        given = self._bursts.given(now, self._tokens.pending)
+        return [*reports, *(_told(one) for one in given)]
+
+
+def _told(given: Given) -> Pressed | Paste:
+    key = given.what
+    if not isinstance(key, Key):
+        return key
+    stroke = Stroke(
+        read_at=key.began,
+        stamp=key.mark,
+        alone=given.alone,
+        held=given.held,
+        steps=given.steps,
+        piece=given.piece,
+    )
+    return Pressed(key.name, key.character, stroke)
