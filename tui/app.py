@@ -11,22 +11,26 @@ from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual.driver import Driver
-from textual.events import Event, Key
-from textual.widgets import Input
+from textual.events import Event, Key, Paste
 
 from tui.bus.errors import LineClosed
 from tui.drive.plain import plain
+from tui.session.events import EventLog
 from tui.session.lines import OpenLine, open_line
 from tui.session.state import remember_line, state_folder
+from tui.terminal.admission import Admission
+from tui.terminal.driver import with_own_keys
+from tui.terminal.fields import takes_space
+from tui.terminal.names import STOP_KEYS
+from tui.terminal.type_ahead import TypeAhead
 from tui.widgets.clock import Clock
 from tui.widgets.lean import LeanApp
 from tui.widgets.palette import THEME
 
-from .screens.actions import CONNECTION, bindings
+from .screens.actions import bindings
 from .screens.connection import ConnectionScreen
-from .screens.in_turn import KeysInTurn
 from .screens.leaving import Leaving
-from .screens.stop_keys import STOP_ALL_ANYWHERE, STOP_ANYWHERE, STOP_OUTSIDE_TEXT, with_stop_keys
+from .screens.places import Places
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId
@@ -35,6 +39,7 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
     from tui.session.stop import StopSummary
+    from tui.terminal.stroke import Stroke
 
 log = logging.getLogger(__name__)
 
@@ -44,17 +49,17 @@ CONNECT_WITHIN = 4.0
 HUNGER_LOOK = 0.25
 """Seconds between two looks for drives that are about to act on their time-out."""
 
-STOP_KEYS = frozenset({STOP_ANYWHERE, STOP_ALL_ANYWHERE, STOP_OUTSIDE_TEXT})
+STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 
 Opener = Callable[..., OpenLine]
 
 
-class DrivePanelApp(LeanApp, Leaving):
+class DrivePanelApp(LeanApp, Places, Leaving):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
-    `leave_running` motors are not stopped when the panel ends without being asked. `on_shown` is
-    called after the first picture.
+    `leave_running` motors are not stopped when the panel ends without being asked. With `mouse` the
+    terminal reports its mouse. `on_shown` is called after the first picture.
     """
 
     TITLE = "Drive Panel"
@@ -71,6 +76,7 @@ class DrivePanelApp(LeanApp, Leaving):
         read_only: bool = False,
         low_bandwidth: bool = False,
         leave_running: bool = False,
+        mouse: bool = False,
         on_shown: Callable[[], None] | None = None,
     ) -> None:
         super().__init__()
@@ -79,9 +85,11 @@ class DrivePanelApp(LeanApp, Leaving):
         self.clock = clock or Clock()
         self.read_only = read_only
         self.low_bandwidth = low_bandwidth
+        self.mouse = mouse
         self.period = 0.5
         self.opened: OpenLine | None = None
         self.fleet: Fleet | None = None
+        self.events = EventLog()
         self.connection = ConnectionScreen()
         self._open = open_line
         self._start = start
@@ -90,7 +98,9 @@ class DrivePanelApp(LeanApp, Leaving):
         self._gone = False
         self.settled = leave_running
         """Whether it was decided what becomes of motors that run by an order from here."""
-        self._keys = KeysInTurn(self)
+        self._stops = 0
+        self._trying_f12 = False
+        self._typed = TypeAhead(self, Admission(self, self).admits)
         self._hungry: set[int] = set()
         self._told: StopSummary | None = None
         self._journal: Journal | None = None
@@ -107,27 +117,65 @@ class DrivePanelApp(LeanApp, Leaving):
 
     def get_driver_class(self) -> type[Driver]:
         """The driver of this platform, with the stop keys before everything else."""
-        return with_stop_keys(super().get_driver_class())
+        return with_own_keys(super().get_driver_class())
 
     def take_stop_key(self, key: str) -> bool:
         """Stop, if the key means that now; may be called in any thread."""
-        if key not in STOP_KEYS or (key == STOP_OUTSIDE_TEXT and self._is_typing()):
+        if key not in STOP_KEYS or (key == STOP_OUTSIDE_TEXT and takes_space(self.focused)):
             return False
-        self._stop(everything=key == STOP_ALL_ANYWHERE)
+        if key == STOP and self._trying_f12:
+            self._f12_arrived()
+        self._stop(everything=key == STOP_ALL)
         return True
 
-    def _is_typing(self) -> bool:
-        """Whether a space would go into a text; a field for a number takes none."""
-        # TextArea by its name: to import it takes longer than the whole first picture may
-        focused = self.focused
-        kinds = type(focused).__mro__
-        is_text = Input in kinds or any(kind.__name__ == "TextArea" for kind in kinds)
-        return is_text and bool(getattr(focused, "takes_space", True))
+    def sequence_swallowed(self, data: bytes) -> None:
+        """A key came that no known terminal sends; in the thread that reads the keys."""
+        if self._trying_f12:
+            from .screens.first_keys import unknown_text
+
+            self._from_keys(self.connection.say, unknown_text(data), "", "alarm")
+
+    def _try_f12(self) -> None:
+        """On the first start on a terminal, while no line is open: does F12 arrive?"""
+        from .screens.first_keys import OFFER, was_tried
+
+        self._trying_f12 = not self.is_headless and self._start is None and not was_tried()
+        if self._trying_f12:
+            self.connection.say(OFFER, "Or choose a line and press Enter, or n to type one.")
+
+    def _f12_arrived(self) -> None:
+        """F12 came while it was tried; in the thread that reads the keys."""
+        from .screens.first_keys import ARRIVED, remember
+
+        self._trying_f12 = False
+        remember()
+        self._from_keys(self.connection.say, ARRIVED, "Choose a line and press Enter.")
+
+    def _from_keys(self, tell: Callable[..., None], *words: str) -> None:
+        """Do something in the screen's loop, from the thread that reads the keys."""
+        if self._loop is not None and self._loop.is_running():
+            self._loop.call_soon_threadsafe(lambda: tell(*words))
+
+    def stop_stamp(self) -> object:
+        """Another object after every stop; may be called in any thread."""
+        return self._stops
+
+    @property
+    def stroke(self) -> Stroke | None:
+        """What is known of the key that has its effect now; None while there is none."""
+        return self._typed.stroke
+
+    def keys_not_taken(self, count: int, *, late: bool = False) -> None:
+        """Tell that keys came at once, or too late, and did nothing."""
+        came = "came too late" if late else "came at once" if count > 1 else "did not come alone"
+        keys = f"{count} keys {came} and were" if count > 1 else f"1 key {came} and was"
+        self.events.add("told", f"{keys} not taken.")
+        self.notify(f"{keys} not taken.", severity="warning")
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A space belongs to the text that is being typed."""
         if action == "stop_by_space":
-            return not self._is_typing()
+            return not takes_space(self.focused)
         return super().check_action(action, parameters)
 
     def action_stop_by_space(self) -> None:
@@ -143,13 +191,29 @@ class DrivePanelApp(LeanApp, Leaving):
         self._stop(everything=True)
 
     def _stop(self, *, everything: bool) -> None:
+        self._stops += 1
         fleet = self.fleet
         if fleet is None:
             return
-        sessions = fleet.sessions if everything else self._shown(fleet)
-        if sessions:
-            with suppress(LineClosed):
-                fleet.stop(sessions)
+        self._stop_sessions(fleet, fleet.sessions if everything else self._meant(fleet))
+
+    def _stop_sessions(
+        self, fleet: Fleet, sessions: list[DriveSession], order: OrderId = "stop"
+    ) -> None:
+        """Stop drives, and end the questions about them; may be called in any thread."""
+        if not sessions:
+            return
+        with suppress(LineClosed):
+            fleet.stop(sessions, order)
+        devices = [session.device for session in sessions]
+        if self._loop is not None and self._loop.is_running():
+            self._loop.call_soon_threadsafe(self._void_questions, devices)
+
+    def _void_questions(self, devices: list[int]) -> None:
+        from .screens.dialogs.question import void_questions
+
+        for device in devices:
+            void_questions(self, device)
 
     def follow(self, line: str, device: int) -> None:
         """Open the line anew as a drive now wants it, and watch that drive."""
@@ -159,26 +223,34 @@ class DrivePanelApp(LeanApp, Leaving):
 
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
         """Stop one drive, in its own way."""
+        self._stops += 1
         if self.fleet is not None:
-            with suppress(LineClosed):
-                self.fleet.stop([console.session], order)
+            self._stop_sessions(self.fleet, [console.session], order)
 
     async def on_event(self, event: Event) -> None:
         """A key keeps an armed drive armed; the next one waits for it."""
-        if isinstance(event, Key) and not event.is_forwarded:
-            if not self._keys.admit(event):
+        if isinstance(event, Key | Paste) and not event.is_forwarded:
+            if not self._typed.admit(event):
                 return
-            for session in self.fleet.sessions if self.fleet else ():
-                session.arming.touch()
+            if isinstance(event, Key):
+                for session in self.fleet.sessions if self.fleet else ():
+                    session.arming.touch()
         await super().on_event(event)
 
-    def _shown(self, fleet: Fleet) -> list[DriveSession]:
-        """The drive whose screen is open; without one those commanded from here, else all."""
-        for screen in reversed(self.screen_stack):
-            console = getattr(screen, "console", None)
-            if console is not None:
-                return [console.session]
-        return fleet.commanded or fleet.sessions
+    def _meant(self, fleet: Fleet) -> list[DriveSession]:
+        """Whom the stop key stops: the drive that was opened, else every drive of the line."""
+        chosen = self.chosen
+        if chosen is not None and chosen in fleet.consoles:
+            return [chosen.session]
+        return fleet.sessions
+
+    @property
+    def stops_whom(self) -> str:
+        """The words of the stop key in the line of keys."""
+        fleet, chosen = self.fleet, self.chosen
+        if fleet is not None and chosen is not None and chosen in fleet.consoles:
+            return f"STOP {chosen.device}"
+        return "STOP ALL"
 
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
@@ -188,6 +260,7 @@ class DrivePanelApp(LeanApp, Leaving):
         self.set_interval(HUNGER_LOOK, self._tell_journal)
         if self._on_shown is not None:
             self.connection.call_after_refresh(self._on_shown)
+        self.call_after_refresh(self._try_f12)
         if self._start is not None:
             self.call_after_refresh(self.connection.start, self._start, self._device)
 
@@ -272,7 +345,7 @@ class DrivePanelApp(LeanApp, Leaving):
 
         # the motors of a simulated line end with it
         starts = StartKeeper("panel") if self.opened.simulation is None else None
-        self.fleet = Fleet(self.opened.line, self.journal, starts)
+        self.fleet = Fleet(self.opened.line, self.journal, starts, self.events)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 
@@ -291,40 +364,19 @@ class DrivePanelApp(LeanApp, Leaving):
     async def disconnect(self) -> None:
         """Close the open line, if there is one."""
         opened, self.opened = self.opened, None
-        fleet, self.fleet = self.fleet, None
+        fleet, self.fleet, self.chosen = self.fleet, None, None
         if opened is not None:
             await asyncio.to_thread(opened.close)
             if fleet is not None and fleet.starts is not None:
                 await asyncio.to_thread(fleet.starts.close)
             log.info("closed %s", opened.label)
 
-    def show_monitor(self, console: DriveConsole) -> None:
-        """Show Monitor on a drive."""
-        from .screens.monitor import MonitorScreen
-
-        log.info("watching device %s, %s", console.device, console.session.profile.id)
-        self.push_screen(MonitorScreen(console))
-
-    def step_drive(self, device: int, step: int) -> None:
-        """Monitor on the next or previous drive found on the line."""
-        from .screens.monitor import MonitorScreen
-
-        consoles = self.fleet.consoles if self.fleet else []
-        at = next((at for at, one in enumerate(consoles) if one.device == device), None)
-        if len(consoles) < 2 or at is None:
-            self.notify("This is the only drive found on the line.", timeout=3)
-            return
-        self.switch_screen(MonitorScreen(consoles[(at + step) % len(consoles)]))
-
     def action_help(self) -> None:
         """Every key of the screen on top."""
         from .screens.help import HelpScreen
 
         if not isinstance(self.screen, HelpScreen):
-            self.push_screen(HelpScreen(self._screen_name()))
-
-    def _screen_name(self) -> str:
-        return (self.screen.TITLE or CONNECTION).lower()
+            self.push_screen(HelpScreen(self.place))
 
     def action_command_palette(self) -> None:
         """Find an action of any screen by its words."""

@@ -191,9 +191,26 @@ def test_a_motor_that_others_stop_ends_it() -> None:
         wait_until(lambda: turns(simulation), "the motor turns")
         simulation.drive(1).power_cycle()
         _, error = program.process.communicate(timeout=PATIENCE)
-        assert program.process.returncode == 4
+        assert program.process.returncode == 5
         assert "Device 1 no longer runs" in error
+        assert "It was stopped by another program or master on the line" in error
+        assert "CMD 16#000F is now 16#0000" in error
         assert stands(simulation)
+
+
+@pytest.mark.parametrize("order", [[], ["--quick"], ["--freewheel"]])
+def test_a_stop_by_another_program_ends_it_and_is_told(order: list[str]) -> None:
+    with Simulation([DriveSpec("atv71", 1)]) as simulation:
+        host, port = simulation.serve_tcp()
+        line = f"tcp:{host}:{port}"
+        with running(line) as program:
+            wait_until(lambda: turns(simulation), "the motor turns")
+            assert drivepanel("stop", line, *order).returncode == 0
+            said, error = program.process.communicate(timeout=PATIENCE)
+            assert program.process.returncode == 5, error
+            assert "It was stopped by another program or master on the line: CMD" in error
+            assert "It was stopped by another program" in said
+            assert stands(simulation)
 
 
 def silence(simulation: Simulation) -> None:

@@ -88,3 +88,13 @@ def test_a_panel_that_had_to_stop_is_no_success(
 ) -> None:
     monkeypatch.setattr(panel, "ends_with", 1)
     assert CliRunner().invoke(main, []).exit_code == 1
+
+
+@pytest.mark.parametrize("command", [(), ("demo",), ("tcp:10.0.0.5",)])
+def test_the_mouse_is_reported_only_where_that_is_asked_for(
+    panel: type[FakePanel], command: tuple[str, ...]
+) -> None:
+    for options, mouse in (((), False), (("--mouse",), True)):
+        result = CliRunner().invoke(main, [*command, *options])
+        assert result.exit_code == 0, result.output
+        assert panel.given["mouse"] is mouse

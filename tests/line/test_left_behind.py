@@ -41,14 +41,14 @@ def test_the_next_panel_knows_the_motor_and_takes_it_over(
         terminal.press("T")
         terminal.wait_for("Not armed")
         terminal.press("a")
-        terminal.wait_for("ARMED")
+        wait_until(lambda: "ARMED" in terminal.text().replace("NOT ARMED", ""), "it is armed")
         before = frames(made.simulation)
         terminal.press("T")
         terminal.wait_for("Taken over")
         assert frames(made.simulation) == before
         terminal.press("q")
-        terminal.wait_for("A motor runs by your order")
-        terminal.press("s")
+        terminal.wait_for("A motor runs by your command")
+        terminal.answer("s")
         made.stopped()
         wait_until(lambda: not runs(terminal.client()), "the second panel ended")
 
@@ -91,8 +91,8 @@ def test_a_motor_left_running_on_purpose_is_told_of(
     with running(terminal_with) as made:
         terminal = made.terminal
         terminal.press("q")
-        terminal.wait_for("A motor runs by your order")
-        terminal.press("l")
+        terminal.wait_for("A motor runs by your command")
+        terminal.answer("l")
         made.ended()
         assert made.speed > 2
         again(second_terminal, made.line).wait_for("Runs since", "left running on purpose")
@@ -112,8 +112,13 @@ def test_where_a_start_cannot_be_recorded_the_panel_asks(
             file.write("")
         terminal = terminal_with([*PANEL, line, "-d", "1"])
         terminal.wait_for("NOT ARMED", "READY")
-        for keys in (("a",), ("f",), ("3", "0"), ("Enter",), ("r",)):
-            terminal.press(*keys)
+        terminal.press("a")
+        wait_until(lambda: "ARMED" in terminal.text().replace("NOT ARMED", ""), "it is armed")
+        terminal.press("r")
+        terminal.wait_for("RUN FORWARD at")
+        terminal.press("3", "0")
+        terminal.wait_for("30  Hz")
+        terminal.answer("Enter")
         terminal.wait_for("unrecorded?")
         assert simulation.drive(1).motor.frequency == 0
         terminal.press("Escape")

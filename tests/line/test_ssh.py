@@ -108,6 +108,7 @@ def test_the_demo_over_ssh(
     terminal = terminal_with(panel_over(ssh_host, tmp_path, "demo"))
     terminal.wait_for("Connection", "5 found")
     choose(terminal, "ATV71")
+    terminal.wait_for("Device 4:")
     terminal.press("Enter")
     terminal.wait_for("ATV71", "device 4", "RUNNING", "Hz")
     terminal.press("q")

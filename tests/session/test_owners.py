@@ -73,8 +73,8 @@ async def bench(family: str, *, watch: bool = True, **spec: Any) -> AsyncIterato
         yield Bench(simulation, fleet, console)
     finally:
         fleet.forget()
-        journal.close()
         line.close()
+        journal.close()
         simulation.stop()
 
 

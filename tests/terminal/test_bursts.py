@@ -226,7 +226,7 @@ NAMES = st.sampled_from(["r", "enter", "up", "up", "up", "down", "pageup", "spac
 READS = st.lists(
     st.tuples(
         st.lists(NAMES, min_size=1, max_size=4),
-        st.sampled_from([0.0005, 0.01, 0.033, 0.033, 0.033, 0.05, 0.06, 0.4]),
+        st.sampled_from([0.0005, 0.01, 0.033, 0.033, 0.033, 0.049, 0.06, 0.4]),
     ),
     max_size=25,
 )

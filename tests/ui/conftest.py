@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import time
+from collections.abc import Iterator
+
 import pytest
 
 from tui.screens.dialogs.question import Question
@@ -9,5 +12,19 @@ from tui.screens.dialogs.question import Question
 
 @pytest.fixture(autouse=True)
 def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Questions take an answer as soon as they stand; `test_questions` looks at the waiting."""
+    """Questions and the run line take Enter as soon as they stand.
+
+    `test_questions` and `test_run_line` look at the waiting.
+    """
     monkeypatch.setattr(Question, "_is_early", lambda _: False)
+    monkeypatch.setattr("tui.screens.run_line.SETTLED", 0.0)
+
+
+@pytest.fixture(autouse=True)
+def utc(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """Times of day are those of one place, wherever the tests are run."""
+    monkeypatch.setenv("TZ", "UTC")
+    time.tzset()
+    yield
+    monkeypatch.undo()
+    time.tzset()

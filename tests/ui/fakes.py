@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
+from textual.pilot import Pilot
+
 from tui.app import DrivePanelApp
 from tui.bus.line import Counters, DeviceState, Frame, Line, LineState, LineStatus
 from tui.bus.link import SerialLink
@@ -262,6 +264,22 @@ class StillFleet(Fleet):
     def hold(self, drive: FoundDrive) -> None:
         """One more drive, or another in its place."""
         self._put(drive)
+
+
+def choose(app: DrivePanelApp, console: DriveConsole) -> None:
+    """The drive is the one that was opened, as after Enter on it; the only one where none is."""
+    app.fleet = app.fleet or StillFleet(FoundDrive(ATV71, console))
+    app.chosen = console
+
+
+async def press(pilot: Pilot[None], *keys: str) -> None:
+    """Press keys; `(name)` is an action that has no key, done as the list of actions does it."""
+    for key in keys:
+        if len(key) > 2 and key.startswith("("):
+            await pilot.app.run_action(key[1:-1], pilot.app.screen)
+            await pilot.pause()
+        else:
+            await pilot.press(key)
 
 
 def app_of(open_line: Callable[..., OpenLine] | None = None) -> DrivePanelApp:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from pathlib import Path
 
 import pytest
@@ -9,15 +10,20 @@ from textual.widgets import Input
 
 from tui.screens.blocks import BlocksScreen
 from tui.screens.connection import ConnectionScreen
+from tui.screens.control_source import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.pick_parameter import PickParameter
+from tui.screens.faults import FaultsScreen
+from tui.screens.frames import FramesScreen
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
 from tui.session.mapping_desk import MappingDesk
 
+from .fakes import press
 from .test_command_flows import Bench, bench
 from .test_flows import shown, until
+from .test_parameter_flows import open_file
 
 
 @pytest.fixture(autouse=True)
@@ -52,7 +58,7 @@ async def pick(made: Bench, typed: str) -> None:
 
 
 async def answer(made: Bench, key: str, text: str) -> None:
-    await made.pilot.press(key)
+    await press(made.pilot, key)
     await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
     made.app.screen.query_one(Input).value = text
     await made.pilot.press("enter")
@@ -71,7 +77,7 @@ async def test_pick_move_write_and_verify() -> None:
         await made.pilot.press("down", "down")
         await pick(made, "lcr")
         await until(made.pilot, lambda: "→ LCR" in shown(made.app, "first"))
-        await made.pilot.press("left_square_bracket")
+        await made.pilot.press("minus")
         await message(made, "2 slots proposed otherwise")
         assert made.drive().raw("NMA2") == 8604
         await made.pilot.press("w")
@@ -81,9 +87,9 @@ async def test_pick_move_write_and_verify() -> None:
         await write(made)
         await message(made, "Written and read back: NMA2, NMA3", "Lost at power-off")
         assert [made.drive().raw(f"NMA{n}") for n in (1, 2, 3)] == [3201, 3204, 8604]
-        await made.pilot.press("v")
+        await made.pilot.press("V")
         await message(made, "3 slots bring the same as direct reads")
-        await made.pilot.press("F")
+        await press(made.pilot, "(factory)")
         await message(made, "2 slots proposed otherwise")
         await made.pilot.press("u", "escape")
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
@@ -122,19 +128,20 @@ async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
         await message(made, "Written and read back: NMA1, NMA3")
 
 
-async def test_save_and_load(tmp_path: Path) -> None:
+async def test_save_and_load(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     async with bench("atv71") as made:
         await to_blocks(made)
         file = tmp_path / "scanner.toml"
-        await answer(made, "s", str(file))
+        await answer(made, "ctrl+s", str(file))
         await until(made.pilot, file.exists)
         text = file.read_text("utf-8")
         file.write_text(text.replace('NMA3 = "none"', 'NMA3 = "LCR"'), "utf-8")
-        await answer(made, "l", str(file))
+        await open_file(made, file)
         await until(made.pilot, lambda: "→ LCR" in shown(made.app, "first"))
         await made.pilot.press("u")
         file.write_text(text.replace('NMA3 = "none"', 'NMA3 = "NOPE"'), "utf-8")
-        await answer(made, "l", str(file))
+        await open_file(made, file)
         await message(made, "scanner.toml:", "NMA3")
 
 
@@ -144,10 +151,10 @@ async def test_outputs_are_written_when_armed_only() -> None:
         for slot, code in {"NCA1": "ACC", "NCA2": "DEC"}.items():
             made.drive().set(slot, made.drive().profile[code].address)
         await until(made.pilot, lambda: "DEC" in shown(made.app, "second"))
-        await made.pilot.press("x")
+        await made.pilot.press("X")
         await message(made, "Not armed")
         await made.pilot.press("a")
-        await answer(made, "x", "ACC=5.5")
+        await answer(made, "X", "ACC=5.5")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
         await message(made, "Written: ACC 5.5", "Came back: ETA")
@@ -158,10 +165,10 @@ async def test_user_words_are_kept_for_the_drive() -> None:
     async with bench("atv71") as made:
         made.drive().set("ACC", 37)
         await to_blocks(made)
-        await answer(made, "m", "acc unsigned, W3199 hex")
+        await answer(made, "(words)", "acc unsigned, W3199 hex")
         await until(made.pilot, lambda: "ACC 37" in shown(made.app, "words"))
         assert "W3199 -----" in shown(made.app, "words")
-        await made.pilot.press("m")
+        await press(made.pilot, "(words)")
         await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
         made.app.screen.query_one(Input).value = "ACC octal"
         await made.pilot.press("enter")
@@ -193,7 +200,7 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
         await pick(made, "fa51")
         await write(made)
         await message(made, "after the drive's next reset")
-        await made.pilot.press("x")
+        await made.pilot.press("X")
         await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
         made.app.screen.query_one(Input).value = "FA51=500"
         await made.pilot.press("enter")
@@ -205,7 +212,7 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
         made.drive().power_on()
         await until(made.pilot, lambda: not desk(made).trouble)
         await until(made.pilot, lambda: "pending" not in shown(made.app, "second"))
-        await answer(made, "x", "FA51=500")
+        await answer(made, "X", "FA51=500")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         assert "cannot be read" in str(made.app.screen.query_one("#follows").render())
         await made.pilot.press("y")
@@ -217,8 +224,9 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
 async def test_a_family_without_blocks(family: str) -> None:
     async with bench(family) as made:
         await to_blocks(made, "neither")
-        for key in ("enter", "tab", "c", "F", "w", "v", "l", "right_square_bracket"):
-            await made.pilot.press(key)
+        keys = ("enter", "tab", "delete", "plus", "minus", "w", "V", "X", "u", "ctrl+o", "ctrl+s")
+        for key in (*keys, "(factory)", "right_square_bracket"):
+            await press(made.pilot, key)
         assert isinstance(made.app.screen, BlocksScreen)
         await made.pilot.press("2")
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
@@ -231,13 +239,17 @@ async def test_every_screen_of_a_drive_is_one_key_away_from_every_other() -> Non
             "2": MonitorScreen,
             "3": ParametersScreen,
             "4": BlocksScreen,
+            "5": FaultsScreen,
+            "6": ControlSourceScreen,
+            "7": FramesScreen,
         }
-        for key in "4343214":
+        others = {a: [b for b in places if b > a] for a in places}
+        walked = "".join(a + "".join(b + a for b in others[a]) for a in places)
+        pairs = set(itertools.pairwise(walked))
+        assert pairs >= {(a, b) for a in places for b in places if a != b}
+        for key in walked:
             screen = made.app.screen
             await made.pilot.press(key)
             await until(made.pilot, lambda key=key: isinstance(made.app.screen, places[key]))  # type: ignore[misc]
             assert made.app.screen is not screen
-            if key == "1":
-                await made.pilot.press("enter")
-                await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
-        assert len(made.app.screen_stack) == 4
+            assert len(made.app.screen_stack) <= 4

@@ -163,9 +163,9 @@ STATES: dict[str, tuple[Callable[[], MappingDesk], Any, float | None, list[str]]
     "pick": (scanner, nothing, None, ["down", "enter"]),
     "pick-found": (scanner, nothing, None, ["down", "enter", *"current"]),
     "pick-nothing": (scanner, nothing, None, ["down", "enter", *"xyz"]),
-    "words": (scanner, nothing, None, ["m"]),
-    "exchange": (scanner, nothing, 52.0, ["x", *"ACC=5.0"]),
-    "exchange-sure": (scanner, nothing, 52.0, ["x", *"ACC=5.0", "enter"]),
+    "words": (scanner, nothing, None, ["(words)"]),
+    "exchange": (scanner, nothing, 52.0, ["X", *"ACC=5.0"]),
+    "exchange-sure": (scanner, nothing, 52.0, ["X", *"ACC=5.0", "enter"]),
     "indirect": (indirect, nothing, None, ["down", "down", "down"]),
     "indirect-outputs": (indirect, nothing, None, ["tab"]),
     "reading": (empty, nothing, None, []),
@@ -189,11 +189,12 @@ def test_blocks(
     desk.session.arming = desk.session.work.arming = fakes.StillArming(desk.session.line, armed)
     console = DriveConsole(desk.session, desk.journal)
     console.blocks = desk
+    fakes.choose(app, console)
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(BlocksScreen(console))
         await pilot.pause()
-        await pilot.press(*keys)
+        await fakes.press(pilot, *keys)
         await pilot.pause()
         await pilot.pause()
 

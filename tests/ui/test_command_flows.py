@@ -6,7 +6,7 @@ import ast
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import pytest
 from textual.events import Key
@@ -16,12 +16,14 @@ from textual.widgets import Input, OptionList
 from tui.app import DrivePanelApp
 from tui.screens.connection import ConnectionScreen
 from tui.screens.control_source import ControlSourceScreen
-from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.options import OptionsScreen
 from tui.screens.dialogs.question import Question
 from tui.screens.faults import FaultsScreen
+from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
+from tui.screens.messages import MessagesScreen
 from tui.screens.monitor import MonitorScreen
 from tui.session.lines import OpenLine, open_line
 from tui.session.stop import Phase
@@ -31,7 +33,6 @@ from tui.widgets.fields import NumberInput
 
 from .test_flows import shown, until
 
-IS_EARLY = Question._is_early
 SOURCES = Path(__file__).parents[2] / "tui" / "screens"
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 
@@ -60,17 +61,34 @@ class Bench(NamedTuple):
 
     async def refer(self, text: str) -> None:
         await self.pilot.press("f")
-        await until(self.pilot, lambda: isinstance(self.app.screen, Ask))
+        await self.message("REFERENCE", "Enter gives it")
         await self.pilot.press(*text, "enter")
         await self.message("DONE Reference")
+
+    async def run(self, key: str) -> None:
+        """Open the line of `r` or `v`: until Enter the motor does what it did."""
+        before, speed = writes(self.app), self.speed()
+        await self.pilot.press(key)
+        await self.message("RUN FORWARD" if key == "r" else "RUN REVERSE", "Enter runs")
+        await self.pilot.pause(0.3)
+        assert writes(self.app) == before
+        assert (self.speed() > 0) is (speed > 0)
+        await self.pilot.press("enter")
 
     async def running(self) -> None:
         """Armed, with a reference, running forward."""
         await self.armed()
         if self.drive().profile.id.startswith("atv"):
             await self.refer("30")
-        await self.pilot.press("r")
+        await self.run("r")
         await until(self.pilot, lambda: self.speed() > 2)
+
+    async def answer(self, key: str, answer: str, kind: type[Question[Any]] = Confirm) -> None:
+        """Press a key that asks, and answer the question."""
+        await self.pilot.press(key)
+        await until(self.pilot, lambda: isinstance(self.app.screen, kind))
+        await self.pilot.press(answer)
+        await until(self.pilot, lambda: not isinstance(self.app.screen, kind))
 
     async def commanded(self) -> None:
         """Wait until it is known that the motor runs by an order from here."""
@@ -82,6 +100,13 @@ class Bench(NamedTuple):
         assert self.app.fleet is not None
         stopper = self.app.fleet.stopper
         await until(self.pilot, lambda: stopper.reports[device].phase is Phase.STOPPED)
+
+
+def writes(app: DrivePanelApp) -> list[bytes]:
+    """The requests that wrote anything, among the last frames of the line."""
+    assert app.opened is not None
+    frames = [frame for frame in app.opened.line.trace if frame.direction == "out"]
+    return [frame.data for frame in frames if frame.data[1] in (5, 6, 15, 16, 22, 23)]
 
 
 def knows_the_state(app: DrivePanelApp) -> bool:
@@ -139,7 +164,7 @@ async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
     async with bench(family) as made:
         await made.running()
         await until(made.pilot, lambda: "RUNNING" in shown(made.app, "state"))
-        await made.pilot.press("v")
+        await made.run("v")
         await until(made.pilot, lambda: made.speed() < -2)
         await made.pilot.press("space")
         await made.stopped()
@@ -153,7 +178,9 @@ async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
         made.drive().provoke(code)
         await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
         await made.armed()
-        await made.pilot.press("x")
+        await made.answer("x", "n")
+        assert made.drive().fault is not None
+        await made.answer("x", "y")
         await until(made.pilot, lambda: made.drive().fault is None)
         await until(made.pilot, lambda: "FAULT" not in shown(made.app, "state"))
         assert made.speed() == 0
@@ -161,11 +188,13 @@ async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
 
 async def test_nothing_is_commanded_before_arming() -> None:
     async with bench("atv71") as made:
-        for key in ("r", "v", "x", "up", "b", "t"):
+        for key in ("r", "v", "f", "x", "up", "pagedown", "o", "t", "g"):
             await made.pilot.press(key)
             await made.message("NOT DONE", "a arms this drive")
+            made.app.screen.session.work.outcome = None  # type: ignore[attr-defined]
         assert made.drive().raw("CMD") == 0
         assert made.drive().raw("LFR") == 0
+        assert writes(made.app) == []
 
 
 async def test_a_read_only_line_is_not_armed() -> None:
@@ -182,25 +211,24 @@ async def test_reference_by_steps_and_its_limit() -> None:
         await until(made.pilot, lambda: made.drive().raw("LFR") == 210)
         await made.pilot.press("pagedown")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 160)
-        await made.pilot.press("f")
-        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
-        await made.pilot.press(*"80", "enter")
-        fault = made.app.screen.query_one("#fault")
-        await until(made.pilot, lambda: "80 Hz is above" in str(fault.render()))
+        await made.pilot.press("f", *"80", "enter")
+        await made.message("REFERENCE", "80 Hz is above")
         assert made.drive().raw("LFR") == 160
 
 
-async def test_what_is_typed_ahead_reaches_the_dialog_but_commands_nothing(
+async def test_what_is_typed_ahead_reaches_the_line_but_commands_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(Question, "_is_early", IS_EARLY)
+    monkeypatch.setattr("tui.screens.run_line.SETTLED", 60.0)
     async with bench("atv71") as made:
         for key, character in [("a", "a"), ("f", "f"), ("3", "3"), ("0", "0"), ("enter", "\r")]:
             made.app.post_message(Key(key, character))
+        await made.message("REFERENCE at       30  Hz")
+        await made.pilot.pause(0.3)
+        await made.message("REFERENCE at       30  Hz")
         made.app.post_message(Key("r", "r"))
-        await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
-        await until(made.pilot, lambda: made.app.screen.query_one(Input).value == "30r")
-        assert isinstance(made.app.screen, Ask)
+        await until(made.pilot, lambda: "REFERENCE" not in shown(made.app, "message"))
+        assert "RUN" not in shown(made.app, "message")
         assert made.drive().raw("LFR") == 0
         assert made.drive().raw("CMD") == 0
 
@@ -208,9 +236,12 @@ async def test_what_is_typed_ahead_reaches_the_dialog_but_commands_nothing(
 SCREENS = {
     "help": ("question_mark", HelpScreen),
     "options": ("o", OptionsScreen),
-    "control source": ("c", ControlSourceScreen),
-    "faults": ("h", FaultsScreen),
-    "reference": ("f", Ask),
+    "control source": ("6", ControlSourceScreen),
+    "faults": ("5", FaultsScreen),
+    "frames": ("7", FramesScreen),
+    "messages": ("m", MessagesScreen),
+    "run line": ("v", MonitorScreen),
+    "coast": ("z", Confirm),
     "leave": ("q", Leave),
 }
 
@@ -225,7 +256,9 @@ async def test_stop_works_on_every_screen(screen: str) -> None:
         await until(made.pilot, lambda: isinstance(made.app.screen, kind))
         await made.pilot.press("f12")
         await made.stopped()
-        assert isinstance(made.app.screen, kind)
+        # a stop voids a question about the drive, and the line that would run it
+        assert isinstance(made.app.screen, kind) is not issubclass(kind, Question)
+        assert "RUN REVERSE" not in shown(made.app, "message")
         if "console" not in vars(made.app.screen):
             # nothing of this screen tells of the drive, so the panel does
             await until(made.pilot, lambda: "STOPPED" in told(made.app))
@@ -249,9 +282,9 @@ async def test_space_stops_outside_texts_only() -> None:
 
 
 @pytest.mark.parametrize("typed", ["", "4x"])
-@pytest.mark.parametrize("way", ["f", "3 slash a c c enter enter", "1 tab tab tab"])
+@pytest.mark.parametrize("way", ["3 slash a c c enter enter", "1 tab tab tab"])
 async def test_space_stops_where_a_number_is_typed(way: str, typed: str) -> None:
-    """A reference, a value, an address: no space is ever typed there."""
+    """A value, an address: no space is ever typed there. A reference: `test_run_line`."""
     async with bench("atv71") as made:
         await made.running()
         await made.pilot.press(*way.split(), *typed)
@@ -285,7 +318,7 @@ def test_numbers_references_and_addresses_take_no_space() -> None:
         if isinstance(call, ast.Call) and ast.unparse(call.func) == "Ask"
     }
     numbers = {question for question, number in asked.items() if number}
-    assert numbers == {"'Reference'", "'Rated current in A'"}
+    assert numbers == {"'Rated current in A'"}
 
 
 async def test_stop_works_in_the_palette() -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from typing import Any, cast
 
@@ -55,6 +54,7 @@ def outcome(kind: Kind, text: str) -> Outcome:
 
 REMOTE = {**fakes.READY, "CCC": 1, "CRC": 1}
 RUNNING = {"raws": fakes.RUNNING}
+LIMITS = {"HSP": 500, "LSP": 0, "ACC": 30, "INR": 1, "TFR": 600, "FRS": 500}
 STATES: dict[str, tuple[dict[str, Any], Given, StopReport | None, bool]] = {
     "armed": ({"raws": fakes.READY}, Given(57), None, False),
     "done": (
@@ -121,6 +121,7 @@ def panel(name: str) -> tuple[Any, MonitorScreen]:
     app.opened = fakes.opened()
     found = FoundDrive(fakes.ATV71, console)
     app.fleet = fakes.StillFleet(found, keeper=fakes.FakeKeeper(WATCH))
+    fakes.choose(app, console)
     app.fleet.stopper = cast("Stopper", FakeStopper({2: report} if report else {}))
     return app, MonitorScreen(console)
 
@@ -140,14 +141,19 @@ def test_commanded(snap_compare: Compare, state: str, size: tuple[int, int]) -> 
 
 
 OVER = {
+    "run": ("armed", ["r"]),
+    "run-typed": ("armed", ["r", *"4.5"]),
+    "run-refused": ("armed", ["v", *"80", "enter"]),
     "reference": ("armed", ["f", *"80"]),
+    "reset": ("tripped", ["x"]),
+    "coast": ("done", ["z"]),
     "options": ("armed", ["o"]),
     "hand-back": ("armed", ["g"]),
-    "control-source": ("armed", ["c", "down"]),
-    "control-source-sure": ("armed", ["c", "down", "enter"]),
-    "faults": ("tripped", ["h"]),
-    "faults-none": ("armed", ["h"]),
-    "save": ("tripped", ["h", "s"]),
+    "control-source": ("armed", ["6", "down"]),
+    "control-source-sure": ("armed", ["6", "down", "enter"]),
+    "faults": ("tripped", ["5"]),
+    "faults-none": ("armed", ["5"]),
+    "save": ("tripped", ["5", "ctrl+s"]),
     "leave-running": ("done", ["q"]),
 }
 
@@ -161,10 +167,9 @@ def test_screens_of_commanding(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     state, keys = OVER[screen]
-    monkeypatch.setenv("TZ", "UTC")
-    time.tzset()
     app, monitor = panel(state)
-    held = {**fakes.RUNNING, **fakes.CHANNELS, **fakes.STORED}
+    held = {**fakes.RUNNING, **fakes.CHANNELS, **fakes.STORED, **LIMITS}
+    monitor.session.image.confirm("LFR", 300, fakes.NOW)
 
     async def read(codes: list[str], **_: Any) -> Any:
         profile = monitor.session.profile

@@ -85,11 +85,11 @@ async def test_enter_tries_the_line_again_that_could_not_be_opened(
         await until(pilot, lambda: len(tried) == 2)
         # a port that comes and goes moves the list, and not the cursor from its line
         ports.insert(0, ("/dev/ttyUSB9", ""))
-        await pilot.press("r")
+        await fakes.press(pilot, "(refresh_lines)")
         await pilot.press("enter")
         await until(pilot, lambda: len(tried) == 3)
         ports.clear()
-        await pilot.press("r")
+        await fakes.press(pilot, "(refresh_lines)")
         await pilot.press("enter")
         await until(pilot, lambda: len(tried) == 4)
     assert set(tried) == {"tcp:elsewhere"}
@@ -168,9 +168,11 @@ async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int,
     app.opened = fakes.opened()
     async with app.run_test(size=size) as pilot:
         snapshot = fakes.snapshot_of(library.load("atv71"), fakes.FAULT)
-        await app.push_screen(MonitorScreen(fakes.console_of(snapshot)))
+        console = fakes.console_of(snapshot)
+        fakes.choose(app, console)
+        await app.push_screen(MonitorScreen(console))
         await pilot.pause(0.4)
-        await pilot.press("w", "l", "escape", "question_mark", "escape")
+        await pilot.press("tab", "7", "escape", "question_mark", "escape")
         await pilot.resize_terminal(80, 24)
         await pilot.pause(0.4)
         assert "FAULT" in str(app.screen.query_one("#state", Lines).lines[1])
@@ -182,7 +184,7 @@ async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:
         await until(pilot, lambda: app.fleet is not None and alone(app.fleet.keeper) == {1: 3.0})
         for answer in ("escape", "y"):
             assert app.opened is not None
-            await pilot.press("x")
+            await fakes.press(pilot, "(disconnect)")
             await until(pilot, lambda: isinstance(app.screen, Confirm))
             await pilot.press(answer)
             await until(pilot, lambda: app.screen is app.connection)

@@ -20,11 +20,14 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults import FaultsScreen
 from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
+from tui.screens.messages import MessagesScreen
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
 from tui.session.keeper import Keeper
 from tui.session.lines import OpenLine, demo_line
 from tui.widgets.lines import Lines
+
+from .fakes import press
 
 DRIVES = {"atv21": 35.0, "atv71": 50.0, "powerdrive": 30.0}
 
@@ -121,7 +124,7 @@ async def test_frames_help_and_palette_open_and_close() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(120, 40)) as pilot:
         await to_monitor(app, pilot, 2)
-        await pilot.press("l")
+        await pilot.press("7")
         await until(pilot, lambda: isinstance(app.screen, FramesScreen))
         await until(pilot, lambda: "out" in shown(app, "frames"))
         await pilot.press("escape")
@@ -149,7 +152,7 @@ async def test_percent_becomes_amperes_once_the_rating_is_told() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 1)
         await until(pilot, lambda: "RUNNING" in shown(app, "state"))
-        await pilot.press("i")
+        await press(pilot, "(rating)")
         await until(pilot, lambda: isinstance(app.screen, Ask))
         await pilot.press(*"3x", "enter", "backspace", *".3", "enter")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
@@ -204,6 +207,7 @@ def test_every_action_has_a_method_and_words() -> None:
         FaultsScreen,
         ParametersScreen,
         BlocksScreen,
+        MessagesScreen,
     )
     owners = {(screen.TITLE or "connection").lower(): screen for screen in screens}
     for action in ACTIONS:
@@ -260,7 +264,7 @@ async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
         places = {widget.id: widget.region for widget in screen.query(Lines)}
         titles = {shown(app, part).partition(" ")[0]}
         for _ in range(3):
-            await pilot.press("w")
+            await pilot.press("tab")
             titles.add(shown(app, part).partition(" ")[0])
             assert {widget.id: widget.region for widget in screen.query(Lines)} == places
         assert len(titles) > 1

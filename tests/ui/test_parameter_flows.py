@@ -6,15 +6,17 @@ import re
 from pathlib import Path
 
 import pytest
-from textual.widgets import Input
+from textual.widgets import Input, OptionList
 
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.edit_value import EditBits, EditNumber, PickValue
+from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
 
-from .test_command_flows import Bench, bench
+from .fakes import press
+from .test_command_flows import Bench, bench, writes
 from .test_flows import shown, until
 
 
@@ -50,9 +52,19 @@ def write(file: Path, text: str) -> None:
 
 async def answer(made: Bench, key: str, text: str) -> None:
     """Press a key that asks for a text, and give it."""
-    await made.pilot.press(key)
+    await press(made.pilot, key)
     await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
     made.app.screen.query_one(Input).value = text
+    await made.pilot.press("enter")
+
+
+async def open_file(made: Bench, file: Path) -> None:
+    """Choose a file from the list of those that can be opened."""
+    await made.pilot.press("ctrl+o")
+    await until(made.pilot, lambda: isinstance(made.app.screen, PickFile))
+    files = made.app.screen.query_one(OptionList)
+    lines = [str(files.get_option_at_index(at).prompt) for at in range(files.option_count)]
+    files.highlighted = next(at for at, line in enumerate(lines) if f" {file.name} " in line)
     await made.pilot.press("enter")
 
 
@@ -81,6 +93,53 @@ async def test_find_edit_write_and_read_back() -> None:
         await message(made, "1 written and read back")
         assert made.drive().raw("ACC") == 75
         await until(made.pilot, lambda: "1 not saved" in shown(made.app, "status"))
+        # after a write u stages what was held before; nothing is written by that
+        await made.pilot.press("u")
+        await until(made.pilot, lambda: "→ 3.0 s" in shown(made.app, "table"))
+        assert made.drive().raw("ACC") == 75
+
+
+async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() -> None:
+    async with bench("atv71") as made:
+        screen = await to_parameters(made)
+        for code in ("ACC", "DEC", "HSP"):
+            await find(made, code)
+            await made.pilot.press("minus")
+            await until(made.pilot, lambda code=code: code in screen.editor.edits)  # type: ignore[misc]
+        await find(made, "ACC")
+        await made.pilot.press("u")
+        assert [edit.code for edit in screen.editor.edits] == ["ACC", "DEC"]
+        await made.pilot.press("delete")
+        assert [edit.code for edit in screen.editor.edits] == ["DEC"]
+        await made.pilot.press("delete")
+        assert "This parameter is not staged" in shown(made.app, "message")
+        await made.pilot.press("u")
+        await until(made.pilot, lambda: "0 staged" in shown(made.app, "status"))
+        assert writes(made.app) == []
+
+
+async def test_a_parameter_is_found_from_every_screen() -> None:
+    async with bench("atv71") as made:
+        for key in "2567":
+            await made.pilot.press(key, "slash", *"hsp", "enter")
+            await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+            await until(made.pilot, lambda: "\n HSP " in shown(made.app, "detail"))
+        assert writes(made.app) == []
+        assert made.app.chosen is not None
+        assert not made.app.chosen.session.arming.armed
+
+
+async def test_the_groups_have_tab_and_the_arrows() -> None:
+    async with bench("atv71") as made:
+        screen = await to_parameters(made)
+        first = screen.listed.code
+        seen = [first]
+        for key in ("tab", "right", "left", "shift+tab"):
+            await made.pilot.press(key)
+            seen.append(screen.listed.code)
+        assert seen[0] == seen[4]
+        assert seen[1] == seen[3]
+        assert len(set(seen)) == 3
 
 
 async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:
@@ -162,15 +221,15 @@ async def test_back_up_change_compare_stage_and_write(
     async with bench("atv312") as made:
         await to_parameters(made)
         file = Path("pump.toml")
-        await answer(made, "b", str(file))
+        await answer(made, "ctrl+s", str(file))
         await message(made, "parameters", "pump.toml")
         assert re.search(r"^ACC = \{.*raw = 30", read(file), re.MULTILINE)
         made.drive().set("ACC", 99)
         made.drive().set("HSP", 400)
-        await answer(made, "o", str(file))
+        await open_file(made, file)
         await message(made, "pump.toml: 2 differ")
         await until(made.pilot, lambda: "differs 2" in shown(made.app, "title"))
-        await made.pilot.press("n")
+        await made.pilot.press("i")
         await until(made.pilot, lambda: "2 staged" in shown(made.app, "status"))
         if not isinstance(made.app.screen, ParametersScreen):
             await made.pilot.press("escape")
@@ -189,7 +248,7 @@ async def test_a_file_that_is_no_set_is_told_and_nothing_is_staged(
     write(file, "format = 1\n[drive\n")
     async with bench("atv312") as made:
         await to_parameters(made)
-        await answer(made, "o", str(file))
+        await open_file(made, file)
         await message(made, "broken.toml:2")
         assert "0 staged" in shown(made.app, "status")
 
@@ -198,7 +257,7 @@ async def test_a_report_is_written(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.chdir(tmp_path)
     async with bench("atv312") as made:
         await to_parameters(made)
-        await answer(made, "p", "pump.md")
+        await answer(made, "(report)", "pump.md")
         await message(made, "parameters", "pump.md")
         assert "Altivar 312" in read(Path("pump.md"))
 

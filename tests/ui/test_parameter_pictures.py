@@ -117,7 +117,7 @@ STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
     "out-of-range": (plain, fakes.READY, 52.0, ["slash", *"hsp", "enter", "enter", *"9999"]),
     "names": (plain, fakes.READY, 52.0, ["slash", *"stt", "enter", "enter"]),
     "confirm": (plain, fakes.READY, 52.0, ["slash", *"fry", "enter", "y"]),
-    "save": (done, fakes.READY, 52.0, ["s"]),
+    "save": (done, fakes.READY, 52.0, ["S"]),
     "factory": (done, fakes.READY, 52.0, ["F"]),
     "help": (plain, fakes.READY, 52.0, ["question_mark"]),
 }
@@ -134,6 +134,7 @@ def test_parameters(
     prepare(console.editor)
     app = fakes.app_of()
     app.opened = fakes.opened()
+    fakes.choose(app, console)
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(ParametersScreen(console))
@@ -150,11 +151,12 @@ def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
     console = editor_of(fakes.READY, reading=True)
     app = fakes.app_of()
     app.opened = fakes.opened()
+    fakes.choose(app, console)
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(ParametersScreen(console))
         await pilot.pause()
-        await pilot.press("right_square_bracket", "right_square_bracket")
+        await pilot.press("tab", "tab")
         await pilot.pause()
 
     assert snap_compare(app, terminal_size=size, run_before=show)

@@ -16,6 +16,7 @@ from tui.drive import library
 from tui.screens.connection import ConnectionScreen
 from tui.screens.monitor import MonitorScreen
 from tui.session.console import DriveConsole
+from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
 from tui.session.identify import DriveIdentity
 from tui.session.keeper import Watch
@@ -55,8 +56,11 @@ def test_monitor(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
     app = fakes.app_of()
     app.opened = fakes.opened(line)
 
+    console = fakes.console_of(snapshot, line)
+    fakes.choose(app, console)
+
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(MonitorScreen(fakes.console_of(snapshot, line)))
+        await app.push_screen(MonitorScreen(console))
         await pilot.pause()
         app.screen.look()  # type: ignore[attr-defined]
         await pilot.pause()
@@ -90,6 +94,7 @@ def test_watched(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
     console.session.line.heard = fakes.NOW - age  # type: ignore[attr-defined]
     found = FoundDrive(fakes.ATV71, console)
     app.fleet = fakes.StillFleet(found, keeper=fakes.FakeKeeper(WATCH), line=line)
+    fakes.choose(app, console)
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(MonitorScreen(console))
@@ -214,9 +219,12 @@ def test_palette(snap_compare: Compare, query: str, size: tuple[int, int]) -> No
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
     app = fakes.app_of()
     app.opened = fakes.opened()
+    console = fakes.console_of(snapshot)
+    app.fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, console))
+    app.chosen = console
 
     async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(MonitorScreen(fakes.console_of(snapshot)))
+        await app.push_screen(MonitorScreen(console))
         await pilot.pause()
         app.screen.look()  # type: ignore[attr-defined]
         await pilot.press("ctrl+p", *PALETTE[query])
@@ -225,7 +233,11 @@ def test_palette(snap_compare: Compare, query: str, size: tuple[int, int]) -> No
     assert snap_compare(app, terminal_size=size, run_before=show)
 
 
-OVER_MONITOR = {"help": "question_mark", "frames": "l", "leave": "q"}
+OVER_MONITOR = {"help": "question_mark", "frames": "7", "messages": "m", "leave": "q"}
+LONG_REFUSAL = (
+    "HSP: the drive refused with exception 4, not written. The drive is running forward."
+    " Stop the motor and write again."
+)
 
 
 @SIZES
@@ -236,6 +248,12 @@ def test_over_monitor(snap_compare: Compare, screen: str, size: tuple[int, int])
     app.opened = fakes.opened()
     console = fakes.console_of(snapshot)
     app.fleet = that_trip(console)
+    fakes.choose(app, console)
+    app.events = EventLog(lambda: 1_795_259_250.4)
+    app.events.add("told", "3 keys came at once and were not taken.")
+    app.events.add("done", "Run forward: Operation enabled", 2)
+    app.events.add("refused", LONG_REFUSAL, 2)
+    app.events.add("failed", "NOT STOPPED: Device 3 did not answer. Stop it at the machine.", 3)
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(MonitorScreen(console))

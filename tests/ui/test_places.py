@@ -11,7 +11,7 @@ from tui.bus.line import Frame
 from tui.drive import library
 from tui.drive.profile import Profile
 from tui.drive.values import type_range
-from tui.screens.actions import EVERYWHERE, MONITOR, line_of, of_screen
+from tui.screens.actions import CONNECTION, EVERYWHERE, MONITOR, line_of, of_screen
 from tui.screens.frames import frame_line
 from tui.session.monitor import TrendPoint
 from tui.session.readings import Quality
@@ -156,9 +156,9 @@ def test_a_trend_has_its_size_whatever_its_values(
     assert [row.cell_len for row in rows] == [width] * height
 
 
-def keys_shown(screen: str, width: int) -> Text:
-    """The line of keys of a screen, as it draws it."""
-    keys = line_of(screen, width)
+def keys_shown(screen: str, width: int, stops: str = "STOP") -> Text:
+    """The line of keys of a screen, as it draws it; `stops` says whom the stop key stops."""
+    keys = line_of(screen, width, stops)
     profile = library.load("atv71")
     return (
         order_keys(view_of(profile, fakes.RUNNING), keys) if screen == MONITOR else key_line(keys)
@@ -178,8 +178,11 @@ def test_the_stop_comes_first_in_red_and_is_never_cut_off(screen: str, width: in
 
 @pytest.mark.parametrize("screen", EVERYWHERE)
 def test_no_key_is_dropped_at_80_columns(screen: str) -> None:
-    line = keys_shown(screen, 80).plain
-    wanted = [f" {action.shown} {action.label}" for action in of_screen(screen) if action.label]
+    whom = "ALL" if screen == CONNECTION else "99"
+    line = keys_shown(screen, 80, f"STOP {whom}").plain
+    assert line.startswith(f" Space STOP {whom}  ")
+    labels = [action for action in of_screen(screen) if action.label][1:]
+    wanted = [f" {action.shown} {action.label}" for action in labels]
     assert [words for words in wanted if words not in line] == []
 
 

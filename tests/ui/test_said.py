@@ -45,7 +45,7 @@ async def test_a_refusal_gives_way_to_what_is_proposed_next() -> None:
         await pilot.pause()
         screen.look()
         assert "NMA1 differs" in shown(app, "message")
-        await pilot.press("c")
+        await pilot.press("delete")
         assert "1 slots proposed otherwise" in shown(app, "message")
         desk.refuse("No output slot is in use.")
         screen.look()

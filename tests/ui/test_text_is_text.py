@@ -26,16 +26,20 @@ from tui.screens.dialogs.palette import Palette
 from tui.screens.dialogs.pick_parameter import PickParameter
 from tui.screens.dialogs.skipped import Skipped
 from tui.screens.faults import FaultsScreen
+from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
 from tui.widgets.lean import cells_of
 from tui.widgets.plain import entry
 
 from . import fakes
+from .fakes import press
 from .test_command_flows import Bench, bench
 from .test_flows import shown, until
+from .test_parameter_flows import open_file, write
 
 ROOT = Path(__file__).resolve().parents[2]
 MARKUP = ("[/]", "[bold]", "[@click=app.quit]x[/]", "[")
+FILES = ("[bold].toml", "[@click=app.quit]x.toml", "[red.toml")
 NAME = "\x1b]0;x\x07[red]"
 SHOWN = "␛]0;x␇[red]"
 PATIENCE = 40.0
@@ -51,7 +55,7 @@ def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 async def dialog(made: Bench, key: str, kind: type = Ask) -> None:
     """Open a dialog, and type markup into its field."""
     for text in MARKUP:
-        await made.pilot.press(key)
+        await press(made.pilot, key)
         await until(made.pilot, lambda: isinstance(made.app.screen, kind))
         await typed(made, text)
         if isinstance(made.app.screen, kind):
@@ -73,13 +77,21 @@ async def typed(made: Bench, text: str) -> None:
 
 
 async def monitor(made: Bench) -> None:
+    """The line of a reference takes no such character: it closes, and nothing else happens."""
     await made.armed()
-    await dialog(made, "f")
+    drive = made.app.chosen
+    for character in ("left_square_bracket", "slash", "at", "right_square_bracket"):
+        await made.pilot.press("f", "3")
+        await until(made.pilot, lambda: "REFERENCE" in shown(made.app, "message"))
+        await made.pilot.press(character)
+        await until(made.pilot, lambda: "REFERENCE" not in shown(made.app, "message"))
+        assert isinstance(made.app.screen, MonitorScreen)
+        assert made.app.chosen is drive
     await dialog(made, "ctrl+p", Palette)
 
 
 async def rating(made: Bench) -> None:
-    await dialog(made, "i")
+    await dialog(made, "(rating)")
 
 
 async def parameters(made: Bench) -> None:
@@ -93,8 +105,19 @@ async def parameters(made: Bench) -> None:
     await made.pilot.press("slash", *"acc", "enter")
     await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
     await dialog(made, "enter", EditNumber)
-    for key in "bpo":
+    for key in ("ctrl+s", "(report)"):
         await dialog(made, key)
+    await files(made)
+
+
+async def files(made: Bench) -> None:
+    """A list of files whose names are markup; what is told of one that is no set names it."""
+    for name in FILES:
+        file = Path(name)
+        write(file, "format = 1\n[drive\n")
+        await open_file(made, file)
+        await until(made.pilot, lambda: name[:20] in shown(made.app, "message"))  # noqa: B023
+        assert made.app.is_running
 
 
 async def blocks(made: Bench) -> None:
@@ -104,19 +127,20 @@ async def blocks(made: Bench) -> None:
     await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))
     await until(made.pilot, lambda: "DEC" in shown(made.app, "second"))
     await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
-    for key in "slmx":
+    for key in ("ctrl+s", "(words)", "X"):
         await dialog(made, key)
+    await files(made)
     await dialog(made, "enter", PickParameter)
 
 
 async def faults(made: Bench) -> None:
     made.drive().provoke(18)
     await until(made.pilot, lambda: "FAULT" in shown(made.app, "state"))
-    await made.pilot.press("h")
+    await made.pilot.press("5")
     await until(made.pilot, lambda: isinstance(made.app.screen, FaultsScreen))
     screen = made.app.screen
     await until(made.pilot, lambda: screen._recorder.latest is not None)  # type: ignore[attr-defined]
-    await dialog(made, "s")
+    await dialog(made, "ctrl+s")
 
 
 async def connection(made: Bench) -> None:
@@ -144,7 +168,15 @@ WAYS: dict[str, tuple[str, Way]] = {
     "faults": ("atv71", faults),
     "connection": ("atv71", connection),
 }
-ASKED = {"f", "i", "b and p", "o", "s of Blocks", "l", "m", "x", "s of Faults", "n"}
+ASKED = {
+    "rating",
+    "Ctrl+S and report of Parameters",
+    "Ctrl+S of Blocks",
+    "words",
+    "X",
+    "Ctrl+S of Faults",
+    "n",
+}
 
 
 @pytest.mark.parametrize("name", WAYS)

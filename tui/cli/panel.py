@@ -36,6 +36,7 @@ def run_panel(
     read_only: bool = False,
     low_bandwidth: bool = False,
     on_hangup: str = STOP,
+    mouse: bool = False,
 ) -> None:
     """Run the panel until it is left."""
     if not _has_terminal():
@@ -52,6 +53,7 @@ def run_panel(
         read_only=read_only,
         low_bandwidth=low_bandwidth,
         leave_running=on_hangup == LEAVE_RUNNING,
+        mouse=mouse,
         on_shown=_collect_garbage,
     )
     with ending_by_signal(app, stop=on_hangup == STOP):
@@ -90,15 +92,19 @@ on_hangup_option = click.option(
 low_bandwidth_option = click.option(
     "--low-bandwidth", is_flag=True, help="Send as little as possible to a slow terminal."
 )
+mouse_option = click.option(
+    "--mouse", is_flag=True, help="Let the terminal report its mouse; the panel needs none."
+)
 
 
 @click.command()
 @low_bandwidth_option
 @on_hangup_option
+@mouse_option
 @told
-def demo(low_bandwidth: bool, on_hangup: str) -> None:
+def demo(low_bandwidth: bool, on_hangup: str, mouse: bool) -> None:
     """Open the panel on one simulated line with five running drives."""
-    run_panel(DEMO_LINE, None, low_bandwidth=low_bandwidth, on_hangup=on_hangup)
+    run_panel(DEMO_LINE, None, low_bandwidth=low_bandwidth, on_hangup=on_hangup, mouse=mouse)
 
 
 @click.command(hidden=True)
@@ -113,6 +119,7 @@ def demo(low_bandwidth: bool, on_hangup: str) -> None:
 @read_only_option
 @low_bandwidth_option
 @on_hangup_option
+@mouse_option
 @told
 def panel(
     line_text: str | None,
@@ -120,10 +127,16 @@ def panel(
     read_only: bool,
     low_bandwidth: bool,
     on_hangup: str,
+    mouse: bool,
 ) -> None:
     """Open the panel."""
     if device is not None and line_text is None:
         raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
     run_panel(
-        line_text, device, read_only=read_only, low_bandwidth=low_bandwidth, on_hangup=on_hangup
+        line_text,
+        device,
+        read_only=read_only,
+        low_bandwidth=low_bandwidth,
+        on_hangup=on_hangup,
+        mouse=mouse,
     )

@@ -17,10 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from tui.bus.errors import LineError
 from tui.session.keeper import left_alone_text
 from tui.session.recording import StartKeeper
 
-from .errors import DRIVE_REFUSED, Failure, told
+from .errors import DRIVE_REFUSED, REFUSED_HERE, Failure, told
 from .options import (
     Target,
     drive_options,
@@ -235,26 +236,45 @@ class Run:
                 self._show(latest)
                 rest = rest + 1 if self._at_rest(latest) else 0
             if rest >= AT_REST:
-                text = self._stopped_by_itself(latest)
+                with suppress(LineError):
+                    await self.console.read(self.console.session.followed)
+                text, status = self._stopped_by_itself(latest)
                 self._tell("ended", text)
-                raise Failure(text, DRIVE_REFUSED)
+                raise Failure(text, status)
             if self.wish.seconds is not None and time.monotonic() - begun >= self.wish.seconds:
                 self.ending.end(f"after {self.wish.seconds:g} s")
             with suppress(TimeoutError):
                 await asyncio.wait_for(self.ending.event.wait(), LOOK)
 
-    @staticmethod
-    def _at_rest(latest: Snapshot) -> bool:
-        return not latest.error and latest.state.kind in ("fault", "stopped", "ready", "blocked")
+    def _at_rest(self, latest: Snapshot) -> bool:
+        """Whether it is seen not to run; a drive may stay in its quick stop at 0 Hz."""
+        if latest.error:
+            return False
+        kind = latest.state.kind
+        at_zero = kind == "stopping" and self._frequency(latest) == 0
+        return at_zero or kind in ("fault", "stopped", "ready", "blocked")
 
-    def _stopped_by_itself(self, latest: Snapshot) -> str:
-        who = f"Device {self.console.session.device}"
+    def _frequency(self, latest: Snapshot) -> float | None:
+        """The output frequency in Hz, as far as it is known."""
+        frequency = self.console.session.profile.quantity("output_frequency")
+        reading = latest.readings.get(frequency.code) if frequency else None
+        return reading.number if reading is not None else None
+
+    def _stopped_by_itself(self, latest: Snapshot) -> tuple[str, int]:
+        """Why the motor no longer runs, and the status: 4 after a trip, 5 where it was stopped."""
+        session = self.console.session
+        who = f"Device {session.device}"
         if fault := fault_text(latest.state):
-            return f"{who} tripped: {fault}. Look at the machine; reset it when its cause is gone."
-        return (
-            f"{who} no longer runs: {latest.state.headline}. It was stopped by itself or from"
-            " elsewhere."
-        )
+            text = f"{who} tripped: {fault}. Look at the machine; reset it when its cause is gone."
+            return text, DRIVE_REFUSED
+        by = "by itself or from elsewhere"
+        if session.work.stops:
+            by = f"by {session.work.stopped_by}"
+        elif lost := self.console.commander.changed_words():
+            by = f"by another program or master on the line: {lost}"
+        elif latest.state.local:
+            by = "at its terminals or keypad"
+        return f"{who} no longer runs: {latest.state.headline}. It was stopped {by}.", REFUSED_HERE
 
     def _show(self, latest: Snapshot) -> None:
         """A line about the motor once a second; trouble on the line when it begins and ends."""
@@ -325,10 +345,8 @@ class Run:
 
     def _stands(self) -> bool:
         """Whether the motor is seen at rest, though the drive did not take the stop."""
-        latest, session = latest_of(self.console), self.console.session
-        frequency = session.profile.quantity("output_frequency")
-        reading = latest.readings.get(frequency.code) if frequency else None
-        return self._at_rest(latest) and reading is not None and reading.number == 0
+        latest = latest_of(self.console)
+        return self._at_rest(latest) and self._frequency(latest) == 0
 
     async def _line_was_bad(self, since: float) -> bool:
         """Wait until the drive answers; whether it failed to at any time since."""

@@ -12,6 +12,11 @@ from .schema import Chart, Order, OrderId, Parameter
 
 GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
 """Ways to stop that trip no drive, the gentlest first."""
+INSTEAD: Mapping[OrderId, tuple[OrderId, ...]] = {
+    "emergency-stop": ("emergency-stop", "quick-stop", "stop"),
+    "quick-stop": ("quick-stop", "stop"),
+}
+"""Ways to stop that take another's place where a drive lacks it."""
 WAYS_TO_STOP = frozenset[OrderId]({"stop", "quick-stop", "freewheel", "emergency-stop"})
 
 
@@ -51,6 +56,15 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Order:
     allowed = ", ".join(dict.fromkeys(names[s] for order in same for s in order.states))
     now = state.name if state else "not known"
     raise OrderRefused(f"{same[0].name} is possible in the states: {allowed}. It is now: {now}.")
+
+
+def nearest_stop(chart: Chart, id: OrderId) -> OrderId:
+    """The way to stop that a chart has in place of one that it lacks.
+
+    An emergency stop becomes a quick stop, else a ramp stop; never coasting or braking.
+    """
+    ids = {order.id for order in chart.orders}
+    return next((way for way in INSTEAD.get(id, (id,)) if way in ids), id)
 
 
 def stop_conditions(chart: Chart, id: OrderId) -> list[str]:

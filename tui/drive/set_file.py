@@ -15,17 +15,21 @@ class FileThere(SetError):
     """A file of this name exists and was not to be overwritten."""
 
 
-def read_set(path: Path) -> ParameterSet:
-    """The parameter set in a file; raises SetError, UnknownProfile and ProfileError."""
+def read_set(path: Path, name: str = "") -> ParameterSet:
+    """The parameter set in a file; raises SetError, UnknownProfile and ProfileError.
+
+    `name` is what errors call the file, its path unless given.
+    """
+    name = name or str(path)
     try:
         text = path.read_text(encoding="utf-8")
     except OSError as error:
-        raise SetError(f"{path}: cannot be read: {error.strerror or error}.") from error
+        raise SetError(f"{name}: cannot be read: {error.strerror or error}.") from error
     except UnicodeDecodeError as error:
         raise SetError(
-            f"{path}: byte {error.start} is not UTF-8 text: no parameter set."
+            f"{name}: byte {error.start} is not UTF-8 text: no parameter set."
         ) from error
-    return loads(text, str(path), library.load)
+    return loads(text, name, library.load)
 
 
 def write_file(path: Path, text: str, *, force: bool = False) -> None:

@@ -6,10 +6,18 @@ from dataclasses import dataclass
 
 CONNECTION, MONITOR, FRAMES = "connection", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control source", "faults", "parameters"
-BLOCKS = "blocks"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS)
+BLOCKS, MESSAGES = "blocks", "messages"
+EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS, MESSAGES)
 
-KEY_NAMES = {"escape": "Esc", "ctrl+p": "^p", "ctrl+l": "^l", "pageup": "PgUp", "pagedown": "PgDn"}
+KEY_NAMES = {
+    "escape": "Esc",
+    "ctrl+p": "^p",
+    "ctrl+l": "^l",
+    "ctrl+s": "^s",
+    "ctrl+o": "^o",
+    "pageup": "PgUp",
+    "pagedown": "PgDn",
+}
 """Keys that a person reads otherwise than Textual writes them, capitals aside."""
 
 

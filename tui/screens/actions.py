@@ -17,6 +17,7 @@ from .action import (
     EVERYWHERE,
     FAULTS,
     FRAMES,
+    MESSAGES,
     MONITOR,
     PARAMETERS,
     SOURCES,
@@ -24,66 +25,88 @@ from .action import (
     on,
 )
 from .block_actions import BLOCK_ACTIONS
-from .monitor_actions import ORDER_ACTIONS, WATCH_ACTIONS
+from .monitor_actions import COMMAND_ACTIONS, WATCH_ACTIONS
 from .parameter_actions import PARAMETER_ACTIONS
 
 of_app = partial(Action, app=True)
 stops = partial(Action, app=True, first=True)
-STOP = "Stop the motor on its ramp, wherever no text is being typed."
-ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, FRAMES, SOURCES)
+STOP = "Stop the drive on its ramp, wherever a space is no text; without an open drive, all."
+STOP_ANYWHERE = "The same, also while text is typed, from any screen or dialog."
+STOP_ALL = "Stop every drive of the line on its ramp, from any screen."
+ARM = "Arm this drive for a minute, or for a minute more."
+ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
+OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
 NEVER_DROPPED = ("stop_by_space", "help")
 """Actions that stand in the line of keys however narrow the terminal is."""
-WRITE_SOURCE = "Write the chosen configuration, armed and with the motor at rest."
+WRITE_SOURCE = "Write the chosen configuration; armed, motor at rest, asks."
+SAVE = "Save what is shown to a file: a backup, an assignment, the record of a trip."
+OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
+FIND = "Find a parameter by code, name, address or value, from anywhere."
+EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
+
+PLACES: tuple[tuple[str, str, str], ...] = (
+    (CONNECTION, "1", "Line"),
+    (MONITOR, "2", "Monitor"),
+    (PARAMETERS, "3", "Parameters"),
+    (BLOCKS, "4", "Scanner and blocks"),
+    (FAULTS, "5", "Faults"),
+    (SOURCES, "6", "Control: who commands the drive"),
+    (FRAMES, "7", "Frames on the line"),
+)
+"""The screens, each with its key everywhere, and how it is called."""
 
 ACTIONS: tuple[Action, ...] = (
     stops("stop_by_space", "space", "STOP", STOP),
-    stops("stop", "f12", "", "Stop the motor on its ramp, from any screen, dialog or text."),
-    stops("stop_all", "f9", "", "Stop every drive of the line on its ramp, from any screen."),
+    stops("stop", "f12", "", STOP_ANYWHERE),
+    stops("stop_all", "f9", "", STOP_ALL),
     *on(
         (CONNECTION,),
         ("open_chosen", "enter", "open", "Open the chosen line or drive."),
-        ("scan", "s", "scan", "Look for drives at the addresses given."),
-        ("type_line", "n", "type line", "Type a line: serial, TCP, RTU over TCP, sim."),
-        ("refresh_lines", "r", "", "Look for serial ports again."),
-        ("disconnect", "x", "close", "Close the line."),
+        ("scan", "s", "search", "Look for drives at the addresses given."),
+        ("type_line", "n", "another line", "Type a line: serial, TCP, RTU over TCP, sim."),
         ("stop_scan", "escape", "", "Stop looking for drives."),
-        ("watch_chosen", "2", "", "Go to Monitor of the chosen drive."),
+        ("refresh_lines", "", "", "Look for serial ports again."),
+        ("disconnect", "", "", "Close the line; asks where a drive acts on that."),
     ),
-    *on(
-        (MONITOR, SOURCES, PARAMETERS, BLOCKS),
-        ("arm", "a", "arm", "Arm this drive, or end that."),
-    ),
-    *ORDER_ACTIONS,
+    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("arm", "a", "arm", ARM)),
+    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("disarm", "A", "", "End arming.")),
+    *COMMAND_ACTIONS,
     Action("write_chosen", "enter", "write", WRITE_SOURCE, (SOURCES,), bound=False),
     *on(
         (FAULTS,),
-        ("save", "s", "save", "Save the record of the trip to a file."),
-        ("move_record(1)", "[", "older", "Older values."),
-        ("move_record(-1)", "]", "newer", "Newer values."),
-        ("leave", "escape,h,2", "back", "Go back to Monitor."),
+        ("move_record(1)", "left", "older", "Older values of the record."),
+        ("move_record(-1)", "right", "", "Newer values of the record."),
+        ("leave", "escape", "back", "Go back to Monitor."),
     ),
-    *on((SOURCES,), ("leave", "escape,c,2", "back", "Go back to Monitor.")),
-    *on(ABOVE_MONITOR, ("go('leave')", "1", "", "Go to Connection.")),
-    *on(
-        tuple(screen for screen in ABOVE_MONITOR if screen != PARAMETERS),
-        ("go('parameters')", "3", "", "Go to Parameters."),
-    ),
-    *on(
-        tuple(screen for screen in ABOVE_MONITOR if screen != BLOCKS),
-        ("go('blocks')", "4", "", "Go to Blocks."),
-    ),
+    *on((SOURCES,), ("leave", "escape", "back", "Go back to Monitor.")),
     *PARAMETER_ACTIONS,
     *BLOCK_ACTIONS,
     *WATCH_ACTIONS,
     *on(
         (FRAMES,),
-        ("leave", "escape,l,2", "back", "Go back to Monitor."),
         ("hold", "h", "hold", "Hold the list still, or let it run."),
+        ("leave", "escape", "back", "Go back to Monitor."),
     ),
+    *on(
+        (MESSAGES,),
+        ("scroll(-1)", "up", "", "Newer messages."),
+        ("scroll(1)", "down", "older", "Older messages."),
+        ("scroll(-10)", "pageup", "", "Ten lines newer."),
+        ("scroll(10)", "pagedown", "", "Ten lines older."),
+        ("leave", "escape", "back", "Go back."),
+    ),
+    *(of_app(f"goto({place!r})", key, "", f"Go to {name}.") for place, key, name in PLACES),
+    of_app("step_drive(-1)", "[", "", "The drive before on this line."),
+    of_app("step_drive(1)", "]", "", "The next drive on this line."),
+    of_app("find", "/", "", FIND),
+    of_app("messages", "m", "", "Messages: everything that was said, with its time."),
+    of_app("save_shown", "ctrl+s", "", SAVE),
+    of_app("open_file", "ctrl+o", "", OPEN),
+    of_app("eeprom", "S", "", EEPROM),
     of_app("command_palette", "ctrl+p", "all", "Find any action by its words."),
     of_app("help", "?,f1", "help", "Show every key."),
     of_app("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
-    of_app("quit", "q,ctrl+q", "leave", "Leave the panel."),
+    of_app("quit", "q,ctrl+q", "leave", "Leave the panel; asks where it matters."),
 )
 
 
@@ -101,6 +124,7 @@ def bindings(screen: str | None) -> list[BindingType]:
         )
         for action in ACTIONS
         if action.bound
+        and action.keys
         and action.app == (screen is None)
         and (screen is None or screen in action.screens)
     ]
@@ -111,10 +135,27 @@ def of_screen(screen: str) -> list[Action]:
     return [action for action in ACTIONS if screen in action.screens]
 
 
-def line_of(screen: str, width: int) -> list[Key]:
-    """The line of keys of a screen, the stop first; where it is narrow, without the last ones."""
+def line_of(screen: str, width: int, stops: str = "STOP") -> list[Key]:
+    """The line of keys of a screen, the stop first; where it is narrow, without the last ones.
+
+    `stops` says whom the stop key stops.
+    """
     keys = [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
-    return fitting(keys, width, NEVER_DROPPED)
+    named = [(id, key, stops if id == "stop_by_space" else label) for id, key, label in keys]
+    return fitting(named, width, NEVER_DROPPED)
+
+
+def elsewhere(screen: str, key: str, character: str | None = None) -> str:
+    """Where a key that a screen does not know has a meaning, in a sentence; empty if nowhere.
+
+    Of a key with a sign the table has the `character`, as `*`, and not its name.
+    """
+    for action in ACTIONS:
+        if {key, character} & {*action.keys.split(",")} and screen not in action.screens:
+            place = next(((k, name) for p, k, name in PLACES if p == action.screens[0]), None)
+            where = f"{place[1].partition(':')[0]} ({place[0]})" if place else "another screen"
+            return f"{action.shown} has a meaning on {where}: {action.help}"
+    return ""
 
 
 __all__ = [
@@ -124,6 +165,7 @@ __all__ = [
     "EVERYWHERE",
     "FAULTS",
     "FRAMES",
+    "MESSAGES",
     "MONITOR",
     "PARAMETERS",
     "SOURCES",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.drive.orders import OrderRefused
@@ -39,7 +40,30 @@ class Arming(PanelScreen):
         """What the motor does now, for a question about this drive."""
         from .dialogs.now import MotorsNow
 
-        return MotorsNow(self.app, [self.console])
+        return MotorsNow(self.app, [self.session])
+
+    def _ask(
+        self, question: str, follows: str, yes: str, no: str, work: Callable[[int], object]
+    ) -> None:
+        """Ask with `y` before something is written or moved; refusals are told on this screen.
+
+        `work` gets the drive's count of stops of the moment of asking: a stop since voids it.
+        """
+        from .dialogs.confirm import Confirm
+
+        stamp = self.session.work.stops
+
+        def told(sure: bool | None) -> None:
+            try:
+                if sure:
+                    work(stamp)
+            except OrderRefused as refused:
+                self._refuse(str(refused))
+            self.look()
+
+        now = self.motor_now()
+        asked = Confirm(question, follows, yes=yes, no=no, loses=True, now=now)
+        self.app.push_screen(asked, told)
 
     def _armed(self) -> bool:
         return self.commander.armed_for is not None
@@ -51,12 +75,14 @@ class Arming(PanelScreen):
         return self._armed()
 
     def action_arm(self) -> None:
-        """Let orders and writes to this drive through, or no longer."""
+        """Let commands and writes to this drive through for a minute, or for a minute more."""
         try:
-            if self._armed():
-                self.commander.disarm()
-            else:
-                self.commander.arm()
+            self.commander.arm()
         except OrderRefused as refused:
             self._refuse(str(refused))
+        self.look()
+
+    def action_disarm(self) -> None:
+        """Let nothing through any more."""
+        self.commander.disarm()
         self.look()

@@ -6,13 +6,14 @@ from collections.abc import Sequence
 from typing import ClassVar
 
 from rich.text import Text
-from textual.events import Resize
+from textual.events import Key, Resize
 from textual.screen import Screen
+from textual.widgets import Input
 
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
-from .actions import line_of
+from .actions import elsewhere, line_of
 from .panel import Panel
 
 
@@ -47,16 +48,23 @@ class PanelScreen(Screen[None]):
 
     def draw(self, width: int) -> None:
         """Put every line, here that of the keys; the screen is on top and has a size."""
-        self.put("keys", [key_line(line_of((self.TITLE or "").lower(), width))])
+        self.put("keys", [key_line(line_of(self.name_of_screen, width, self.app.stops_whom))])
+
+    @property
+    def name_of_screen(self) -> str:
+        """The screen as the table of actions calls it."""
+        return (self.TITLE or "").lower()
+
+    def on_key(self, event: Key) -> None:
+        """A key that means nothing here says where it does, and does nothing."""
+        if event.key in self.active_bindings or isinstance(self.focused, Input):
+            return
+        if said := elsewhere(self.name_of_screen, event.key, event.character):
+            self.app.tell(said)
 
     def action_leave(self) -> None:
         """Back to the screen below."""
         self.app.pop_screen()
-
-    def action_go(self, place: str) -> None:
-        """From a screen above Monitor straight to where an action of Monitor leads."""
-        self.app.pop_screen()
-        getattr(self.app.screen, f"action_{place}")()
 
 
 def _fitted(line: Text, width: int) -> Text:

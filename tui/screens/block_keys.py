@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 from tui.drive.errors import DriveError
@@ -11,7 +12,7 @@ from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, word_
 from tui.session.mapping_desk import MappingDesk
 
 from .arming import Arming
-from .dialogs.files import fault_of_known, fault_of_new
+from .dialogs.files import fault_of_new
 
 
 class BlockKeys(Arming):
@@ -37,7 +38,6 @@ class BlockKeys(Arming):
     def action_exchange(self) -> None:
         """Write values through the outputs."""
         from .dialogs.ask import Ask
-        from .dialogs.confirm import Confirm
 
         desk = self.desk
         if not self._armed():
@@ -66,27 +66,16 @@ class BlockKeys(Arming):
                 self._refuse(str(refused))
                 return
 
-            def told(sure: bool | None) -> None:
-                if sure:
-                    desk.exchange(agreed)
-                self.look()
-
-            asked = Confirm(
-                "Write through the outputs?",
-                agreed.follows,
-                yes="writes, read back",
-                no="writes nothing",
-                loses=True,
-                now=self.motor_now(),
-            )
-            self.app.push_screen(asked, told)
+            question = "Write through the outputs?"
+            work = partial(desk.exchange, agreed)
+            self._ask(question, agreed.follows, "writes, read back", "writes nothing", work)
 
         asked = Ask("Write through the outputs", wrong, about=about, takes="goes on to a question")
         self.app.push_screen(asked, given)
 
     # Files and user words
 
-    def action_save(self) -> None:
+    def action_save_file(self) -> None:
         """Ask for a file, and save what is proposed, else today's assignment."""
         from .dialogs.ask import Ask
 
@@ -115,9 +104,11 @@ class BlockKeys(Arming):
         write_file(path, dumps(profile, plans, note))
         self.app.notify(f"Saved: {path}", timeout=5)
 
-    def action_load(self) -> None:
-        """Ask for a file, and propose what it holds."""
-        from .dialogs.ask import Ask
+    def action_load_file(self) -> None:
+        """Choose a file, and propose what it holds."""
+        from tui.session.state import state_folder
+
+        from .dialogs.pick_file import PickFile
 
         if not self.desk.blocks:
             self._refuse(no_blocks(self.session.profile))
@@ -127,9 +118,8 @@ class BlockKeys(Arming):
             if name:
                 self._try(lambda: self._load(Path(name).expanduser()))
 
-        about = "A file saved here. It is proposed, not written."
-        asked = Ask("Load from", fault_of_known, about=about, takes="proposes what it holds")
-        self.app.push_screen(asked, given)
+        question = "Open an assignment: it is proposed, not written"
+        self.app.push_screen(PickFile(question, [], [Path.cwd(), state_folder()]), given)
 
     def _load(self, path: Path) -> None:
         from tui.drive.mapping import MappingError

@@ -194,8 +194,6 @@ class BlocksScreen(BlockKeys):
 
     def action_write(self) -> None:
         """Say what follows, and write it."""
-        from .dialogs.confirm import Confirm
-
         desk = self.desk
         todo = {block.id: block for block in desk.blocks if desk.changes(block)}
         if not todo:
@@ -209,21 +207,9 @@ class BlocksScreen(BlockKeys):
         if not self._armed_or_told():
             return
 
-        def told(sure: bool | None) -> None:
-            if sure:
-                desk.write()
-            self.look()
-
         count = sum(len(desk.changes(block)) for block in todo.values())
-        asked = Confirm(
-            f"Write {count} slots?",
-            self._follows(),
-            yes="writes, each slot read back",
-            no="writes nothing",
-            loses=True,
-            now=self.motor_now(),
-        )
-        self.app.push_screen(asked, told)
+        yes, no = "writes, each slot read back", "writes nothing"
+        self._ask(f"Write {count} slots?", self._follows(), yes, no, desk.write)
 
     def _follows(self) -> str:
         """What would be written, and what that means for others."""
@@ -237,7 +223,7 @@ class BlocksScreen(BlockKeys):
             if found and block.effective == "after-reset":
                 told.append("It counts after the drive's next reset or switch-on.")
             if found and any(profile[s].storage == "ram-until-saved" for s in block.slots):
-                told.append("Lost at power-off until saved (Parameters, s).")
+                told.append("Lost at power-off until saved (S).")
             if found and block.direction == "write":
                 told.append("What a master writes to these outputs goes elsewhere from then on.")
         told.append(

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 from .base import PanelScreen
 from .dialogs.palette import Palette
-from .places import PLACE_OF, go_to, place
 
 if TYPE_CHECKING:
     from .finding import Found
@@ -24,10 +23,8 @@ def open_palette(app: Panel) -> None:
             return
         if found.here:
             app.call_later(app.run_action, found.action.id, app if found.action.app else below)
-        elif found.action.id in PLACE_OF:
-            go_to(app, PLACE_OF[found.action.id])
         else:
-            go_to(app, found.screen)
-            app.notify(f"{found.name}: {found.action.shown} on {found.screen.capitalize()}.")
+            app.action_goto(found.screen)
+            app.tell(f"{found.name}: {found.action.shown} on {found.screen.capitalize()}.")
 
-    app.push_screen(Palette(place(app)), chosen)
+    app.push_screen(Palette(app.place), chosen)

@@ -7,7 +7,6 @@ from typing import ClassVar
 from textual.widgets import OptionList
 
 from .actions import CONNECTION, bindings
-from .connection_view import ALARM_KIND
 from .found import about_drive, next_step
 from .line_keys import LineKeys
 
@@ -50,10 +49,3 @@ class ConnectionScreen(LineKeys):
             self.action_scan()  # by what was typed
         else:
             self.lines.action_select()
-
-    def action_watch_chosen(self) -> None:
-        """Watch the drive that is chosen in the list of drives."""
-        if self.drives.highlighted is None:
-            self.say("No drive is found yet.", "Enter on a line opens it and looks.", ALARM_KIND)
-        else:
-            self.drives.action_select()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
-from textual.events import Resize
+from textual.events import Key, Resize
 from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
@@ -136,9 +136,10 @@ class ConnectionView(PanelScreen):
         states = {d: _state(drive, looks.get(d), connected) for d, drive in found.items()}
         self.drives.fill(found, states, sort=self._hands_are_quiet())
 
-    def on_key(self) -> None:
+    def on_key(self, event: Key) -> None:
         """While keys come, nothing changes its place under them."""
         self._key_at = self.app.clock.monotonic()
+        super().on_key(event)
 
     def _hands_are_quiet(self) -> bool:
         return self.app.clock.monotonic() - self._key_at >= QUIET

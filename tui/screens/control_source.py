@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import ClassVar
 
 from rich.text import Text
@@ -127,8 +128,6 @@ class ControlSourceScreen(OrderKeys):
 
     def action_write_chosen(self) -> None:
         """Say what follows, and write it."""
-        from .dialogs.confirm import Confirm
-
         found = changes(self.session.profile, self._chosen, self._raws)
         if self._armed_or_told() and found and self._raws:
             codes = ", ".join(change.parameter.code for change in found)
@@ -136,19 +135,7 @@ class ControlSourceScreen(OrderKeys):
                 f"Writes {codes}, each read back. A run order that waits at the new source"
                 " starts the motor."
             )
-            source = self._chosen
-
-            def told(sure: bool | None) -> None:
-                if sure:
-                    self._give(lambda: self.commander.configure(source))
-
-            asked = Confirm(
-                f"{source.name}?",
-                follows,
-                yes="writes",
-                no="leaves all as it is",
-                loses=True,
-                now=self.motor_now(),
-            )
-            self.app.push_screen(asked, told)
+            work = partial(self.commander.configure, self._chosen)
+            name = self._chosen.name
+            self._ask(f"{name}?", follows, "writes", "leaves all as it is", work)
         self.look()

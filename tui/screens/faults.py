@@ -15,15 +15,16 @@ from tui.session.console import DriveConsole
 from tui.session.fault_record import FaultRecord, Recorder, record_name, record_text
 from tui.session.readings import Reading
 from tui.session.state import state_folder
-from tui.widgets.drawing import rule
+from tui.widgets.drawing import armed_text, rule
 from tui.widgets.fault_view import fault_lines, history_line, record_lines, stored_lines
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, STRONG
 from tui.widgets.plain import entry
 
 from .actions import FAULTS, bindings
-from .base import PanelScreen
 from .dialogs.files import fault_of_new
+from .orders import OrderKeys
+from .said import news
 
 LEFT = 36
 STORED = 52
@@ -32,7 +33,7 @@ STEP = 5
 """Rows of the record that a key moves by."""
 
 
-class FaultsScreen(PanelScreen):
+class FaultsScreen(OrderKeys):
     """Reads the history when it opens, and again after a trip."""
 
     CSS_PATH = "faults.tcss"
@@ -115,14 +116,17 @@ class FaultsScreen(PanelScreen):
         present = latest is not None and latest.state.kind == "fault"
         fault = latest.state.fault if latest and present else record.fault if record else None
         who = f"Faults · {self.session.profile.name} · device {self.session.device}"
-        self.put("title", [rule(who, width, self.app.clock.time_of_day())])
+        title = rule(who, width - 12, self.app.clock.time_of_day())
+        self.put("title", [title.append_text(armed_text(self.commander.armed_for))])
         self.put("fault", fault_lines(fault, present, width))
         room = min(STORED, width - LEFT)
         stored = stored_lines(self.session.profile, self._stored(), self._readings, room)
         self.put("stored", stored)
         room = self.size.height - 1 - 4 - self.query_one("#middle").size.height - 2
         self.put("record", record_lines(record, width, room, self._offset))
-        self.put("message", [self._message])
+        now = self.app.clock.monotonic()
+        told = news(self.session.work.outcome, now, busy=self.session.work.busy)
+        self.put("message", [Text(f" {told[0]}", told[1]) if told else self._message])
 
     def _stored(self) -> list[str]:
         """Codes that the drive keeps of the chosen fault."""
@@ -136,7 +140,7 @@ class FaultsScreen(PanelScreen):
         self._offset = max(0, min(most, self._offset + rows * STEP))
         self.look()
 
-    def action_save(self) -> None:
+    def action_save_file(self) -> None:
         """Write the record to a file whose name the person may change."""
         from .dialogs.ask import Ask
 

@@ -15,19 +15,19 @@ BY_NAME = {
     "stop": ("stop",),
     "stop_all": ("stop", "all"),
     "arm": ("arm",),
-    "order('forward')": ("run", "forward"),
-    "order('reverse')": ("run", "reverse"),
-    "order('dc-braking')": ("brake",),
-    "order('take-control')": ("take", "control"),
-    "take_over": ("take", "over"),
+    "run_line('forward')": ("run", "forward"),
+    "run_line('reverse')": ("run", "reverse"),
+    "ask_stop_as('dc-braking')": ("brake",),
+    "take_control": ("take",),
+    "take_over": ("after",),
     "stop_as('quick-stop')": ("stop", "quick"),
-    "stop_as('freewheel')": ("coast",),
+    "ask_stop_as('freewheel')": ("coast",),
     "stop_as('emergency-stop')": ("stop", "emergency"),
 }
 """What acts on a motor: listed for one of these words, and standing ready for all of them only."""
-NOT_FOUND = ("command_palette", "stop_by_space")
-"""The palette itself, and a key that has another one to the same end."""
-WAYS = ("leave", "go(", "move", "page", "end(", "group(")
+NOT_FOUND = ("command_palette", "stop_by_space", "step_reference(")
+"""The palette itself, a key that has another one to the same end, and steps of a live motor."""
+WAYS = ("leave", "goto(", "move", "scroll(", "page", "end(", "group(")
 """Beginnings of the ids of what only moves: found where one is, not on other screens."""
 
 _WORD = re.compile(r"[^\W_]+")
@@ -72,7 +72,7 @@ def find(query: str, screen: str, actions: Sequence[Action] = ACTIONS) -> list[F
 
 
 def _is_left_out(action: Action, words: Sequence[str], *, here: bool) -> bool:
-    if action.id in NOT_FOUND or (not here and (not words or action.id.startswith(WAYS))):
+    if action.id.startswith(NOT_FOUND) or (not here and (not words or action.id.startswith(WAYS))):
         return True
     names = BY_NAME.get(action.id, ())
     return bool(names) and not any(word.casefold().startswith(names) for word in words)

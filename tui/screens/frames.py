@@ -7,7 +7,8 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 
-from tui.bus.line import Frame, Line
+from tui.bus.line import Frame
+from tui.session.console import DriveConsole
 from tui.widgets.drawing import rule, short
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN
@@ -28,9 +29,10 @@ class FramesScreen(PanelScreen):
     TITLE = "Frames"
     LOOK = 0.5
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, console: DriveConsole) -> None:
         super().__init__()
-        self._line = line
+        self.console = console
+        self._line = console.session.line
         self._held: tuple[Frame, ...] | None = None
 
     def compose(self) -> ComposeResult:

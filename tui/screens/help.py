@@ -14,6 +14,7 @@ from textual.screen import ModalScreen
 from tui.widgets.palette import ALARM, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
 from tui.widgets.plain import Plain
 
+from .action import KEY_NAMES
 from .actions import of_screen
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
@@ -54,7 +55,8 @@ def help_text(screen: str) -> Table:
         Text.assemble((f"Keys on {screen.capitalize()}", TITLE), ("   Esc closes", FAINT)),
     )
     for action in of_screen(screen):
-        table.add_row(Text(action.shown, KEY, no_wrap=True), Text(action.help, PLAIN))
+        key = action.shown or KEY_NAMES["ctrl+p"]  # what has no key is in the list of actions
+        table.add_row(Text(key, KEY, no_wrap=True), Text(action.help, PLAIN))
     table.add_row("", "")
     table.add_row("", Text("Signs", TITLE))
     for sign, colour, meaning in SIGNS:

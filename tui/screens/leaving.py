@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING
 from .dialogs.confirm import Confirm
 from .dialogs.leave import Choice, Leave
 from .dialogs.now import MotorsNow
-from .dialogs.question import Question
 from .panel import Panel
 
 if TYPE_CHECKING:
@@ -26,21 +25,25 @@ class Leaving(Panel):
 
     settled: bool
     """Whether it was decided what becomes of motors that run by an order from here."""
+    _asked: Confirm | None = None
+    """The question before leaving, while nothing runs by a command from here."""
 
     async def action_quit(self) -> None:
         """Leave; where a motor runs by a command from here, or a drive trips, not unasked."""
-        if isinstance(self.screen, Question):
-            return  # one question at a time
+        if any(isinstance(screen, Leave) for screen in self.screen_stack):
+            return
         if running := self._motors():
             follows = [self._left_running(running), *self._tripping(running), *self._unfinished()]
-            asked = Leave("\n".join(follows), self._now(running))
+            asked = Leave("\n".join(follows), MotorsNow(self, running))
             self.push_screen(asked, self._leave_motors)
             return
-        question = self._question("Leave the panel?", yes="leaves", no="stays")
-        if question is None:
+        if self._asked in self.screen_stack:
+            return
+        self._asked = self._question("Leave the panel?", yes="leaves", no="stays")
+        if self._asked is None:
             self.exit()
         else:
-            self.push_screen(question, self._leave)
+            self.push_screen(self._asked, self._leave)
 
     def _motors(self) -> list[DriveSession]:
         """Drives commanded from here whose motors do not surely stand."""
@@ -154,16 +157,12 @@ class Leaving(Panel):
             told.insert(0, always)
         if not told:
             return None
-        now = self._now(running)
+        alone = self.fleet.keeper.left_alone() if self.fleet else {}
+        turning = {session.device for session in running} | alone.keys()
+        sessions = self.fleet.sessions if self.fleet else []
+        drives = [session for session in sessions if session.device in turning]
+        now = MotorsNow(self, drives) if drives else None
         return Confirm(question, "\n".join(told), yes=yes, no=no, loses=True, now=now)
-
-    def _now(self, running: Sequence[DriveSession]) -> MotorsNow | None:
-        """What the motors do that are left, and those of drives that act on being left."""
-        if self.fleet is None:
-            return None
-        left = {session.device for session in running} | self.fleet.keeper.left_alone().keys()
-        consoles = [console for console in self.fleet.consoles if console.device in left]
-        return MotorsNow(self, consoles) if consoles else None
 
     def _unfinished(self) -> list[str]:
         """What would be lost of the work on parameters."""

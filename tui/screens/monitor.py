@@ -28,11 +28,11 @@ from tui.widgets.monitor_state import (
     status_lines,
 )
 from tui.widgets.monitor_trends import stacked_trends, trend_lines
-from tui.widgets.monitor_view import View
+from tui.widgets.monitor_view import SPANS, USUAL_SPAN, View
 from tui.widgets.monitor_words import word_lines, word_pages
 
 from .actions import MONITOR, bindings, line_of
-from .orders import OrderKeys
+from .run_keys import RunKeys
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
@@ -51,7 +51,7 @@ WORDS_HEIGHT = 16
 WIDE_MOTOR = 46
 
 
-class MonitorScreen(OrderKeys):
+class MonitorScreen(RunKeys):
     """One drive, watched live; the screen only looks at what the line's worker brought."""
 
     CSS_PATH = "monitor.tcss"
@@ -63,6 +63,7 @@ class MonitorScreen(OrderKeys):
         self.console = console
         self.session = console.session
         self._word = 0
+        self._span = SPANS.index(USUAL_SPAN)
         self._timer: Timer | None = None
         self._still: Timer | None = None
         self._busy: tuple[float, float] | None = None
@@ -169,6 +170,7 @@ class MonitorScreen(OrderKeys):
             control=self.control(now),
             stop=self._stop(now),
             was=self._was,
+            span=SPANS[self._span],
             unseen=not self.console.recorder.seen,
         )
 
@@ -176,9 +178,17 @@ class MonitorScreen(OrderKeys):
         """What a stop of this drive has come to; a good end is told for a while only."""
         fleet = self.app.fleet
         report = fleet.stopper.reports.get(self.session.device) if fleet else None
-        if report is None:
+        if report is None or self._is_overtaken(report):
             return None
         return report if now - report.since < STOP_TOLD.get(report.phase, now) else None
+
+    def _is_overtaken(self, report: StopReport) -> bool:
+        """Whether something newer is true: a later command, or a motor that runs again."""
+        outcome, latest = self.session.work.outcome, self.console.latest
+        if outcome is not None and outcome.time > report.since:
+            return True
+        runs = latest is not None and not latest.error and latest.state.kind == "running"
+        return runs and report.phase is Phase.STOPPED
 
     def _measure_load(self, now: float, busy: float) -> None:
         """Share of the last seconds in which the line was busy."""
@@ -197,9 +207,9 @@ class MonitorScreen(OrderKeys):
         parts = {
             "header": header(view, width),
             "state": state_lines(view, left),
-            "message": message_lines(view, width),
+            "message": self.run_line_lines(view.now, width) or message_lines(view, width),
             "status": status_lines(view, width),
-            "keys": [order_keys(view, line_of(MONITOR, width))],
+            "keys": [order_keys(view, line_of(MONITOR, width, self.app.stops_whom))],
         }
         body = height - (WORDS_HEIGHT if self.wide else 0) - 5
         rest = body - len(parts["state"])
@@ -256,15 +266,16 @@ class MonitorScreen(OrderKeys):
         codes += [parameter.code for parameter in self._words()]
         return list(dict.fromkeys(codes))
 
-    def action_step_drive(self, step: int) -> None:
-        """Another drive of this line."""
-        self.app.step_drive(self.session.device, step)
-
     def action_change_rate(self, step: int) -> None:
         """A faster or slower poll, out of a fixed row of rates."""
         now = PERIODS.index(min(PERIODS, key=lambda p: abs(p - self.app.period)))
         self.app.period = PERIODS[max(0, min(len(PERIODS) - 1, now - step))]
         self.console.monitor.period = self.app.period
+        self.look()
+
+    def action_trend_window(self, step: int) -> None:
+        """A longer or shorter window of the trend."""
+        self._span = max(0, min(len(SPANS) - 1, self._span + step))
         self.look()
 
     def action_next_word(self) -> None:
@@ -297,42 +308,6 @@ class MonitorScreen(OrderKeys):
         )
         asked = Ask("Rated current in A", fault_of_rating, about=about, number=True)
         self.app.push_screen(asked, told)
-
-    def action_faults(self) -> None:
-        """The last trip and the drive's history."""
-        from .faults import FaultsScreen
-
-        self.app.push_screen(FaultsScreen(self.console))
-
-    def action_parameters(self) -> None:
-        """Every parameter of the drive."""
-        from .parameters import ParametersScreen
-
-        self.app.push_screen(ParametersScreen(self.console))
-
-    def action_blocks(self) -> None:
-        """The indirect blocks or the communication scanner of the drive."""
-        from .blocks import BlocksScreen
-
-        self.app.push_screen(BlocksScreen(self.console))
-
-    def action_control_source(self) -> None:
-        """Who commands the drive, and how that is changed."""
-        from .control_source import ControlSourceScreen
-
-        if not self.session.profile.data.control_sources:
-            self._refuse(
-                "The control source of this drive is set at its keypad; t takes the control,"
-                " g gives it back, where it has a word for that."
-            )
-            return
-        self.app.push_screen(ControlSourceScreen(self.console))
-
-    def action_frames(self) -> None:
-        """The frames on the line."""
-        from .frames import FramesScreen
-
-        self.app.push_screen(FramesScreen(self.session.line))
 
 
 def fault_of_rating(text: str) -> str:

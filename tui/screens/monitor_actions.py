@@ -2,45 +2,51 @@
 
 from __future__ import annotations
 
-from .action import MONITOR, on
+from .action import FAULTS, MONITOR, on
 
-HAND_BACK = "Give the control back to the terminals; a run order waiting there counts then."
-EMERGENCY = "Emergency stop with a fault (Altivar 21); needs no arming."
-BRAKE = "Brake by direct current, where the drive has an order for it."
+RUN = "Run forward: opens a line with the reference, Enter runs."
+REVERSE = "Run reverse: opens a line with the reference, Enter runs."
+REFER = "Give a reference in Hz or rpm: opens a line, Enter gives it."
+OPTIONS = "Choose a ramp, preset speed, motor or output; armed, asks."
+QUICK = "Quick stop at once, where the drive has one, else its ramp stop; needs no arming."
+EMERGENCY = "Emergency stop at once, else the quick stop, else the ramp stop; needs no arming."
+COAST = "Let the motor coast; asks, needs no arming. A coasting hoist falls."
+BRAKE = "Brake by direct current, where the drive has that; asks, needs no arming."
+TAKE = "Take the control from the terminals (Leroy-Somer 6.43); armed, locked only, asks."
+HAND_BACK = "Give the control back to the terminals; a run command waiting there counts then; asks."
 TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
-TAKE = "Take the control from the terminals (Leroy-Somer 6.43), locked only."
 
-ORDER_ACTIONS = on(
-    (MONITOR,),
-    ("order('forward')", "r", "run", "Run forward."),
-    ("order('reverse')", "v", "reverse", "Run reverse."),
-    ("reference", "f", "ref", "Type a reference in Hz or rpm."),
-    ("order('reset')", "x", "reset", "Reset a fault; runs nothing."),
-    ("step_reference(1)", "up", "", "Raise the reference by 1 Hz."),
-    ("step_reference(-1)", "down", "", "Lower the reference by 1 Hz."),
-    ("step_reference(5)", "pageup", "", "Raise the reference by 5 Hz."),
-    ("step_reference(-5)", "pagedown", "", "Lower the reference by 5 Hz."),
-    ("options", "o", "", "Choose a ramp, preset speed, motor or output."),
-    ("stop_as('quick-stop')", "k", "", "Quick stop, where the drive has one; needs no arming."),
-    ("stop_as('freewheel')", "z", "", "Let the motor coast; needs no arming."),
-    ("stop_as('emergency-stop')", "e", "", EMERGENCY),
-    ("order('dc-braking')", "b", "", BRAKE),
-    ("order('take-control')", "t", "", TAKE),
-    ("hand_back", "g", "", HAND_BACK),
-    ("take_over", "T", "", TAKE_OVER),
-    ("control_source", "c", "", "See and set up who commands the drive."),
+COMMAND_ACTIONS = (
+    *on(
+        (MONITOR,),
+        ("run_line('forward')", "r", "run", RUN),
+        ("run_line('reverse')", "v", "reverse", REVERSE),
+        ("run_line('reference')", "f", "ref", REFER),
+    ),
+    *on((MONITOR, FAULTS), ("reset", "x", "reset", "Reset a fault; armed, asks. Runs nothing.")),
+    *on(
+        (MONITOR,),
+        ("step_reference(1)", "up", "", "Raise the reference by 1 Hz, at most to HSP; armed."),
+        ("step_reference(-1)", "down", "", "Lower the reference by 1 Hz, at most to LSP; armed."),
+        ("step_reference(5)", "pageup", "", "Raise the reference by 5 Hz; armed."),
+        ("step_reference(-5)", "pagedown", "", "Lower the reference by 5 Hz; armed."),
+        ("options", "o", "", OPTIONS),
+        ("stop_as('quick-stop')", "k", "", QUICK),
+        ("stop_as('emergency-stop')", "e", "", EMERGENCY),
+        ("ask_stop_as('freewheel')", "z", "", COAST),
+        ("ask_stop_as('dc-braking')", "b", "", BRAKE),
+        ("take_control", "t", "", TAKE),
+        ("hand_back", "g", "", HAND_BACK),
+        ("take_over", "T", "", TAKE_OVER),
+    ),
 )
 WATCH_ACTIONS = on(
     (MONITOR,),
-    ("faults", "h", "", "Faults: the last trip, the drive's history and what it stored."),
-    ("parameters", "3", "", "Parameters of this drive."),
-    ("blocks", "4", "", "Indirect blocks or scanner."),
-    ("leave", "escape,1", "", "Go back to Connection."),
-    ("step_drive(-1)", "[", "", "The drive before on this line."),
-    ("step_drive(1)", "]", "", "The next drive on this line."),
-    ("change_rate(1)", "+,=", "", "Poll twice as fast."),
-    ("change_rate(-1)", "-", "", "Poll half as fast."),
-    ("next_word", "w", "", "Show the next word of bits."),
-    ("rating", "i", "", "Tell the rated current of a drive that gives its current in %."),
-    ("frames", "l", "", "Show the frames on the line."),
+    ("next_word", "tab", "", "Show the next word with all its bits."),
+    ("trend_window(-1)", "<", "", "A shorter window of the trend: 10 s, 60 s, 10 min."),
+    ("trend_window(1)", ">", "", "A longer window of the trend."),
+    ("leave", "escape", "", "Go back to Line."),
+    ("change_rate(1)", "", "", "Poll twice as fast."),
+    ("change_rate(-1)", "", "", "Poll half as fast."),
+    ("rating", "", "", "Tell the rated current of a drive that gives its current in %."),
 )

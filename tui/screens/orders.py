@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from decimal import Decimal
+from functools import partial
 
-from tui.drive.errors import ValueRefused
 from tui.drive.orders import OrderRefused, chart_in_force, interlock
 from tui.drive.schema import CommandOption, OrderId
-from tui.session.reference import parse_reference
 from tui.session.work import Outcome
 from tui.widgets.monitor_view import Control
 
@@ -17,6 +16,21 @@ from .arming import Arming
 SHOWN = 8.0
 SHOWN_REFUSED = 20.0
 """Seconds for which it is shown what became of an order."""
+
+
+STOPS_THAT_ASK = {
+    "freewheel": (
+        "Let the motor coast?",
+        "The output is switched off: nothing brakes the motor, and a hoist falls.",
+        "lets it coast",
+    ),
+    "dc-braking": (
+        "Brake by direct current?",
+        "Direct current heats the motor; it holds no load at standstill.",
+        "brakes it",
+    ),
+}
+"""Question, what follows and the yes of the stops that need no arming but ask."""
 
 
 class OrderKeys(Arming):
@@ -65,111 +79,90 @@ class OrderKeys(Arming):
         if not refused or isinstance(outcome.error, StartOvertaken):
             return
         self._asked = outcome
-        order = self.commander.last_order
-        if order not in ("forward", "reverse"):
+        if (last := self.commander.last_run) is None:
             return
-        from .dialogs.confirm import Confirm
+        order, reference = last
 
-        def told(sure: bool | None) -> None:
-            if sure:
-                starts.unrecorded = True
-                self._give(lambda: self.commander.order(order))
+        def run(stamp: int) -> None:
+            starts.unrecorded = True
+            self.commander.run(order, reference, stamp)
 
-        asked = Confirm(
-            f"Run {order} unrecorded?",
-            str(outcome.error),
-            yes="runs it without a record",
-            no="does not run it",
-            loses=True,
-            now=self.motor_now(),
-        )
-        self.app.push_screen(asked, told)
+        self._ask(f"Run {order} unrecorded?", str(outcome.error), "runs it", "does not run it", run)
 
     def _refuse(self, text: str) -> None:
         self.commander.refuse(text)
         self.look()
 
-    def action_order(self, id: OrderId) -> None:
-        """Give an order to the drive."""
-        self._give(lambda: self.commander.order(id))
+    def action_reset(self) -> None:
+        """Reset a fault, after saying what that needs."""
+        if self._armed_or_told():
+            follows = "The cause must be gone. Nothing runs by itself: command it anew afterwards."
+            work = partial(self.commander.order, "reset")
+            self._ask("Reset the fault?", follows, "resets it", "leaves it", work)
+
+    def action_take_control(self) -> None:
+        """Take the control from the terminals, after saying what that means."""
+        if self._armed_or_told():
+            follows = (
+                "The terminals and the keypad command the drive no longer, their stop included;"
+                " the drive must be locked."
+            )
+            work = partial(self.commander.order, "take-control")
+            self._ask("Take the control?", follows, "takes it", "leaves it", work)
 
     def action_step_reference(self, steps: int) -> None:
-        """Raise or lower the reference by so many Hz."""
-        self._give(lambda: self.commander.step(Decimal(steps)))
+        """Raise or lower the reference by so many Hz; arrows that came at once are one step."""
+        stroke = self.app.stroke
+        if stroke is None or stroke.steps:
+            self._give(lambda: self.commander.step(Decimal(steps)))
 
     def action_hand_back(self) -> None:
         """Give the control back, after saying what may start then."""
-        from .dialogs.confirm import Confirm
-
-        def told(sure: bool | None) -> None:
-            if sure:
-                self._give(lambda: self.commander.order("hand-back"))
-
-        follows = (
-            "This is no stop. Command and reference go back to the terminals or the keypad:"
-            " a run order that waits there starts the motor."
-        )
-        asked = Confirm(
-            "Give the control back?",
-            follows,
-            yes="gives it back",
-            no="keeps it",
-            loses=True,
-            now=self.motor_now(),
-        )
-        self.app.push_screen(asked, told)
+        if self._armed_or_told():
+            follows = (
+                "This is no stop. Command and reference go back to the terminals or the keypad:"
+                " a run command that waits there starts the motor."
+            )
+            work = partial(self.commander.order, "hand-back")
+            self._ask("Give the control back?", follows, "gives it back", "keeps it", work)
 
     def action_stop_as(self, id: OrderId) -> None:
         """Stop the drive in another way than on its ramp; needs no arming."""
         self.app.stop_drive(self.console, id)
         self.look()
 
-    def action_reference(self) -> None:
-        """Type a reference."""
-        from .dialogs.ask import Ask
-
-        def given(text: str | None) -> None:
-            if text:
-                self._give(lambda: self.commander.refer(text))
-
-        profile, latest = self.session.profile, self.console.latest
-        about = "In Hz or rpm: 30, 30.5Hz, 900rpm.\nUp and Down on Monitor change it by 1 Hz."
-
-        def wrong(text: str) -> str:
-            try:
-                parse_reference(profile, text, latest.readings if latest else {})
-            except ValueRefused as refused:
-                return str(refused)
-            return ""
-
-        if self._armed_or_told():
-            asked = Ask(
-                "Reference",
-                wrong,
-                about=about,
-                takes="writes it",
-                number=True,
-                now=self.motor_now(),
-            )
-            self.app.push_screen(asked, given)
+    def action_ask_stop_as(self, id: OrderId) -> None:
+        """Let the motor coast, or brake it, after saying what that means; needs no arming."""
+        charts = self.session.profile.data.charts
+        if not any(order.id == id for chart in charts for order in chart.orders):
+            name = {"freewheel": "let the motor coast", "dc-braking": "brake by direct current"}
+            self._refuse(f"{self.session.profile.name} cannot be told to {name[id]} from here.")
+            return
+        question, follows, yes = STOPS_THAT_ASK[id]
+        stop = partial(self.app.stop_drive, self.console, id)
+        self._ask(question, follows, yes, "does not", lambda _stamp: stop())
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""
         from .dialogs.options import OptionsScreen
 
+        if not self._armed_or_told():
+            return
         raws = self.session.image.raws
         chart = chart_in_force(self.session.profile, raws)
         if chart is None or not chart.options:
             self._refuse("This drive has no options of its commands.")
             return
 
+        stamp = self.session.work.stops
+
         def chosen(choice: tuple[CommandOption, int] | None) -> None:
             if choice is not None:
-                self._give(lambda: self.commander.choose_option(*choice))
+                self._give(lambda: self.commander.choose_option(*choice, stamp))
 
         self.app.push_screen(OptionsScreen(chart.options, raws, self.motor_now()), chosen)
 
-    def _give(self, order: Callable[[], None]) -> None:
+    def _give(self, order: Callable[[], object]) -> None:
         try:
             order()
         except OrderRefused as refused:

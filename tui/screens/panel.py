@@ -11,11 +11,14 @@ from tui.drive.plain import plain
 
 if TYPE_CHECKING:
     from textual.notifications import SeverityLevel
+    from textual.widget import AwaitMount
 
     from tui.drive.schema import OrderId
     from tui.session.console import DriveConsole
+    from tui.session.events import EventLog
     from tui.session.fleet import Fleet
     from tui.session.lines import OpenLine
+    from tui.terminal.stroke import Stroke
     from tui.widgets.clock import Clock
 
 
@@ -31,6 +34,13 @@ class Panel(App[None]):
     opened: OpenLine | None
     fleet: Fleet | None
     """The drives of the open line."""
+    events: EventLog
+    """Everything that was said."""
+
+    @property
+    @abstractmethod
+    def stroke(self) -> Stroke | None:
+        """What is known of the key that has its effect now; None while there is none."""
 
     @abstractmethod
     def follow(self, line: str, device: int) -> None:
@@ -92,6 +102,21 @@ class Panel(App[None]):
     def show_monitor(self, console: DriveConsole) -> None:
         """Show Monitor on a drive."""
 
+    @property
     @abstractmethod
-    def step_drive(self, device: int, step: int) -> None:
-        """Monitor on the next or previous drive found on the line."""
+    def place(self) -> str:
+        """The name of the screen below any dialog."""
+
+    @abstractmethod
+    def action_goto(self, place: str) -> AwaitMount | None:
+        """Show a screen, on the drive that is open."""
+
+    @property
+    @abstractmethod
+    def stops_whom(self) -> str:
+        """The words of the stop key in the line of keys."""
+
+    def tell(self, text: str) -> None:
+        """Say why a key did nothing."""
+        self.events.add("told", text)
+        self.notify(text, timeout=4)

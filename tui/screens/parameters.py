@@ -167,7 +167,3 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
             self.list_again()
         else:
             self.app.pop_screen()
-
-    def action_monitor(self) -> None:
-        """Back to Monitor at once."""
-        self.app.pop_screen()

@@ -1,41 +1,155 @@
-"""The way from any screen to any other, over Connection and Monitor."""
+"""Going from screen to screen: the keys that mean the same on every one of them."""
 
 from __future__ import annotations
 
+import logging
 from typing import TYPE_CHECKING
 
+from textual.screen import Screen
+
 from .action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
+from .panel import Panel
 
 if TYPE_CHECKING:
-    from .panel import Panel
+    from textual.widget import AwaitMount
 
-FROM_MONITOR = {
-    PARAMETERS: "parameters",
-    BLOCKS: "blocks",
-    FAULTS: "faults",
-    FRAMES: "frames",
-    SOURCES: "control_source",
-}
-"""The action of Monitor that leads to a screen."""
-PLACE_OF = {action: screen for screen, action in FROM_MONITOR.items()}
-"""The screen to which an action of Monitor leads."""
+    from tui.session.console import DriveConsole
+
+log = logging.getLogger(__name__)
 
 
-def place(app: Panel) -> str:
-    """The name of the screen on top, as the table of actions has it."""
-    return (app.screen.TITLE or CONNECTION).lower()
+class Places(Panel):
+    """Where the keys 1 to 7 lead, and those that look for the drive or the screen they need."""
+
+    chosen: DriveConsole | None = None
+    """The drive that was opened last on the open line; the stop key means it."""
+
+    @property
+    def place(self) -> str:
+        """The name of the screen below any dialog."""
+        for screen in reversed(self.screen_stack):
+            if not screen.is_modal and screen.TITLE:
+                return str(screen.TITLE).lower()
+        return CONNECTION
+
+    def show_monitor(self, console: DriveConsole) -> None:
+        """Show Monitor on a drive, in place of whatever is above the list of lines."""
+        from .monitor import MonitorScreen
+
+        log.info("watching device %s, %s", console.device, console.session.profile.id)
+        self.chosen = console
+        self._to_base()
+        self.push_screen(MonitorScreen(console))
+
+    def _to_base(self) -> None:
+        """Back to the list of lines, whatever is above it."""
+        while len(self.screen_stack) > 2:
+            self.pop_screen()
+
+    def action_goto(self, place: str) -> AwaitMount | None:
+        """Show a screen, on the drive that is open; awaited, so that the next key is its key."""
+        if place == self.place:
+            return None
+        if place == CONNECTION:
+            self._to_base()
+        elif self.chosen is None:
+            self.tell("No drive is open yet: Enter on a drive of Line opens it.")
+        else:
+            return self.show_place(place, self.chosen)
+        return None
+
+    def show_place(self, place: str, console: DriveConsole) -> AwaitMount | None:
+        """Show a screen of a drive, above its Monitor; whoever needs it there awaits it."""
+        from .monitor import MonitorScreen
+
+        if place == SOURCES and not console.session.profile.data.control_sources:
+            self.tell(
+                "The control source of this drive is set at its keypad; t takes the control,"
+                " g gives it back, where it has a word for that."
+            )
+            return None
+        below = self.screen_stack[2] if len(self.screen_stack) > 2 else None
+        if not isinstance(below, MonitorScreen) or below.console is not console:
+            self.show_monitor(console)
+        while len(self.screen_stack) > 3:
+            self.pop_screen()
+        return self.push_screen(_made(place, console)) if place != MONITOR else None
+
+    def action_step_drive(self, step: int) -> None:
+        """The same screen of the next or previous drive found on the line."""
+        consoles = self.fleet.consoles if self.fleet else []
+        if self.chosen not in consoles:
+            self.tell("No drive is open yet: Enter on a drive of Line opens it.")
+            return
+        if len(consoles) < 2:
+            self.tell("This is the only drive found on the line.")
+            return
+        place = self.place
+        wanted = consoles[(consoles.index(self.chosen) + step) % len(consoles)]
+        if place == CONNECTION:
+            self.chosen = wanted
+            return
+        self.show_monitor(wanted)
+        if place != MONITOR:
+            self.show_place(place, wanted)
+
+    async def action_find(self) -> None:
+        """Into the search for a parameter, from anywhere; what is typed next is searched for."""
+        if shown := self.action_goto(PARAMETERS):
+            await shown
+        if self.chosen is not None:
+            self._ask_screen("action_search")
+
+    def action_messages(self) -> None:
+        """Everything that was said."""
+        from .messages import MessagesScreen
+
+        if not isinstance(self.screen, MessagesScreen):
+            self.push_screen(MessagesScreen())
+
+    def action_save_shown(self) -> None:
+        """Save what the screen shows to a file."""
+        self._ask_screen("action_save_file", "There is nothing to save on this screen.")
+
+    def action_open_file(self) -> None:
+        """Open a file on the screen that can show it."""
+        self._ask_screen("action_load_file", "No file is opened on this screen.")
+
+    async def action_eeprom(self) -> None:
+        """Keep the settings of the open drive in its EEPROM."""
+        if shown := self.action_goto(PARAMETERS):
+            await shown
+        if self.chosen is not None:
+            self._ask_screen("action_save_eeprom")
+
+    def _ask_screen(self, action: str, otherwise: str = "") -> None:
+        """Let the screen on top do what the key means there."""
+        work = getattr(self.screen, action, None)
+        if work is not None:
+            work()
+        elif otherwise:
+            self.tell(otherwise)
 
 
-def go_to(app: Panel, screen: str) -> None:
-    """Go to a screen; from Connection to Monitor of the chosen drive, whatever lies behind it."""
-    if place(app) == screen:
-        return
-    if place(app) == CONNECTION:
-        app.screen.action_watch_chosen()  # type: ignore[attr-defined]
-        return
-    while place(app) not in (MONITOR, CONNECTION) or (
-        screen == CONNECTION and place(app) == MONITOR
-    ):
-        app.pop_screen()
-    if screen in FROM_MONITOR:
-        getattr(app.screen, f"action_{FROM_MONITOR[screen]}")()
+def _made(place: str, console: DriveConsole) -> Screen[None]:
+    """A screen of a drive; each is imported when it is first looked at."""
+    if place == PARAMETERS:
+        from .parameters import ParametersScreen
+
+        return ParametersScreen(console)
+    if place == BLOCKS:
+        from .blocks import BlocksScreen
+
+        return BlocksScreen(console)
+    if place == FAULTS:
+        from .faults import FaultsScreen
+
+        return FaultsScreen(console)
+    if place == SOURCES:
+        from .control_source import ControlSourceScreen
+
+        return ControlSourceScreen(console)
+    assert place == FRAMES
+    from .frames import FramesScreen
+
+    return FramesScreen(console)

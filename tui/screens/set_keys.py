@@ -23,7 +23,7 @@ class SetKeys(ParameterKeys):
 
     # Back up and report
 
-    def action_backup(self) -> None:
+    def action_save_file(self) -> None:
         """Ask for a file, read everything, write it."""
         from tui.drive.parameter_set import dumps
 
@@ -84,30 +84,25 @@ class SetKeys(ParameterKeys):
 
     # Compare
 
-    def action_compare(self) -> None:
-        """Ask for what to compare with."""
-        from .dialogs.ask import Ask
+    def action_load_file(self) -> None:
+        """Choose what to compare with: a file, another drive of the line, the factory settings."""
+        from tui.session.state import state_folder
+
+        from .dialogs.pick_file import PickFile
 
         def told(text: str | None) -> None:
             if text:
                 self.run_worker(self._compare(text), exclusive=True, group="sets")
 
-        about = (
-            "A file of a backup, the address of another drive found on this line, or `factory`."
-            " What it has otherwise is shown; n stages it."
-        )
-        asked = Ask("Compare with", self._nameable, about=about, takes="compares")
-        self.app.push_screen(asked, told)
-
-    def _nameable(self, text: str) -> str:
-        """What is wrong with what was typed, or nothing."""
-        typed = text.strip()
-        if typed.isdecimal():
-            found = self.app.fleet.console(int(typed)) if self.app.fleet else None
-            return "" if found else f"No drive was found at {typed}."
-        if typed.casefold() == "factory" or Path(typed).expanduser().is_file():
-            return ""
-        return f"There is no file {typed}." if typed else "Type a file, an address, or factory."
+        others = [("factory", "the factory settings")]
+        consoles = self.app.fleet.consoles if self.app.fleet else []
+        others += [
+            (str(one.device), f"drive {one.device}, {one.session.profile.name}")
+            for one in consoles
+            if one is not self.console
+        ]
+        question = "Compare with; what it has otherwise can be staged"
+        self.app.push_screen(PickFile(question, others, [Path.cwd(), state_folder()]), told)
 
     async def _compare(self, text: str) -> None:
         editor = self.editor
@@ -131,7 +126,8 @@ class SetKeys(ParameterKeys):
         from tui.drive.set_file import read_set
 
         path = Path(name)
-        self.editor.source = await asyncio.to_thread(lambda: read_set(path.expanduser()))
+        # by its name alone: a long path leaves no room for what is wrong in the file
+        self.editor.source = await asyncio.to_thread(lambda: read_set(path.expanduser(), path.name))
         self.editor.other_label = path.name
 
     async def _compare_drive(self, device: int) -> None:
@@ -162,7 +158,7 @@ class SetKeys(ParameterKeys):
             editor.other = {"": 0}
         writes, skips = plan.count("write"), plan.count("skip")
         self.note(
-            f"{editor.other_label}: {writes} differ and can be staged (n), {plan.count('equal')}"
+            f"{editor.other_label}: {writes} differ and can be staged (i), {plan.count('equal')}"
             f" are equal, {skips} left out."
         )
         self.listed.chosen = "differs"
@@ -171,7 +167,7 @@ class SetKeys(ParameterKeys):
     def action_stage_set(self) -> None:
         """Stage what the set has otherwise; nothing is written."""
         if self.editor.source is None:
-            self.note("Nothing to stage from: o chooses a file or another drive.")
+            self.note("Nothing to stage from: Ctrl+O chooses a file or another drive.")
             return
         self.run_worker(self._stage_set(), exclusive=True, group="sets")
 

@@ -93,8 +93,19 @@ class StageKeys(ParameterKeys):
         self.app.push_screen(asked, told)
 
     def action_undo(self) -> None:
+        """Take the last edit back; where nothing is staged, stage what was held before a write."""
+        if len(self.editor.edits.asked):
+            self.editor.undo(self.editor.edits.asked[-1].code)
+        else:
+            self.note(self.editor.stage_old())
+        self.list_again()
+
+    def action_undo_this(self) -> None:
         """Take the edit under the cursor back."""
-        self.editor.undo(self.listed.code)
+        if self.listed.code in self.editor.edits:
+            self.editor.undo(self.listed.code)
+        else:
+            self.note("This parameter is not staged.")
         self.list_again()
 
     def action_undo_all(self) -> None:

@@ -19,7 +19,6 @@ class WriteKeys(ParameterKeys):
 
     def action_write(self, *, only: str = "") -> None:
         """Say what will be written, and write it."""
-        from .dialogs.confirm import Confirm
         from .write_text import write_text
 
         edits = [e for e in self.editor.edits if not only or e.code == only]
@@ -29,22 +28,13 @@ class WriteKeys(ParameterKeys):
         if not self._armed_or_told():
             return
 
-        def told(sure: bool | None) -> None:
-            if sure and self._armed_or_told():
-                self.remark = ""
-                self.editor.apply((only,) if only else ())
-                self.look()
+        def work(stamp: int) -> None:
+            self.remark = ""
+            self.editor.apply((only,) if only else (), stamp)
 
         many = f"{len(edits)} parameters" if len(edits) > 1 else "1 parameter"
-        asked = Confirm(
-            f"Write {only or many}?",
-            write_text(self.editor, edits),
-            yes="writes, each read back",
-            no="writes nothing",
-            loses=True,
-            now=self.motor_now(),
-        )
-        self.app.push_screen(asked, told)
+        yes, no = "writes, each read back", "writes nothing"
+        self._ask(f"Write {only or many}?", write_text(self.editor, edits), yes, no, work)
 
     def action_write_one(self) -> None:
         """Write the edit under the cursor."""
@@ -53,7 +43,7 @@ class WriteKeys(ParameterKeys):
         else:
             self.note("This parameter is not staged.")
 
-    def action_save(self) -> None:
+    def action_save_eeprom(self) -> None:
         """Copy to EEPROM, after saying what happens."""
         from tui.drive.memory_orders import save_order
 
@@ -66,32 +56,15 @@ class WriteKeys(ParameterKeys):
         self._memory("Recall the factory settings?", factory_order, self.editor.factory)
 
     def _memory(
-        self, question: str, order_of: Callable[[Profile], MemoryOrder], work: Callable[[], None]
+        self, question: str, order_of: Callable[[Profile], MemoryOrder], work: Callable[[int], None]
     ) -> None:
-        from .dialogs.confirm import Confirm
-
         try:
             order = order_of(self.session.profile)
         except DriveError as refused:
             self.note(str(refused))
             return
-        if not self._armed_or_told():
-            return
-
-        def told(sure: bool | None) -> None:
-            if sure and self._armed_or_told():
-                work()
-                self.look()
-
-        asked = Confirm(
-            question,
-            order.does,
-            yes="does it",
-            no="leaves all as it is",
-            loses=True,
-            now=self.motor_now(),
-        )
-        self.app.push_screen(asked, told)
+        if self._armed_or_told():
+            self._ask(question, order.does, "does it", "leaves all as it is", work)
 
     def offer_to_follow(self) -> None:
         """Ask once whether to go where the drive answers now."""
@@ -110,13 +83,12 @@ class WriteKeys(ParameterKeys):
                 self.app.follow(moved.line, moved.device)
 
         # the line is opened anew as this drive wants it: others on it are not asked meanwhile
-        found = self.app.fleet.consoles if self.app.fleet else ()
         asked = Confirm(
             "Follow the drive?",
             moved.text,
             yes="follows it",
             no="stays",
-            loses=len(found) > 1,
+            loses=len(self.app.fleet.sessions if self.app.fleet else ()) > 1,
             now=self.motor_now(),
         )
         self.app.push_screen(asked, told)

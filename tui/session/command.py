@@ -37,7 +37,7 @@ from .journal import Journal
 from .reader import Reader
 from .readings import Reading
 from .recording import NothingToTakeOver, record_start
-from .reference import Reference, parse_reference, reference_codes
+from .reference import Reference, parse_reference, reference_codes, within_limits
 from .work import Kind, Outcome, Permit, Task
 from .writing import Writer
 
@@ -62,10 +62,11 @@ class Commander:
     def __init__(self, session: DriveSession, journal: Journal) -> None:
         self.session = session
         self.journal = journal
-        self.last_order: OrderId | None = None
-        """The command that was given last."""
+        self.last_run: tuple[OrderId, str | None] | None = None
+        """The run command that was given last, with its reference."""
         self._wanted: Reference | None = None
         self._written: dict[str, int] = {}
+        self._written_under = 0
         self._lock = threading.Lock()
         self._steps = Decimal(0)
         self._stepping = False
@@ -113,8 +114,15 @@ class Commander:
 
     def order(self, id: OrderId, stamp: int | None = None) -> None:
         """Give a command. Raises OrderRefused when the drive is not armed."""
-        self.last_order = id
         self._begin(lambda do: do.carry_out(id), stamp)
+
+    def run(self, id: OrderId, reference: str | None = None, stamp: int | None = None) -> None:
+        """Run forward or reverse at a reference as typed, or at the one that stands.
+
+        Raises OrderRefused when the drive is not armed.
+        """
+        self.last_run = (id, reference)
+        self._begin(lambda do: do.run(id, reference), stamp)
 
     def refer(self, text: str, stamp: int | None = None) -> None:
         """Give a reference as typed: 30, 30Hz, 900rpm. Raises OrderRefused when not armed."""
@@ -165,16 +173,23 @@ class Commander:
         self._begin(work, stamp)
 
     def lost_orders(self) -> str:
-        """What the drive no longer holds of what was written from here, or nothing."""
+        """What the drive no longer holds of what was written from here, or nothing.
+
+        Nothing behind a stop from here, which wrote another word itself.
+        """
+        if self._written_under != self.session.work.stops:
+            return ""
+        lost = self.changed_words()
+        return f"Reset, switched off or commanded by others: {lost}." if lost else ""
+
+    def changed_words(self) -> str:
+        """The command words that the drive holds otherwise than they were written from here."""
         known = self.session.image.raws
-        lost = [
+        return ", ".join(
             f"{code} 16#{raw:04X} is now 16#{known[code] & 0xFFFF:04X}"
             for code, raw in self._written.items()
             if code in known and known[code] & 0xFFFF != raw
-        ]
-        if not lost:
-            return ""
-        return f"Reset, switched off or commanded by others: {', '.join(lost)}."
+        )
 
     def refuse(self, text: str) -> None:
         """Tell why a command was not given."""
@@ -213,7 +228,7 @@ class Commander:
 
     def note_command(self, code: str, word: int) -> None:
         """A command word was written: it is watched from now on."""
-        self._written = {code: word}
+        self._written, self._written_under = {code: word}, self.session.work.stops
         self.session.followed = (code,)
 
     def note_option(self, code: str, word: int) -> None:
@@ -247,10 +262,19 @@ class _Commands:
         if refused := interlock(chart, id, raws):
             raise OrderRefused(refused)
         if id in ("forward", "reverse"):
-            return await self._run(chart, id)
+            return await self._start(chart, id)
         order = choose(chart, id, raws)
         await self._send(chart, order)
         return f"{order.name}: {await self._reached(chart)}"
+
+    async def run(self, id: OrderId, reference: str | None) -> str:
+        """Reference and run command in one, once nothing speaks against the command."""
+        chart = await self._chart()
+        if refused := interlock(chart, id, self._raws()):
+            raise OrderRefused(refused)
+        if reference is not None:
+            await self.refer(reference)
+        return await self._start(chart, id)
 
     async def _chart(self) -> Chart:
         """The chart in force, with every word read anew that an order depends on."""
@@ -272,7 +296,7 @@ class _Commands:
     def _raws(self) -> Mapping[str, int]:
         return self.session.image.raws
 
-    async def _run(self, chart: Chart, id: OrderId) -> str:
+    async def _start(self, chart: Chart, id: OrderId) -> str:
         """Reference first, then the way through the chart to the running state."""
         same = [order for order in chart.orders if order.id == id]
         if not same:
@@ -405,7 +429,7 @@ class _Commands:
         reading = readings.get(parameter.code) if parameter else None
         if reading is None or reading.value is None or reading.value.number is None:
             raise OrderRefused(f"Where {profile.name} takes its reference is not known.")
-        number = max(Decimal(0), reading.value.number + hertz)
+        number = within_limits(profile, reading.value.number + hertz, readings)
         return await self._give(parse_reference(profile, f"{number:f}Hz", readings))
 
     async def _give(self, reference: Reference) -> str:

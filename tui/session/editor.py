@@ -261,6 +261,19 @@ class Editor:
         self.results.pop(code, None)
         self.version += 1
 
+    def stage_old(self) -> str:
+        """Stage what the drive held before the last write; says what was staged."""
+        done = [result.edit for result in self.results.values() if result.done]
+        olds = [(edit.code, edit.old) for edit in done if edit.old is not None]
+        staged = 0
+        for code, old in olds:
+            with suppress(ValueRefused):
+                self.stage_raw(code, old)
+                staged += 1
+        if not olds:
+            return "Nothing is staged, and nothing was written lately."
+        return f"{staged} old values are staged; w writes them."
+
     def undo_all(self) -> None:
         """Take every edit back."""
         self.edits, self.results = Edits(), {}

@@ -8,6 +8,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from types import MappingProxyType
 
 from tui.bus.line import Line
@@ -15,11 +16,13 @@ from tui.drive.schema import OrderId
 
 from .console import DriveConsole
 from .drive import DriveSession
+from .events import EventLog
 from .identify import DriveIdentity
 from .journal import Journal
 from .keeper import Keeper
 from .recording import StartKeeper
 from .stop import Stopper
+from .work import Kind, Outcome
 
 Stamp = Mapping[int, int]
 """The count of stops of each drive when something was typed."""
@@ -43,13 +46,21 @@ class FoundDrive:
 class Fleet:
     """The drives of one line, with what looks after them and stops them."""
 
-    def __init__(self, line: Line, journal: Journal, starts: StartKeeper | None = None) -> None:
+    def __init__(
+        self,
+        line: Line,
+        journal: Journal,
+        starts: StartKeeper | None = None,
+        events: EventLog | None = None,
+    ) -> None:
         self.line = line
         self.journal = journal
         self.starts = starts
         """Where starts of motors are put on record; None where none are."""
         self.keeper = Keeper(line)
-        self.stopper = Stopper(line, journal)
+        self.events = events or EventLog()
+        """What was said about the drives."""
+        self.stopper = Stopper(line, journal, self.events)
         self._lock = threading.Lock()
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})
 
@@ -89,6 +100,7 @@ class Fleet:
             self._put(FoundDrive(identity or session.known_identity, before, guessed))
             return before
         session.starts = self.starts
+        session.work.on_tell = partial(self._note_outcome, session.device)
         console = DriveConsole(session, self.journal)
         said = identity or session.known_identity
         self._put(FoundDrive(said, console, guessed))
@@ -100,6 +112,10 @@ class Fleet:
             look = threading.Thread(target=self.starts.look, args=(session,), daemon=True)
             look.start()
         return console
+
+    def _note_outcome(self, device: int, outcome: Outcome) -> None:
+        if outcome.kind is not Kind.WORKING:
+            self.events.add(outcome.kind, outcome.text, device)
 
     def _put(self, drive: FoundDrive) -> None:
         with self._lock:

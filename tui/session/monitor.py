@@ -36,7 +36,7 @@ STALE_LEAST = 1.5
 """Seconds for which a snapshot counts however fast the cycles are."""
 SLOW_FACTOR = 10
 """Cycles of the fast values to one of the slow ones."""
-TREND_SECONDS = 300.0
+TREND_SECONDS = 600.0
 TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 SHORTEST_PERIOD = 0.05
 RESET_NEAR = frozenset({"fault", "starting", "unknown"})

@@ -63,6 +63,15 @@ def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]
     return Reference(parameter, conversion.raw, f"{shown:f} {parameter.unit}", conversion.rounded)
 
 
+def within_limits(profile: Profile, hertz: Decimal, readings: Mapping[str, Reading]) -> Decimal:
+    """A stepped reference in Hz, at most to the limits LSP..HSP (LL..UL) that are known."""
+    low, high, most = (_number(profile, quantity, readings) for quantity in LIMITS)
+    for limit in (high, most):
+        if limit:
+            hertz = min(hertz, limit)
+    return max(hertz, low or Decimal(0))
+
+
 def _check_limits(profile: Profile, hertz: Decimal, readings: Mapping[str, Reading]) -> None:
     low, high, most = (_number(profile, quantity, readings) for quantity in LIMITS)
     upper: tuple[tuple[Quantity, Decimal | None], ...] = (

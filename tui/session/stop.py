@@ -23,6 +23,7 @@ from tui.drive.orders import (
     chart_in_force,
     choose,
     last_word,
+    nearest_stop,
     stop_conditions,
     stop_in_any,
     target,
@@ -32,6 +33,7 @@ from tui.drive.schema import Chart, Order, OrderId
 from tui.drive.values import from_words
 
 from .drive import DriveSession
+from .events import EventLog
 from .image import Raw
 from .journal import Journal
 from .limits import limits_of
@@ -107,8 +109,9 @@ class StopSummary:
 class Stopper:
     """Stops drives of one line; `stop` may be called from any thread and returns at once."""
 
-    def __init__(self, line: Line, journal: Journal) -> None:
+    def __init__(self, line: Line, journal: Journal, events: EventLog | None = None) -> None:
         self._line = line
+        self._events = events
         self._journal = journal
         self._reports: dict[int, StopReport] = {}
         self._workers: dict[int, Worker] = {}
@@ -155,6 +158,9 @@ class Stopper:
         report = StopReport(session.device, phase, text, ordered, since)
         self._reports = {**self._reports, session.device: report}
         if not same:
+            if self._events is not None:
+                kind = "failed" if phase is Phase.FAILED else "stop"
+                self._events.add(kind, f"{phase.capitalize()}: {text}", session.device)
             log.info("stop of device %s: %s, %s", session.device, phase, text)
 
     async def _broadcast(self, sessions: list[DriveSession], order: OrderId) -> None:
@@ -219,12 +225,15 @@ class _Stop:
     order: OrderId
     ordered: float
     say: Say
+    wanted: OrderId = field(init=False)
+    """The way to stop that was asked for."""
     reader: Reader = field(init=False)
     held: dict[str, Raw] = field(default_factory=dict)
     """What command words held before they were written here: option bits are kept from it."""
 
     def __post_init__(self) -> None:
         self.reader = Reader(self.session)
+        self.wanted = self.order
 
     async def carry_out(self) -> str | None:
         """Choose, send and follow; returns why the motor does not stop, or nothing."""
@@ -240,6 +249,7 @@ class _Stop:
             await self._read_anew(deciding)
             chart = chart_in_force(profile, self._sure(deciding))
             if chart is not None:
+                self.order = nearest_stop(chart, self.order)
                 await self._read_anew(stop_conditions(chart, self.order))
         except ExchangeError as failure:
             # blind: by the word that stops whatever the drive is in
@@ -293,7 +303,7 @@ class _Stop:
         while (now := time.monotonic()) - self.ordered < SEEN_FOR:
             kind, hertz = await self._motion(chart)
             if not hertz and kind in STANDING:
-                self.say(self.session, Phase.STOPPED, "stopped", self.ordered)
+                self.say(self.session, Phase.STOPPED, f"stopped{self._instead()}", self.ordered)
                 self.session.stir()
                 return None
             if hertz == 0 and kind == "running" and ending is not None:
@@ -307,9 +317,17 @@ class _Stop:
                 return self._why_not(hertz)
             before = hertz
             speed = f", {hertz:g} Hz" if hertz else ""
-            self.say(self.session, Phase.STOPPING, f"{order.name}{speed}", self.ordered)
+            text = f"{order.name}{speed}{self._instead()}"
+            self.say(self.session, Phase.STOPPING, text, self.ordered)
             await asyncio.sleep(LOOK)
         return "it still turns after a minute."
+
+    def _instead(self) -> str:
+        """Which way to stop the drive lacks, where another took its place."""
+        if self.order == self.wanted:
+            return ""
+        wanted, way = self.wanted.replace("-", " "), self.order.replace("-", " ")
+        return f" (it has no {wanted}: {'ramp stop' if way == 'stop' else way})"
 
     def _why_not(self, hertz: float | None) -> str:
         """What still enables a drive that does not obey."""

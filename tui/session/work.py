@@ -104,6 +104,8 @@ class WorkQueue:
         """How many stops this drive was given from here."""
         self.stopped_by = ""
         """Who gave the last one."""
+        self.on_tell: Callable[[Outcome], None] = lambda _: None
+        """Called, in any thread, with each outcome that is told."""
         self.on_change: Callable[[], None] = lambda: None
         """Called in the line's thread when a task has ended: the drive may hold other values."""
         self._line = line
@@ -119,7 +121,8 @@ class WorkQueue:
 
     def tell(self, kind: Kind, text: str, error: Exception | None = None) -> None:
         """Say what work on the drive has come to."""
-        self.outcome = Outcome(kind, text, time.monotonic(), error)
+        self.outcome = outcome = Outcome(kind, text, time.monotonic(), error)
+        self.on_tell(outcome)
 
     # Work
 

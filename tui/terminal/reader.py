@@ -26,6 +26,9 @@ class Stops(Protocol):
     def stop_stamp(self) -> object:
         """Another object after every stop."""
 
+    def sequence_swallowed(self, data: bytes) -> None:
+        """A sequence came that no known terminal sends; it did nothing."""
+
 
 @dataclass(frozen=True, slots=True)
 class Pressed:
@@ -53,7 +56,10 @@ class KeyReader:
 
     def read(self, data: bytes, now: float, stamp: object = None) -> list[Read]:
         """Bytes that were read at this time, when the app's stamp of stops was this."""
-        return self._sorted(self._tokens.feed(self._decode(data), now, stamp), now)
+        tokens = self._tokens.feed(self._decode(data), now, stamp)
+        if not tokens and self._tokens.pending is None and data.startswith(b"\x1b"):
+            self._stops.sequence_swallowed(data)
+        return self._sorted(tokens, now)
 
     def tick(self, now: float) -> list[Read]:
         """What is known by this time because nothing more was read."""

@@ -248,7 +248,7 @@ def word_lines(desk: MappingDesk, words: UserWords, width: int) -> list[Text]:
         style = FAINT if shown == NOT_AVAILABLE else PLAIN
         text.append(f"{shown:<{max(0, room - len(name) - 1)}}", style)
     text.truncate(width, overflow="ellipsis")
-    return [rule("User words", width, "m"), text]
+    return [rule("User words", width), text]
 
 
 def stretch_lines(desk: MappingDesk, found: Sequence[Stretch], width: int, room: int) -> list[Text]:

@@ -31,7 +31,7 @@ def order_keys(view: View, keys: Sequence[Key]) -> Text:
     """The line of keys: stop first; orders that cannot work now are dim."""
 
     def styles(action: str) -> tuple[Style, Style]:
-        if not action.startswith(("order", "reference")):
+        if not action.startswith(("reset", "run_line")):
             return key_styles(action)
         return (ATTENTION, STRONG) if works_now(view, action) else (FAINT, FAINT)
 
@@ -42,6 +42,6 @@ def works_now(view: View, action: str) -> bool:
     """Whether an order can work now, as far as is known without asking the drive."""
     if view.control.armed_for is None or view.lost or view.snapshot is None:
         return False
-    if action == "order('reset')":
+    if action == "reset":
         return view.snapshot.state.kind == "fault"
-    return not view.control.no_effect or action == "reference"
+    return not view.control.no_effect or action == "run_line('reference')"

@@ -161,7 +161,7 @@ def _messages(view: View, width: int) -> list[Text]:
         fault = state.fault
         cause = fault.cause or "The profile gives no cause; see the drive's manual."
         remedy = f" Do: {fault.remedy}" if fault.remedy else ""
-        more = "   h: what happened before" if view.unseen else ""
+        more = "   5: what happened before" if view.unseen else ""
         return [
             Text(cut(f"FAULT {fault.code} ({fault.raw}) {fault.name}{more}", width), FAULT),
             Text(cut(cause + remedy, width), PLAIN),

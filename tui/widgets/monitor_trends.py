@@ -10,13 +10,11 @@ from tui.drive.schema import Parameter, Quantity
 from tui.session.monitor import STALE_CYCLES
 
 from .drawing import cut, rule, trend
-from .monitor_view import View, end_of
+from .monitor_view import USUAL_SPAN, View, end_of
 from .palette import (
     FAINT,
     LINE,
 )
-
-TREND_SPAN = 60.0
 
 
 def stacked_trends(view: View, width: int, height: int) -> list[Text]:
@@ -54,10 +52,16 @@ def _trend(
         return [rule(title, width), off, *[Text(" " * width)] * (height - 2)]
     high = _trend_high(view, parameter, index)
     columns = width - 1
-    step = TREND_SPAN / columns
+    step = view.span / columns
     rows = trend(_columns(view, index, columns, step), high or 1.0, columns, height - 1)
     span = f"0..{high:g} {parameter.unit}" if high else "no values yet"
-    lines = [rule(title, width, span + (", 60 s" if width > 30 else ""))]
+    lines = [
+        rule(
+            title,
+            width,
+            span + (f", {span_text(view.span)}" if width > 30 or view.span != USUAL_SPAN else ""),
+        )
+    ]
     return lines + [Text.assemble(("│", LINE), row) for row in rows]
 
 
@@ -73,6 +77,11 @@ def _trend_high(view: View, parameter: Parameter, index: int) -> float | None:
     if not seen:
         return None
     return next((top for top in ROUND_TOPS if top >= max(seen)), max(seen))
+
+
+def span_text(seconds: float) -> str:
+    """A window of the trend as a person reads it."""
+    return f"{seconds:g} s" if seconds < 120 else f"{seconds / 60:g} min"
 
 
 ROUND_TOPS: Sequence[float] = (1, 2, 5, 10, 20, 50, 60, 100, 200, 500, 1000, 2000, 5000, 10000)

@@ -14,6 +14,10 @@ from tui.session.readings import Reading
 from tui.session.stop import StopReport
 from tui.session.work import Outcome
 
+USUAL_SPAN = 60.0
+SPANS = (10.0, USUAL_SPAN, 600.0)
+"""Windows of the trend in seconds."""
+
 
 @dataclass(frozen=True, slots=True)
 class Control:
@@ -60,6 +64,8 @@ class View:
     """What became of a stop that was ordered lately."""
     was: str = ""
     """What the drive did when it was last known."""
+    span: float = USUAL_SPAN
+    """Seconds that the trend shows."""
     unseen: bool = False
     """Whether the drive has tripped and nobody has said that he saw it."""
 

@@ -2,46 +2,73 @@
 
 Textual hands each key to the screen of that moment; a key that the screen does not take itself
 comes back to the app's queue, behind those that were typed since. Without this the 30 of a
-quickly typed `f30` would be keys of the screen below.
+quickly typed `f30` would be keys of the screen below. Whether a key may do anything is asked when
+its turn comes: a stop voids those that still wait.
 """
 
 from __future__ import annotations
 
 import asyncio
 from collections import deque
+from collections.abc import Callable
 from contextlib import suppress
 
 from textual.app import App
 from textual.dom import DOMNode
-from textual.events import Key
+from textual.events import Key, Paste
 from textual.message_pump import MessagePump
+
+from .stroke import Stroke, stroke_of
 
 LONGEST = 0.3
 """Seconds that a key waits at most for the one before."""
 
+Typed = Key | Paste
 
-class KeysInTurn:
+
+class TypeAhead:
     """Lets the app take a key only when the one before has had its whole effect."""
 
-    def __init__(self, app: App[None]) -> None:
+    def __init__(self, app: App[None], admits: Callable[[Typed], bool]) -> None:
         self._app = app
-        self._waiting: deque[Key] = deque()
-        self._taken: Key | None = None
+        self._admits = admits
+        self._waiting: deque[Typed] = deque()
+        self._taken: Typed | None = None
         self._task: asyncio.Task[None] | None = None
 
-    def admit(self, key: Key) -> bool:
-        """Whether the app may take this key now; another one comes again in its turn."""
-        if self._taken is not None and key is not self._taken:
-            self._waiting.append(key)
+    @property
+    def stroke(self) -> Stroke | None:
+        """The stroke of the key that has its effect now; None while there is none."""
+        return stroke_of(self._taken) if self._taken is not None else None
+
+    def admit(self, typed: Typed) -> bool:
+        """Whether the app may take this key now; one that must wait comes again in its turn."""
+        if self._taken is not None and typed is not self._taken:
+            if not self._repeats_the_last(typed):
+                self._waiting.append(typed)
             return False
-        self._taken = key
+        self._taken = typed
+        if not self._admits(typed):
+            self._call_next()
+            return False
         self._task = asyncio.create_task(self._next())
         return True
+
+    def _repeats_the_last(self, typed: Typed) -> bool:
+        """Whether it is a held key that waits already: it is to end with the key."""
+        last = self._waiting[-1] if self._waiting else None
+        if not isinstance(typed, Key) or not isinstance(last, Key) or typed.key != last.key:
+            return False
+        strokes = stroke_of(typed), stroke_of(last)
+        return all(stroke is not None and stroke.held for stroke in strokes)
 
     async def _next(self) -> None:
         with suppress(TimeoutError):
             async with asyncio.timeout(LONGEST):
                 await self._worked_off()
+        self._call_next()
+
+    def _call_next(self) -> None:
         self._taken = self._waiting.popleft() if self._waiting else None
         if self._taken is not None:
             self._app.post_message(self._taken)

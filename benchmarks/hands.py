@@ -1,0 +1,193 @@
+"""What a person's hands, a paste and a hung link do to a motor, counted on the wire.
+
+    python -m benchmarks.hands [--bursts N] [--keys N] [--seed N]
+
+The panel runs on a pseudo-terminal with one simulated Altivar 71 on Monitor, over a relay that
+keeps every write. First bursts: the drive is armed, sometimes with the run line open or the motor
+running, and a random piece of keys with one stop key in it arrives in one read or cut at random
+places, as after a link that hung. Then keys: random ones, alone and in pieces, with the drive not
+armed. Counted is every write that is no stop; each must be 0.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import random
+import time
+from dataclasses import asdict, dataclass
+
+from rich.console import Console
+from rich.table import Table
+
+from tests.line.pty_panel import COMMAND, PtyPanel, Write, panel_on_a_pty
+
+REFERENCE = 8502
+"""Register of the reference LFR."""
+STOPS = (b" ", b"\x1b[24~", b"\x1b[20~")
+"""Space, F12 and F9 as terminals send them."""
+KEYS = [bytes([code]) for code in range(33, 127) if code != ord("q")]
+"""Without q, which leaves a panel whose motor stands, and ends the count."""
+KEYS += [b"\r", b"\t", b"\x7f", b"\x1b[A", b"\x1b[B", b"\x1b[5~", b"\x1b[6~", b"\x1b", b"\x1bOP"]
+QUIET = 0.15
+"""Seconds after a piece in which whatever it does has been sent."""
+AWAY = 0.12
+"""Longest pause inside a piece that a link cuts, in s."""
+STOP_WORDS = {7, 2, 0, 0x010F}
+"""What may go into the command word of an Altivar 71 unasked: only words that stop."""
+
+
+@dataclass(slots=True)
+class Counted:
+    """What went out."""
+
+    pieces: int = 0
+    keys: int = 0
+    stops: int = 0
+    runs_after_stop: int = 0
+    references_after_stop: int = 0
+    other_writes: int = 0
+    still_armed: int = 0
+    stopless: int = 0
+    """Stop keys that no stop frame followed."""
+
+
+def is_stop(write: Write) -> bool:
+    """Whether a write can only stop the motor."""
+    return write.register == COMMAND and write.words[0] in STOP_WORDS
+
+
+def settle(panel: PtyPanel, seconds: float = QUIET) -> None:
+    """Take what the panel draws until nothing of a piece is under way any more."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        panel.look(0.02)
+
+
+def home(panel: PtyPanel) -> None:
+    """Back on Monitor, whatever a piece has opened."""
+    for key in (b"\x1b", b"\x1b", b"\x1b", b"2"):
+        panel.type(key)
+        settle(panel, 0.4)
+    panel.shows("Motor", "State")
+
+
+def arm(panel: PtyPanel) -> None:
+    """Arm the drive; a piece may have opened another screen or a field before."""
+    for _ in range(10):
+        settle(panel)
+        if panel.armed:
+            return
+        panel.type(b"a")
+        settle(panel, 0.3)
+        if not panel.armed:
+            home(panel)
+    raise SystemExit(f"the drive cannot be armed:\n{panel.text()}")
+
+
+def send(panel: PtyPanel, chance: random.Random, keys: list[bytes]) -> None:
+    """The keys in one write, or cut at random places with pauses between."""
+    data = b"".join(keys)
+    cuts = sorted(chance.sample(range(len(data) + 1), chance.randint(0, min(3, len(data)))))
+    parts = [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True) if a < b]
+    for part in parts:
+        panel.type(part)
+        if chance.random() < 0.5:
+            time.sleep(chance.random() * AWAY)
+
+
+def bursts(panel: PtyPanel, chance: random.Random, count: int, counted: Counted) -> None:
+    """Pieces with a stop in each, on an armed drive."""
+    for number in range(count):
+        if number % 20 == 0:
+            home(panel)
+        arm(panel)
+        if chance.random() < 0.3:
+            panel.type(b"r")
+            settle(panel)
+            if chance.random() < 0.5:
+                settle(panel, 0.35)
+                panel.type(b"\r")
+                settle(panel, 0.3)
+        before_keys = chance.choices(KEYS, k=chance.randint(1, 6))
+        after_keys = chance.choices(KEYS, k=chance.randint(0, 4))
+        stop = chance.choice(STOPS)
+        before = len(panel.log.writes)
+        send(panel, chance, [*before_keys, stop])
+        settle(panel)
+        sent = panel.log.writes[before:]
+        counted.pieces += 1
+        counted.keys += len(before_keys) + 1
+        at = next((i for i, write in enumerate(sent) if is_stop(write)), None)
+        counted.stopless += at is None
+        counted.stops += sum(map(is_stop, sent))
+        _count(sent[at or 0 :], counted)
+        counted.still_armed += not _disarmed(panel)
+        if after_keys:
+            mark = len(panel.log.writes)
+            send(panel, chance, after_keys)
+            settle(panel)
+            _count(panel.log.writes[mark:], counted)
+            counted.keys += len(after_keys)
+
+
+def _disarmed(panel: PtyPanel) -> bool:
+    """Whether the screen says within a second that the drive is not armed."""
+    end = time.monotonic() + 1.0
+    while panel.armed and time.monotonic() < end:
+        panel.look(0.02)
+    return not panel.armed
+
+
+def unarmed(panel: PtyPanel, chance: random.Random, count: int, counted: Counted) -> None:
+    """Random keys without arming."""
+    keys = [key for key in KEYS if key != b"a"]
+    home(panel)
+    left = count
+    while left > 0:
+        size = min(left, chance.choice((1, 1, 1, 2, 5, 20, 100)))
+        before = len(panel.log.writes)
+        panel.type(b"".join(chance.choices([*keys, b" "], k=size)))
+        settle(panel, 0.08)
+        sent = panel.log.writes[before:]
+        counted.pieces += 1
+        counted.keys += size
+        counted.stops += sum(map(is_stop, sent))
+        _count(sent, counted)
+        left -= size
+
+
+def _count(sent: list[Write], counted: Counted) -> None:
+    for write in sent:
+        if is_stop(write):
+            continue
+        if write.register == COMMAND:
+            counted.runs_after_stop += 1
+        elif write.register == REFERENCE:
+            counted.references_after_stop += 1
+        else:
+            counted.other_writes += 1
+
+
+def main() -> None:
+    """Count, and print a table and a JSON object."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--bursts", type=int, default=1000)
+    parser.add_argument("--keys", type=int, default=10_000)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    chance = random.Random(arguments.seed)
+    found = {"bursts with a stop": Counted(), "keys, not armed": Counted()}
+    with panel_on_a_pty() as panel:
+        bursts(panel, chance, arguments.bursts, found["bursts with a stop"])
+    with panel_on_a_pty() as panel:
+        unarmed(panel, chance, arguments.keys, found["keys, not armed"])
+    table = Table("", *(name.replace("_", " ") for name in asdict(Counted())))
+    for name, counted in found.items():
+        table.add_row(name, *(str(number) for number in asdict(counted).values()))
+    Console().print(table)
+    print(json.dumps({name: asdict(counted) for name, counted in found.items()}))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,38 @@
+"""The first start on a terminal offers to try F12, and says what arrived."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+
+from .terminal import Terminal
+
+Start = Callable[[list[str]], Terminal]
+PANEL = [sys.executable, "-m", "tui"]
+
+
+def test_f12_is_tried_once_while_no_line_is_open(
+    terminal_with: Start, second_terminal: Start
+) -> None:
+    terminal = terminal_with(PANEL)
+    terminal.wait_for("First start on this terminal", "press F12")
+    terminal.press("F12")
+    terminal.wait_for("F12 arrived")
+    again = second_terminal(PANEL)
+    again.wait_for("Choose a line and press Enter")
+    assert "First start" not in again.text()
+
+
+def test_a_key_that_no_terminal_is_known_to_send_is_told_of(terminal_with: Start) -> None:
+    terminal = terminal_with(PANEL)
+    terminal.wait_for("press F12")
+    # as raw bytes: a sequence of nobody
+    terminal.run("send-keys", "-H", "1b", "5b", "39", "39", "39", "7e")
+    terminal.wait_for("does not know", "ESC [999~")
+
+
+def test_with_a_line_f12_is_not_asked_for(terminal_with: Start) -> None:
+    """It would stop motors that run."""
+    terminal = terminal_with([*PANEL, "sim:atv71@2"])
+    terminal.wait_for("ATV71", "1 found")
+    assert "press F12" not in terminal.text()

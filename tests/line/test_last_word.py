@@ -1,0 +1,246 @@
+"""A stop is the last word: keys of a person, of a paste and of a link that hung, on the wire."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+
+import pytest
+
+from benchmarks.hands import Counted, bursts, unarmed
+from tests.programs import wait_until
+
+from .pty_panel import LINE_SETTLED, PtyPanel, Write, panel_on_a_pty
+from .test_hands import RANDOM_KEYS
+
+F12, F9 = "\x1b[24~", "\x1b[20~"
+PAUSES = (0.02, 0.06, 0.2, 0.5)
+"""Seconds between two parts of a paste: one piece, two pieces, longer than a question settles."""
+
+
+@pytest.fixture(scope="module")
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PtyPanel]:
+    """A panel on Monitor, for several tests; each leaves it there, its motor at rest."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
+            patch.setenv(name, str(tmp_path_factory.mktemp(name.lower())))
+        with panel_on_a_pty() as made:
+            yield made
+
+
+@pytest.fixture
+def fresh_panel() -> Iterator[PtyPanel]:
+    """A panel on Monitor, for one test."""
+    with panel_on_a_pty() as made:
+        yield made
+
+
+def at_rest(panel: PtyPanel) -> None:
+    """See the motor stand, as it must behind a stop."""
+    wait_until(lambda: panel.simulation.drive(1).motor.frequency == 0, "the motor stands")
+
+
+@pytest.mark.parametrize("typed", ["\r ", " \r", f"30\r{F12}", "5 ", "\x1b[A ", f"\r{F9}\r", "r "])
+@pytest.mark.parametrize("key", ["r", "v", "f"])
+def test_a_stop_in_a_piece_closes_the_open_line(panel: PtyPanel, key: str, typed: str) -> None:
+    panel.open_line(key)
+    before = len(panel.log.writes)
+    panel.type(typed)
+    panel.stopped(before)
+    assert " at  " not in panel.text().splitlines()[-4]
+
+
+@pytest.mark.parametrize("stop", [" ", F12, F9])
+def test_enter_behind_a_stop_runs_nothing(panel: PtyPanel, stop: str) -> None:
+    panel.open_line()
+    before = len(panel.log.writes)
+    panel.type(stop)
+    panel.settle(0.1)
+    panel.type("\r")
+    panel.stopped(before)
+
+
+@pytest.mark.parametrize("typed", ["\r", "30\r", "r30\r", "ar30\r"])
+def test_no_run_comes_of_a_piece(panel: PtyPanel, typed: str) -> None:
+    panel.open_line()
+    before = len(panel.log.writes)
+    panel.type(f"5{typed}")
+    panel.settle(LINE_SETTLED)
+    assert panel.log.writes[before:] == []
+    panel.type(" ")
+    panel.stopped(before)
+
+
+@pytest.mark.parametrize(
+    "typed", ["r ", "r\r ", "\x1b[A\x1b[Ar ", "ar ", f"30\r{F12}", f"f40\r{F9}"]
+)
+def test_keys_that_a_hung_link_kept_only_stop_a_running_motor(panel: PtyPanel, typed: str) -> None:
+    panel.run()
+    before = len(panel.log.writes)
+    panel.type(typed)
+    panel.stopped(before)
+    at_rest(panel)
+
+
+def test_keys_before_a_stop_in_the_next_read_do_nothing_behind_it(panel: PtyPanel) -> None:
+    for key in ("r", "\x1b[A", "x", "o", "T", "v"):
+        panel.arm()
+        before = len(panel.log.writes)
+        panel.type(key, " ", apart=0.01)
+        panel.stopped(before)
+
+
+PASTES = ["bar", "cd /var/run && ./fork.sh --verbose 30 a r\r", "r30\r", "arf30\ryy\r"]
+
+
+@pytest.mark.parametrize("armed", [True, False], ids=["armed", "unarmed"])
+@pytest.mark.parametrize("text", PASTES)
+def test_a_paste_without_brackets_that_is_cut_anywhere_only_stops(
+    panel: PtyPanel, text: str, armed: bool
+) -> None:
+    chance = random.Random(text)
+    cuts = sorted(chance.sample(range(1, len(text)), min(6, len(text) - 1)))
+    for cut in cuts:
+        panel.type(F12)  # whatever the paste before has opened or armed
+        panel.settle(0.2)
+        if armed:
+            panel.arm()
+        before = len(panel.log.writes)
+        panel.type(text[:cut], text[cut:], apart=chance.choice(PAUSES))
+        panel.settle(LINE_SETTLED)
+        panel.stops(before)
+        leave_questions(panel)
+
+
+@pytest.mark.parametrize("armed", [True, False], ids=["armed", "unarmed"])
+def test_random_keys_at_once_that_are_cut_anywhere_only_stop(panel: PtyPanel, armed: bool) -> None:
+    chance = random.Random(armed)
+    for _ in range(4):
+        if armed:
+            panel.arm()
+        keys = b"".join(chance.choices([*RANDOM_KEYS, b" "], k=300))
+        cut = chance.randrange(len(keys))
+        before = len(panel.log.writes)
+        panel.type(keys[:cut], keys[cut:], apart=chance.choice(PAUSES))
+        panel.settle(LINE_SETTLED)
+        panel.type(F12)
+        panel.stopped(before, seconds=1.0)
+        leave_questions(panel)
+
+
+def leave_questions(panel: PtyPanel) -> None:
+    """Back to Monitor, out of whatever keys have opened."""
+    for key in ("\x1b", "\x1b", "2"):
+        panel.type(key)
+        panel.settle(0.3)
+    panel.shows("device 1", "State")
+
+
+def test_keys_two_seconds_apart_on_a_link_that_hangs_are_a_message(panel: PtyPanel) -> None:
+    before = len(panel.log.writes)
+    panel.type("arrv")  # typed 2 s apart, let through at once
+    panel.shows("4 keys came at once and were not")
+    panel.settle()
+    assert panel.log.writes[before:] == []
+    assert not panel.armed
+
+
+def stage_a_ramp(panel: PtyPanel) -> None:
+    """Stage another ACC on Parameters."""
+    panel.type("3")
+    panel.shows("/ search")
+    panel.type("/")
+    panel.settle(0.3)
+    panel.type("ACC")
+    panel.settle(0.3)
+    panel.type("\r")
+    panel.settle(0.3)
+    panel.type("+")
+    panel.shows("w write")
+
+
+@pytest.mark.parametrize("key", ["q", "n", "\x1b", "\r", " ", "wy"])
+def test_only_y_writes_a_parameter(fresh_panel: PtyPanel, key: str) -> None:
+    panel = fresh_panel
+    stage_a_ramp(panel)
+    panel.arm()
+    panel.settle(0.2)
+    panel.type("w")
+    panel.shows("Write 1 parameter")
+    panel.settle(LINE_SETTLED)
+    before = len(panel.log.writes)
+    panel.type(key)
+    if key == " ":
+        panel.stopped(before)
+    panel.settle()
+    panel.stops(before)
+
+
+def test_y_alone_writes_a_parameter(fresh_panel: PtyPanel) -> None:
+    panel = fresh_panel
+    stage_a_ramp(panel)
+    panel.arm()
+    panel.settle(0.2)
+    panel.type("w")
+    panel.shows("Write 1 parameter")
+    panel.settle(LINE_SETTLED)
+    panel.type("y")
+    wait_until(lambda: panel.look() and Write(1, 9001, (31,)) in panel.log.writes, "the write")
+
+
+@pytest.mark.parametrize("key", ["q", "n", "\x1b", "\r", " "])
+def test_only_y_recalls_the_factory_settings(fresh_panel: PtyPanel, key: str) -> None:
+    panel = fresh_panel
+    panel.type("3")
+    panel.shows("/ search")
+    panel.type("a")
+    wait_until(lambda: panel.armed, "armed")
+    panel.type("F")
+    panel.shows("factory settings?")
+    panel.settle(LINE_SETTLED)
+    before = len(panel.log.writes)
+    panel.type(key)
+    if key == " ":
+        panel.stopped(before)
+    panel.settle()
+    panel.stops(before)
+
+
+def test_space_stops_while_a_number_is_typed(fresh_panel: PtyPanel) -> None:
+    panel = fresh_panel
+    panel.run()
+    panel.type("3")
+    panel.shows("/ search")
+    panel.type("/")
+    panel.settle(0.3)
+    panel.type("ACC")
+    panel.settle(0.3)
+    panel.type("\r")
+    panel.settle(0.3)
+    panel.type("\r")
+    panel.settle(0.4)
+    panel.type("4x")
+    panel.shows("4x")
+    before = len(panel.log.writes)
+    panel.type(" ")
+    wait_until(lambda: panel.look() and panel.stops(before) > 0, "the stop")
+    at_rest(panel)
+    panel.stops(before)
+
+
+def test_bursts_with_a_stop_run_nothing_behind_it(fresh_panel: PtyPanel) -> None:
+    counted = Counted()
+    bursts(fresh_panel, random.Random(7), 60, counted)
+    assert (counted.pieces, counted.stopless) == (60, 0)
+    assert counted.still_armed == 0
+    moved = counted.runs_after_stop, counted.references_after_stop, counted.other_writes
+    assert moved == (0, 0, 0)
+
+
+def test_random_keys_write_nothing_unarmed(fresh_panel: PtyPanel) -> None:
+    counted = Counted()
+    unarmed(fresh_panel, random.Random(8), 1000, counted)
+    assert counted.keys == 1000
+    moved = counted.runs_after_stop, counted.references_after_stop, counted.other_writes
+    assert moved == (0, 0, 0)
+    assert fresh_panel.look(), "the panel has ended"

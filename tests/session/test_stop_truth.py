@@ -1,0 +1,104 @@
+"""A stop that a drive lacks, what takes its place, and what is said of it afterwards."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+
+from tui.drive import library
+from tui.drive.orders import nearest_stop
+from tui.drive.schema import OrderId
+from tui.session.events import EventLog
+
+from .test_owners import bench, until
+from .test_stop import FAMILIES
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("way", ["emergency-stop", "quick-stop", "stop"])
+def test_what_takes_the_place_of_a_stop_never_coasts_nor_brakes(family: str, way: OrderId) -> None:
+    for chart in library.load(family).data.charts:
+        if not chart.orders:
+            continue
+        found = nearest_stop(chart, way)
+        assert found in {order.id for order in chart.orders}
+        assert found in ("emergency-stop", "quick-stop", "stop")
+
+
+def test_what_coasts_is_never_put_in_place_of_another() -> None:
+    chart = library.load("varmeca").data.charts[0]
+    assert nearest_stop(chart, "freewheel") == "freewheel"
+    assert nearest_stop(chart, "dc-braking") == "dc-braking"
+
+
+async def test_an_emergency_stop_that_a_drive_lacks_becomes_its_quick_stop_and_says_so() -> None:
+    async with bench("atv71", run_hz=20.0) as here:
+        await until(lambda: here.drive.motor.frequency > 10)
+        here.fleet.stop([here.session], "emergency-stop")
+        await until(lambda: here.fleet.stopper.reports[1].phase in ("stopped", "failed"))
+        report = here.fleet.stopper.reports[1]
+        assert report.phase == "stopped"
+        assert "no emergency stop: quick stop" in report.text
+        assert (8501, 0x0002) in here.writes()
+
+
+async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
+    async with bench("atv71") as here:
+        commander = here.console.commander
+        commander.arm()
+        commander.run("forward", "20Hz")
+        await until(lambda: here.drive.motor.frequency > 5)
+        await until(lambda: not here.session.work.busy)
+        here.fleet.stop([here.session])
+        await until(lambda: here.fleet.stopper.reports[1].phase == "stopped")
+        here.session.stir()
+        await until(lambda: here.session.image.raws.get("CMD") == 7)
+        assert commander.lost_orders() == ""
+
+
+async def test_another_programs_stop_is_told_with_the_word() -> None:
+    async with bench("atv71") as here:
+        commander = here.console.commander
+        commander.arm()
+        commander.run("forward", "20Hz")
+        await until(lambda: here.drive.motor.frequency > 5)
+        await until(lambda: not here.session.work.busy)
+        here.drive.set("CMD", 7)
+        here.session.stir()
+        await until(lambda: here.session.image.raws.get("CMD") == 7)
+        assert "CMD 16#000F is now 16#0007" in commander.lost_orders()
+
+
+@pytest.mark.parametrize(("steps", "ends"), [(40, 500), (-90, 0)])
+async def test_a_step_past_a_limit_goes_to_the_limit(steps: int, ends: int) -> None:
+    """40 held Up wrote nothing once the sum lay above HSP."""
+    async with bench("atv71", sets={"HSP": 500, "LSP": 0}) as here:
+        commander = here.console.commander
+        commander.arm()
+        commander.refer("30Hz")
+        await until(lambda: here.drive.raw("LFR") == 300)
+        commander.step(Decimal(steps))
+        await until(lambda: here.drive.raw("LFR") == ends)
+
+
+async def test_a_run_that_the_interlock_refuses_writes_no_reference() -> None:
+    async with bench("atv71", sets={"FR1": 1, "LFR": 0}) as here:
+        commander = here.console.commander
+        commander.arm()
+        commander.run("forward", "20Hz")
+        await until(lambda: here.session.work.outcome is not None)
+        assert here.session.work.outcome is not None
+        assert here.session.work.outcome.kind == "refused"
+        assert here.writes() == []
+
+
+def test_the_log_of_events_keeps_each_once_and_the_last_ones() -> None:
+    log = EventLog(lambda: 5.0)
+    for _ in range(3):
+        log.add("done", "written", 2)
+    assert [(e.wall, e.device, e.text) for e in log.events] == [(5.0, 2, "written")]
+    for number in range(600):
+        log.add("done", str(number))
+    assert len(log.events) == 500
+    assert log.events[-1].text == "599"

@@ -1,0 +1,281 @@
+"""Which keys an app takes: alone, of a piece, held, before a stop, into a text."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import ClassVar
+
+import pytest
+from textual import events
+from textual.app import App, ComposeResult
+from textual.binding import Binding
+from textual.pilot import Pilot
+from textual.screen import ModalScreen
+from textual.widgets import Input, Static
+
+from tests.ui.test_flows import until
+from tui.terminal.admission import LATE, Admission
+from tui.terminal.fields import takes_space, takes_text
+from tui.terminal.stroke import Stroke, attach
+from tui.terminal.type_ahead import TypeAhead
+
+
+class Line(Static, can_focus=True):
+    """A line that keys are typed into, of a widget that Textual does not know."""
+
+    takes_text = True
+    takes_space = False
+    typed = ""
+
+    def on_key(self, event: events.Key) -> None:
+        self.typed += event.character or f"<{event.key}>"
+        event.stop()
+
+
+class Question(ModalScreen[None]):
+    """A dialog with a text, which takes a while to come."""
+
+    AUTO_FOCUS = "Input"
+
+    def compose(self) -> ComposeResult:
+        yield Input(id="answer")
+
+
+class Panel(App[None]):
+    """Takes keys as the panel does, and notes what they did."""
+
+    AUTO_FOCUS = None
+    BINDINGS: ClassVar = [
+        Binding("r", "act('run')"),
+        Binding("enter", "act('enter')"),
+        Binding("y", "act('yes')"),
+        Binding("escape", "act('escape')"),
+        Binding("up", "act('up')"),
+        Binding("f", "ask"),
+        Binding("s", "slow"),
+    ]
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.stops = 0
+        self.done: list[str] = []
+        self.strokes: list[Stroke | None] = []
+        self.not_taken: list[int] = []
+        self.late = 0
+        self.submitted: list[str] = []
+        self.typed = TypeAhead(self, Admission(self, self).admits)
+
+    def compose(self) -> ComposeResult:
+        yield Input(id="text")
+        yield Input(id="number", type="integer")
+        yield Line("", id="line")
+
+    async def on_event(self, event: events.Event) -> None:
+        ours = isinstance(event, events.Key | events.Paste) and not event.is_forwarded
+        if ours and not self.typed.admit(event):  # type: ignore[arg-type]
+            return
+        await super().on_event(event)
+
+    def stop_stamp(self) -> object:
+        return self.stops
+
+    def keys_not_taken(self, count: int, *, late: bool = False) -> None:
+        self.not_taken.append(count)
+        self.late += late
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        self.submitted.append(event.value)
+
+    def action_act(self, name: str) -> None:
+        self.done.append(name)
+        self.strokes.append(self.typed.stroke)
+
+    def action_ask(self) -> None:
+        self.push_screen(Question())
+
+    async def action_slow(self) -> None:
+        self.done.append("slow")
+        await asyncio.sleep(0.1)
+
+    def send(self, *keys: str, stroke: Stroke | None = None) -> None:
+        """Keys as the driver brings them."""
+        for key in keys:
+            event = events.Key(key, key if len(key) == 1 else None)
+            attach(event, stroke or Stroke(time.monotonic(), self.stops))
+            self.post_message(event)
+
+
+def piece(count: int = 9, stamp: object = 0, *, steps: bool = False) -> Stroke:
+    return Stroke(time.monotonic(), stamp, alone=False, steps=steps, piece=count)
+
+
+async def quiet(pilot: Pilot[None], app: Panel) -> None:
+    """Wait until every key had its effect."""
+    await until(pilot, lambda: app.typed.stroke is None)
+    await pilot.pause()
+
+
+async def test_a_key_alone_acts_and_one_of_a_piece_does_not() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send("r")
+        await until(pilot, lambda: app.done == ["run"])
+        app.send("r", "enter", "y", "escape", stroke=piece())
+        await until(pilot, lambda: app.not_taken == [4])
+        assert app.done == ["run"]
+        app.send("r", stroke=Stroke(time.monotonic(), 0, alone=False, held=True))
+        await until(pilot, lambda: app.done == ["run", "run"])
+
+
+async def test_each_piece_is_told_of_once() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send(*"rrr", stroke=piece())
+        await until(pilot, lambda: app.not_taken == [3])
+        app.send(*"rr", stroke=piece())
+        await until(pilot, lambda: app.not_taken == [3, 2])
+
+
+async def test_a_piece_writes_text_and_moves_its_cursor_but_never_submits() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        field = app.query_one("#text", Input)
+        field.focus()
+        app.send(*"abr", "backspace", "left", "c", "enter", "escape", "ctrl+k", stroke=piece())
+        await until(pilot, lambda: app.not_taken == [3])
+        assert field.value == "acb"
+        assert app.submitted == []
+        app.send("enter")
+        await until(pilot, lambda: app.submitted == ["acb"])
+        assert app.done == []
+
+
+async def test_a_widget_says_for_itself_that_it_takes_text() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        line = app.query_one(Line)
+        line.focus()
+        app.send(*"30", "left", "enter", stroke=piece())
+        await until(pilot, lambda: app.not_taken == [1])
+        assert line.typed == "30<left>"
+
+
+async def test_an_arrow_of_a_piece_comes_through_and_tells_what_it_is() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send("up", stroke=piece(steps=True))
+        app.send("up", stroke=piece())
+        await until(pilot, lambda: app.done == ["up", "up"])
+        assert [stroke and stroke.steps for stroke in app.strokes] == [True, False]
+        assert app.not_taken == []
+        await quiet(pilot, app)
+        assert app.typed.stroke is None
+
+
+async def test_what_waits_behind_a_key_when_a_stop_comes_is_void() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send("s", "r", "enter")
+        await until(pilot, lambda: app.done == ["slow"])
+        app.stops += 1
+        app.send("y")
+        await until(pilot, lambda: "yes" in app.done)
+        await quiet(pilot, app)
+        assert app.done == ["slow", "yes"]
+        assert app.not_taken == []
+
+
+async def test_a_key_that_comes_after_a_stop_but_was_read_before_it_is_void() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.stops = 3
+        app.send("r", stroke=Stroke(time.monotonic(), 2))
+        app.send("y", stroke=Stroke(time.monotonic(), 3))
+        await until(pilot, lambda: app.done == ["yes"])
+        assert [stroke and stroke.stamp for stroke in app.strokes] == [3]
+
+
+async def test_a_key_that_no_terminal_sent_is_alone_and_of_now() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.stops = 7
+        await pilot.press("r")
+        (stroke,) = app.strokes
+        assert stroke is not None
+        assert (stroke.alone, stroke.stamp, stroke.piece) == (True, 7, 1)
+
+
+async def test_a_held_key_ends_with_the_key_however_slow_the_app_is() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send("s")
+        app.send(*["up"] * 50, stroke=Stroke(time.monotonic(), 0, alone=False, held=True))
+        await until(pilot, lambda: app.done == ["slow", "up"])
+        await quiet(pilot, app)
+        assert app.done == ["slow", "up"]
+
+
+async def test_a_key_that_waited_long_does_no_more_than_one_of_a_piece() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        before = Stroke(time.monotonic() - LATE - 0.1, 0)
+        app.send("r", "up", stroke=before)
+        await until(pilot, lambda: app.not_taken == [1])
+        assert app.late == 1
+        assert app.done == ["up"]
+        assert [stroke and stroke.steps for stroke in app.strokes] == [False]
+        app.query_one("#text").focus()
+        app.send("r", stroke=before)
+        await until(pilot, lambda: app.query_one("#text", Input).value == "r")
+
+
+async def test_what_is_typed_ahead_goes_into_the_dialog() -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.send("f", *"30")
+        await until(pilot, lambda: isinstance(app.screen, Question))
+        answer = app.screen.query_one(Input)
+        await until(pilot, lambda: answer.value == "30")
+
+
+@pytest.mark.parametrize(
+    ("focus", "value"), [("#text", "run"), ("#number", ""), ("#line", ""), (None, "")]
+)
+async def test_a_paste_goes_into_a_text_and_does_nothing_else(
+    focus: str | None, value: str
+) -> None:
+    app = Panel()
+    async with app.run_test() as pilot:
+        app.set_focus(app.query_one(focus) if focus else None)
+        app.post_message(events.Paste("run\r\nr\n"))
+        app.send("y" if focus is None else "f12")
+        await pilot.pause()
+        await quiet(pilot, app)
+        assert app.query_one("#text", Input).value == value
+        assert app.submitted == []
+        assert app.done in ([], ["yes"])
+
+
+@pytest.mark.parametrize(
+    ("widget", "text", "space"),
+    [
+        (Input(), True, True),
+        (Input(type="integer"), True, False),
+        (Input(type="number"), True, False),
+        (Line(), True, False),
+        (Static(), False, False),
+        (None, False, False),
+    ],
+    ids=lambda value: type(value).__name__,
+)
+def test_what_a_field_takes(widget: Input | Static | None, text: bool, space: bool) -> None:
+    assert (takes_text(widget), takes_space(widget)) == (text, space)
+
+
+def test_a_text_field_may_say_that_it_takes_no_space() -> None:
+    class Reference(Input):
+        takes_space = False
+
+    assert takes_text(Reference())
+    assert not takes_space(Reference())

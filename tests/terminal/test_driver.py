@@ -1,0 +1,151 @@
+"""The driver: what it writes, when it takes bytes to have come, and where it reads no keys."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from threading import Event
+from typing import Any
+
+import pytest
+from textual import events
+from textual.driver import Driver
+from textual.message import Message
+
+from tui.terminal import driver as module
+from tui.terminal.driver import NO_REPORTS, with_own_keys
+from tui.terminal.reader import KeyReader, Pressed
+
+
+class Stops:
+    """An app that takes every stop key."""
+
+    def __init__(self, *, mouse: bool = False) -> None:
+        self.mouse = mouse
+        self.taken: list[str] = []
+
+    def take_stop_key(self, key: str) -> bool:
+        if key not in ("space", "f12", "f9"):
+            return False
+        self.taken.append(key)
+        return True
+
+    def sequence_swallowed(self, data: bytes) -> None:
+        """No test of these looks at it."""
+
+    def stop_stamp(self) -> object:
+        return len(self.taken)
+
+
+class OtherDriver(Driver):
+    """A driver of another system, whose keys Textual reads itself."""
+
+    def __init__(self, app: Any, **settings: Any) -> None:
+        super().__init__(app, **settings)
+        self.mouse_asked = self._mouse
+        self.written: list[str] = []
+        self.passed: list[Message] = []
+
+    def write(self, data: str) -> None:
+        self.written.append(data)
+
+    def send_message(self, message: Message) -> None:
+        self.passed.append(message)
+
+    def start_application_mode(self) -> None: ...
+
+    def disable_input(self) -> None: ...
+
+    def stop_application_mode(self) -> None: ...
+
+
+def made(app: Stops, **settings: Any) -> Any:
+    async def make() -> Any:
+        return with_own_keys(OtherDriver)(app, **settings)  # type: ignore[arg-type]
+
+    return asyncio.run(make())
+
+
+ASKED = ["\x1b[?25l", "\x1b[?1004h", "\x1b[>25u", "\x1b]22;text\x07", "\x1b[1;1Htext", "\x1b[<u"]
+
+
+def test_without_mouse_less_is_asked_of_the_terminal() -> None:
+    driver = made(Stops())
+    for data in ASKED:
+        driver.write(data)
+    assert driver.written == ["\x1b[?25l", NO_REPORTS, "\x1b[1;1Htext"]
+    assert not driver.mouse_asked
+
+
+def test_with_mouse_all_is_asked_as_textual_does() -> None:
+    driver = made(Stops(mouse=True))
+    for data in ASKED:
+        driver.write(data)
+    assert driver.written == ASKED
+    assert driver.mouse_asked
+    assert not made(Stops(mouse=True), mouse=False).mouse_asked
+
+
+def test_where_textual_reads_the_keys_stop_keys_are_taken_early_all_the_same() -> None:
+    driver = made(stops := Stops())
+    for key in ("r", "f12", "space", "f9", "f1"):
+        driver.process_message(events.Key(key, None))
+    assert stops.taken == ["f12", "space", "f9"]
+    assert [message.key for message in driver.passed] == ["r", "f1"]
+
+
+class Late:
+    """A selector in a thread that was kept waiting; time passes in it alone."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+        self.sleeps = 0.0
+
+    def select(self, _wait: float) -> list[object]:
+        self.now += self.sleeps
+        return [object()]
+
+    def monotonic(self) -> float:
+        return self.now
+
+
+@pytest.mark.parametrize(("sleeps", "alone"), [(0.03, False), (0.3, False)])
+def test_bytes_that_a_busy_thread_finds_late_are_not_taken_for_late_keys(
+    sleeps: float, alone: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    late, ends = Late(), os.pipe()
+    monkeypatch.setattr("tui.terminal.driver.time.monotonic", late.monotonic)
+    driver: Any = type("Fake", (), {"fileno": ends[0], "exit_event": Event(), "_app": Stops()})()
+    keys = KeyReader(driver._app)
+
+    def look() -> list[Any]:
+        return module._look(driver, late, keys)  # type: ignore[arg-type]
+
+    try:
+        os.write(ends[1], b"r")
+        assert look() == []
+        late.sleeps = sleeps
+        os.write(ends[1], b"\r")
+        found = [*look(), *keys.tick(late.now + 1)]
+    finally:
+        for end in ends:
+            os.close(end)
+    assert [one.stroke.alone for one in found if isinstance(one, Pressed)] == [alone] * 2
+
+
+def test_a_stop_that_falls_between_bytes_and_stamp_voids_them(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    stops = Stops()
+    driver: Any = type("Fake", (), {"fileno": 0, "exit_event": Event(), "_app": stops})()
+    keys = KeyReader(stops)
+
+    def read(_file: int, _count: int) -> bytes:
+        stops.taken.append("by somebody else")
+        return b"r"
+
+    monkeypatch.setattr("tui.terminal.driver.os.read", read)
+    module._look(driver, Late(), keys)  # type: ignore[arg-type]
+    (pressed,) = keys.tick(float("inf"))
+    assert isinstance(pressed, Pressed)
+    assert pressed.stroke.stamp != stops.stop_stamp()

@@ -1,0 +1,234 @@
+"""One key, one meaning: the table of actions has no clash, and no letter writes by itself."""
+
+from __future__ import annotations
+
+import string
+from collections import defaultdict
+from dataclasses import replace
+
+import pytest
+from textual.events import Key
+from textual.screen import ModalScreen
+from textual.widgets import Input
+
+from tui.drive import library
+from tui.screens.action import Action
+from tui.screens.actions import ACTIONS, CONNECTION, EVERYWHERE, PLACES, elsewhere, line_of
+from tui.widgets.monitor_orders import order_keys
+from tui.widgets.monitor_view import Control
+from tui.widgets.palette import ATTENTION
+
+from . import fakes
+from .test_command_flows import Bench, bench, writes
+from .test_flows import shown, until
+from .test_places import view_of
+
+CURSOR = "it moves what has a cursor; on Monitor that is the reference, which is armed or asks"
+GENERIC = {
+    "enter": "go in: open, edit, choose; what it writes on Control asks with y",
+    "escape": "go out: back, close, end the search",
+    "tab": "the next part of the screen: word, group, table",
+    "shift+tab": "the part before",
+    "up": CURSOR,
+    "down": CURSOR,
+    "left": CURSOR,
+    "right": CURSOR,
+    "pageup": CURSOR,
+    "pagedown": CURSOR,
+    "home": "the first of a list",
+    "end": "the last of a list",
+    "+": "one more, or one further, of what is staged or proposed; writes nothing",
+    "-": "one less, or one back, of what is staged or proposed; writes nothing",
+    "delete": "what is under the cursor goes from what is staged or proposed; writes nothing",
+    "u": "what is staged or proposed last goes; writes nothing",
+    "U": "all that is staged or proposed goes; writes nothing",
+    "w": "write all that is staged or proposed; armed, asks with y",
+}
+"""Keys that do alike on alike things: why each may have an action on each screen."""
+AT_ONCE = {"k": "quick-stop", "e": "emergency-stop"}
+"""Letters that write at once: stops, which need no arming and wait for nothing."""
+LETTERS = [*"wW", *(key for key in string.ascii_letters if key not in "kewWuU"), *"uU"]
+"""Every other letter; those that write come first, those that drop what waits come last."""
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+def meanings() -> dict[str, set[str]]:
+    """By key, the actions that it has over all screens."""
+    found: dict[str, set[str]] = defaultdict(set)
+    for action in ACTIONS:
+        for key in filter(None, action.keys.split(",")):
+            found[key].add(action.id)
+    return found
+
+
+def test_a_key_means_one_thing_on_every_screen() -> None:
+    clashes = {key: ids for key, ids in meanings().items() if len(ids) > 1 and key not in GENERIC}
+    assert clashes == {}
+
+
+def test_no_generic_key_is_excused_that_needs_it_no_more() -> None:
+    used = {key for key, ids in meanings().items()}
+    assert set(GENERIC) <= used
+
+
+@pytest.mark.parametrize("screen", EVERYWHERE)
+def test_a_key_has_one_action_on_a_screen(screen: str) -> None:
+    keys = [
+        key
+        for action in ACTIONS
+        if screen in action.screens
+        for key in action.keys.split(",")
+        if key
+    ]
+    assert len(keys) == len(set(keys))
+
+
+def test_a_key_of_every_screen_is_none_of_a_single_one() -> None:
+    everywhere = {key for a in ACTIONS if a.app for key in a.keys.split(",")}
+    single = {key for a in ACTIONS if not a.app for key in a.keys.split(",") if key}
+    assert everywhere & single == set()
+    assert {a.screens for a in ACTIONS if a.app} == {EVERYWHERE}
+
+
+def test_letters_that_stop_at_once_are_stops() -> None:
+    assert {*LETTERS, *AT_ONCE} == set(string.ascii_letters)
+    found = {a.keys: a.id for a in ACTIONS if a.keys in AT_ONCE}
+    assert found == {key: f"stop_as('{order}')" for key, order in AT_ONCE.items()}
+
+
+# A key without a meaning on a screen
+
+
+def test_where_a_key_has_a_meaning() -> None:
+    assert elsewhere(CONNECTION, "r").startswith("r has a meaning on Monitor (2): Run forward")
+    assert elsewhere("frames", "V").startswith("V has a meaning on Scanner and blocks (4)")
+    assert elsewhere("monitor", "asterisk", "*").startswith("* has a meaning on Parameters (3)")
+    assert elsewhere("parameters", "less_than_sign", "<").startswith("< has a meaning on Monitor")
+    assert elsewhere("monitor", "r") == ""
+    assert elsewhere("monitor", "p") == ""
+    assert elsewhere("monitor", "j", "j") == ""
+
+
+KEY_OF = {name: key for name, key, _ in PLACES}
+
+
+@pytest.mark.parametrize("screen", KEY_OF)
+async def test_a_key_without_a_meaning_says_where_it_has_one_and_does_nothing(screen: str) -> None:
+    async with bench("atv71") as made:
+        await made.armed()
+        await made.pilot.press(KEY_OF[screen])
+        await until(made.pilot, lambda: made.app.place == screen)
+        here = {key for a in ACTIONS if screen in a.screens for key in a.keys.split(",")}
+        strange: dict[str, Action] = {}
+        for action in ACTIONS:
+            for key in action.keys.split(","):
+                if len(key) == 1 and key not in here:
+                    strange.setdefault(key, action)
+        assert strange
+        stack, before = list(made.app.screen_stack), writes(made.app)
+        for key, action in strange.items():
+            made.app.clear_notifications()
+            if screen == CONNECTION:
+                made.app.connection.drives.focus()  # in a field it is text
+            await made.pilot.press(key)
+            told = f"{action.shown} has a meaning on"
+            await until(made.pilot, lambda: notices(made).startswith(told))  # noqa: B023
+            assert list(made.app.screen_stack) == stack
+        assert writes(made.app) == before
+
+
+def notices(made: Bench) -> str:
+    return " ".join(one.message for one in made.app._notifications)
+
+
+@pytest.mark.parametrize("key", "123567")
+async def test_what_is_typed_behind_the_slash_is_searched_for_and_nothing_else(key: str) -> None:
+    """Typed at once on a slow machine, it was a key of the screen below: `a` armed."""
+    async with bench("atv71") as made:
+        await made.pilot.press(key)
+        await until(made.pilot, lambda: KEY_OF[made.app.place] == key)
+        for character in ("/", *"area"):
+            made.app.post_message(Key("slash" if character == "/" else character, character))
+        await until(made.pilot, lambda: made.app.place == "parameters")
+        await until(made.pilot, lambda: found(made).endswith("a"))
+        await made.pilot.pause(0.3)
+        assert found(made) == "area"
+        assert made.app.chosen is not None
+        assert not made.app.chosen.session.arming.armed
+
+
+def found(made: Bench) -> str:
+    return made.app.screen.query_one("#search", Input).value
+
+
+# No letter writes by itself
+
+
+async def stage(made: Bench) -> None:
+    """Something to write on Parameters and on Blocks, and an output to write through."""
+    made.drive().set("NCA1", made.drive().profile["ACC"].address)
+    await made.pilot.press("slash", *"hsp", "enter")
+    await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
+    await made.pilot.press("minus", "4")
+    await until(made.pilot, lambda: "ACC" in shown(made.app, "second"))
+    await made.pilot.press("delete")
+    await until(made.pilot, lambda: "proposed otherwise" in shown(made.app, "message"))
+
+
+@pytest.mark.parametrize("screen", EVERYWHERE)
+async def test_no_letter_writes_without_a_question_or_a_line(screen: str) -> None:
+    """Armed, with work that waits to be written; a question that comes is left unanswered."""
+    async with bench("atv71") as made:
+        await stage(made)
+        await made.pilot.press("2")
+        await until(made.pilot, lambda: bool(shown(made.app, "state")))
+        for letter in LETTERS:
+            await back_to(made, screen)
+            await made.pilot.press(letter)
+            await made.pilot.pause(0.05)
+            assert writes(made.app) == [], letter
+        await made.pilot.pause(0.5)
+        assert writes(made.app) == []
+        assert made.app._exit is False
+
+
+async def back_to(made: Bench, screen: str) -> None:
+    """Armed on that screen, with no question open and no line."""
+    app = made.app
+    while isinstance(app.screen, ModalScreen):
+        await made.pilot.press("escape")
+    if app.place != "monitor":
+        await made.pilot.press("2")
+        await until(made.pilot, lambda: app.place == "monitor")
+    await until(made.pilot, lambda: bool(shown(app, "message")))
+    if "Enter" in shown(app, "message"):
+        await made.pilot.press("escape")
+    console = app.chosen
+    assert console is not None
+    if not console.session.arming.armed:
+        await made.pilot.press("a")
+        await until(made.pilot, lambda: console.session.arming.armed)
+    if screen == CONNECTION:
+        await made.pilot.press("1")
+        app.connection.drives.focus()
+    elif screen != "monitor":
+        await made.pilot.press(KEY_OF.get(screen, "m"))
+    await until(made.pilot, lambda: app.place == screen)
+
+
+# The line of keys
+
+
+@pytest.mark.parametrize("raws", [fakes.READY, fakes.FAULT], ids=["ready", "fault"])
+@pytest.mark.parametrize("armed", [None, 57.0])
+def test_a_key_that_cannot_work_now_is_dim(raws: dict[str, int], armed: float | None) -> None:
+    faulty = raws is fakes.FAULT
+    view = replace(view_of(library.load("atv71"), raws), control=Control(armed_for=armed))
+    line = order_keys(view, line_of("monitor", 80))
+    bright = {line.plain[span.start : span.end] for span in line.spans if span.style == ATTENTION}
+    assert ("x" in bright) is (faulty and armed is not None)
+    assert ("r" in bright) is (armed is not None)

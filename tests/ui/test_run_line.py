@@ -1,0 +1,237 @@
+"""The line that runs a motor: what edits it, what closes it, and that Enter alone runs."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+from decimal import Decimal
+
+import pytest
+
+from tui.drive import library
+from tui.screens import run_line
+from tui.screens.run_line import RunLine, proposed
+
+from . import fakes
+from .test_command_flows import Bench, bench, writes
+from .test_flows import shown, until
+
+MOMENT = 0.3
+"""Seconds before which Enter is no answer, by the rules of the panel's hands."""
+SETTLED = run_line.SETTLED
+LINE = RunLine("forward", "30.0", "Hz", fakes.NOW, 0)
+ARROWS = ("up", "down", "pageup", "pagedown")
+CLOSING = ["escape", "q", "n", "y", "x", "r", "v", "f", "a", "3 a", "tab", "left", "delete", "f5"]
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+
+
+def edited(line: RunLine, keys: str) -> str:
+    """The text after these characters; `<` is Backspace."""
+    for key in keys:
+        changed = line.erased() if key == "<" else line.typed(key)
+        assert changed is not None
+        line = changed
+    return line.text
+
+
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ("4", "4"),
+        ("45", "45"),
+        ("4.5", "4.5"),
+        ("4,5", "4.5"),
+        ("4..5", "4.5"),
+        (".5", "0.5"),
+        ("<", ""),
+        ("45<", "4"),
+        ("<45", "45"),
+        ("<.5", "0.5"),
+        ("123456789", "1234567"),
+    ],
+)
+def test_the_first_digit_replaces_the_proposal_and_the_rest_edit(keys: str, text: str) -> None:
+    assert edited(LINE, keys) == text
+
+
+@pytest.mark.parametrize("character", ["x", " ", "-", "e", "[", "²", "٣"])
+def test_what_no_number_has_is_not_taken(character: str) -> None:
+    assert LINE.typed(character) is None
+
+
+def test_steps_end_at_the_limits() -> None:
+    low, high = Decimal(20), Decimal(50)
+    ends = {key: LINE.stepped(key, low, high).text for key in ARROWS}
+    assert ends == {"up": "31.0", "down": "29.0", "pageup": "35.0", "pagedown": "25.0"}
+    near = RunLine("reference", "49.5", "Hz", fakes.NOW, 0)
+    assert near.stepped("up", low, high).text == "50"
+    assert (
+        RunLine("reference", "22", "Hz", fakes.NOW, 0).stepped("pagedown", low, high).text == "20"
+    )
+    assert RunLine("reference", "3", "Hz", fakes.NOW, 0).stepped("pagedown", None, None).text == "0"
+    assert RunLine("reference", "900", "rpm", fakes.NOW, 0).stepped("up", None, None).text == "910"
+
+
+def test_the_last_reference_given_is_proposed_else_the_drives_own() -> None:
+    profile = library.load("atv71")
+    held = {"LFR": Decimal("-30.0")}
+    assert proposed(profile, "forward", "42.5Hz", held) == ("42.5", "Hz")
+    assert proposed(profile, "forward", "", held) == ("30.0", "Hz")
+    assert proposed(profile, "forward", "", {}) == ("0", "Hz")
+    assert proposed(library.load("varmeca"), "forward", "", {}) == ("", "")
+
+
+def test_the_moment_is_that_of_the_rules() -> None:
+    assert SETTLED == MOMENT
+
+
+# On a drive
+
+
+@asynccontextmanager
+async def ready() -> AsyncIterator[Bench]:
+    """An armed drive at rest with 30 Hz as its reference."""
+    async with bench("atv71") as made:
+        await made.armed()
+        await made.refer("30")
+        yield made
+
+
+def said(made: Bench) -> str:
+    return " ".join(shown(made.app, "message").split())
+
+
+def open_lines(made: Bench) -> Callable[[], bool]:
+    return lambda: "Enter" in said(made) and ("RUN " in said(made) or "REFERENCE" in said(made))
+
+
+async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    async with ready() as made:
+        monkeypatch.setattr(run_line, "SETTLED", SETTLED)
+        clock = made.app.clock
+        now = clock.monotonic()
+        clock.monotonic = lambda: now  # type: ignore[method-assign]
+        before = writes(made.app)
+        await made.pilot.press("r")
+        await until(made.pilot, open_lines(made))
+        for passed in (0.0, 0.1, MOMENT - 0.01):
+            clock.monotonic = lambda passed=passed: now + passed  # type: ignore[method-assign,misc]
+            await made.pilot.press("enter", "enter")
+            await made.pilot.pause(0.2)
+            assert writes(made.app) == before
+            assert open_lines(made)()
+        clock.monotonic = lambda: now + MOMENT  # type: ignore[method-assign]
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: made.speed() > 2)
+
+
+async def test_from_arming_to_a_running_motor_in_five_keys() -> None:
+    async with bench("atv71") as made:
+        await made.pilot.press("a")
+        await until(made.pilot, lambda: " ARMED" in shown(made.app, "status"))
+        await made.pilot.press("r", "3", "0")
+        await made.pilot.pause(0.3)
+        assert writes(made.app) == []
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: made.speed() > 2)
+        assert made.drive().raw("LFR") == 300
+
+
+@pytest.mark.parametrize("keys", CLOSING)
+async def test_any_other_key_closes_the_line_and_is_swallowed(keys: str) -> None:
+    async with ready() as made:
+        screen, before = made.app.screen, writes(made.app)
+        await made.pilot.press("v")
+        await until(made.pilot, open_lines(made))
+        await made.pilot.press(*keys.split())
+        await until(made.pilot, lambda: not open_lines(made)())
+        await made.pilot.press("enter")
+        await made.pilot.pause(0.3)
+        assert made.app.screen is screen
+        assert writes(made.app) == before
+        assert made.app.chosen is not None
+        assert made.app.chosen.session.arming.armed
+
+
+@pytest.mark.parametrize("typed", ["", "4", "4."])
+@pytest.mark.parametrize("key", ["r", "v", "f"])
+@pytest.mark.parametrize("stop", ["space", "f12", "f9"])
+async def test_a_stop_closes_the_line_and_enter_comes_too_late(
+    stop: str, key: str, typed: str
+) -> None:
+    async with ready() as made:
+        await made.pilot.press(key, *typed)
+        await until(made.pilot, open_lines(made))
+        await made.pilot.press(stop, "enter")
+        await made.stopped()
+        await until(made.pilot, lambda: not open_lines(made)())
+        assert made.drive().raw("LFR") == 300
+        assert made.drive().raw("CMD") == 7
+        assert "NOT ARMED" in shown(made.app, "status")
+
+
+async def test_the_end_of_arming_closes_the_line() -> None:
+    async with ready() as made:
+        before = writes(made.app)
+        await made.pilot.press("r")
+        await until(made.pilot, open_lines(made))
+        made.app.screen.commander.disarm()  # type: ignore[attr-defined]
+        await until(made.pilot, lambda: not open_lines(made)())
+        await made.pilot.press("enter")
+        await made.pilot.pause(0.3)
+        assert writes(made.app) == before
+
+
+async def test_arrows_edit_the_line_and_step_a_reference_without_one() -> None:
+    async with ready() as made:
+        await made.pilot.press("f", "up", "up", "pagedown", "backspace", "2", "7")
+        await until(made.pilot, lambda: "REFERENCE at 27 Hz" in said(made))
+        assert made.drive().raw("LFR") == 300
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: made.drive().raw("LFR") == 270)
+        await until(made.pilot, lambda: "DONE" in said(made))
+        await made.pilot.press("down")
+        await until(made.pilot, lambda: made.drive().raw("LFR") == 260)
+
+
+async def test_a_step_past_a_limit_goes_to_the_limit() -> None:
+    async with ready() as made:
+        made.drive().set("HSP", 330)
+        made.drive().set("LSP", 280)
+        await made.pilot.press("pageup")
+        await until(made.pilot, lambda: made.drive().raw("LFR") == 330)
+        await until(made.pilot, lambda: "DONE" in said(made))
+        await made.pilot.press("pagedown")
+        await until(made.pilot, lambda: made.drive().raw("LFR") == 280)
+
+
+async def test_an_arrow_opens_the_line_where_it_would_start_the_motor() -> None:
+    async with bench("atv71") as made:
+        await made.armed()
+        await made.refer("0")
+        await made.run("r")
+        screen = made.app.screen
+        await until(made.pilot, lambda: screen._would_start())  # type: ignore[attr-defined]
+        before = writes(made.app)
+        await made.pilot.press("up")
+        await until(made.pilot, open_lines(made))
+        await made.pilot.pause(0.3)
+        assert writes(made.app) == before
+        assert made.speed() == 0
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: made.speed() > 0)
+
+
+async def test_a_drive_whose_reference_is_not_given_from_here_has_a_line_without_one() -> None:
+    async with bench("varmeca") as made:
+        await made.armed()
+        await made.pilot.press("r")
+        await until(made.pilot, lambda: "the reference is given at the drive" in said(made))
+        await made.pilot.press("3")
+        await until(made.pilot, lambda: "RUN FORWARD" not in said(made))
+        await made.pilot.press("f")
+        await made.message("NOT DONE", "is not known")

@@ -1,0 +1,106 @@
+"""The line that runs a motor: what is typed in it, what it tells, and when Enter counts."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.drive import library
+from tui.screens.run_line import LONGEST, SETTLED, STEPS, RunLine, proposed, run_lines
+
+from . import fakes
+
+LINE = RunLine("forward", "30.0", "Hz", 100.0, 0)
+
+
+def typed(line: RunLine, text: str) -> RunLine | None:
+    for character in text:
+        found = line.typed(character)
+        if found is None:
+            return None
+        line = found
+    return line
+
+
+@pytest.mark.parametrize(
+    ("text", "stands"),
+    [("2", "2"), ("45", "45"), ("7.5", "7.5"), ("7,5", "7.5"), (".5", "0.5"), ("1..5", "1.5")],
+)
+def test_the_first_digit_replaces_the_proposal(text: str, stands: str) -> None:
+    found = typed(LINE, text)
+    assert found is not None
+    assert found.text == stands
+    assert found.reference == f"{stands}Hz"
+
+
+@pytest.mark.parametrize("character", ["a", " ", "-", "\r", "²", "٣", "h"])
+def test_what_a_number_has_not_closes_the_line(character: str) -> None:
+    assert LINE.typed(character) is None
+
+
+def test_backspace_takes_the_proposal_whole_and_typed_digits_one_by_one() -> None:
+    assert LINE.erased().text == ""
+    found = typed(LINE, "45")
+    assert found is not None
+    assert found.erased().text == "4"
+
+
+@pytest.mark.parametrize(
+    ("key", "ends"), [("up", "31.0"), ("down", "29.0"), ("pageup", "35.0"), ("pagedown", "25.0")]
+)
+def test_arrows_step_within_the_limits(key: str, ends: str) -> None:
+    assert LINE.stepped(key, None, None).text == ends
+    line = LINE
+    for _ in range(40):
+        line = line.stepped(key, Decimal(10), Decimal(50))
+    assert Decimal(line.text) == (Decimal(50) if STEPS[key] > 0 else Decimal(10))
+
+
+def test_enter_counts_once_the_line_has_stood_for_a_moment() -> None:
+    assert not LINE.counts(100.0 + SETTLED - 0.01)
+    assert LINE.counts(100.0 + SETTLED + 0.01)
+
+
+@given(st.text(alphabet="0123456789.,", max_size=30))
+def test_whatever_is_typed_is_short_and_has_one_point(text: str) -> None:
+    found = typed(LINE, text)
+    assert found is not None
+    assert len(found.text) <= LONGEST
+    assert found.text.count(".") <= 1
+
+
+def test_a_reference_past_the_limit_is_told_and_not_given() -> None:
+    profile = library.load("atv71")
+    readings = fakes.readings_of(profile, {"HSP": 500, "LSP": 0, "TFR": 600}, fakes.NOW)
+    wrong = RunLine("forward", "60", "Hz", 0.0, 0).checked(profile, readings)
+    assert "above HSP = 50.0 Hz" in wrong.fault
+    right = RunLine("forward", "45", "Hz", 0.0, 0).checked(profile, readings)
+    assert right.fault == ""
+    empty = RunLine("forward", "", "Hz", 0.0, 0).checked(profile, readings)
+    assert "no reference" in empty.fault
+
+
+def test_the_proposal_is_the_last_reference_given_else_the_drives_own() -> None:
+    profile = library.load("atv71")
+    assert proposed(profile, "forward", "37.5 Hz", {}) == ("37.5", "Hz")
+    assert proposed(profile, "forward", "", {"LFR": Decimal("20.0")}) == ("20.0", "Hz")
+    assert proposed(profile, "forward", "", {}) == ("0", "Hz")
+
+
+@pytest.mark.parametrize("width", [80, 120])
+def test_the_line_says_what_will_happen_and_fits(width: int) -> None:
+    profile = library.load("atv71")
+    raws = {"HSP": 500, "LSP": 0, "TFR": 600, "ACC": 30, "INR": 1, "FRS": 500}
+    readings = fakes.readings_of(profile, raws, fakes.NOW)
+    first, second = run_lines(LINE, profile, readings, 200.0, width)
+    assert "RUN FORWARD at" in first.plain
+    assert "30.0  Hz" in first.plain
+    assert "0 .. HSP 50.0" in first.plain
+    assert "ramp 3.0 s" in first.plain
+    assert "there in 1.8 s" in first.plain
+    assert second.plain.split()[:2] == ["Enter", "runs"]
+    assert "Space stops" in second.plain
+    assert max(len(first.plain), len(second.plain)) <= width

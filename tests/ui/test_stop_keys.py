@@ -1,0 +1,89 @@
+"""Where a stop key stops and where it is text, and that every stop has a stamp of its own."""
+
+from __future__ import annotations
+
+import pytest
+from textual.events import Key, Paste
+from textual.widgets import Input
+
+from tui.screens.dialogs.ask import Ask
+
+from .fakes import app_of
+from .test_flows import until
+
+
+@pytest.mark.parametrize("field", ["baud", "format", "addresses", "profile", "lines"])
+async def test_space_stops_where_a_space_is_no_text(field: str) -> None:
+    app = app_of()
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: bool(app.connection.query("#lines")))
+        app.connection.query_one(f"#{field}").focus()
+        await pilot.pause()
+        before = app.stop_stamp()
+        assert app.take_stop_key("space")
+        assert app.stop_stamp() != before
+
+
+@pytest.mark.parametrize("number", [True, False])
+async def test_space_stops_where_a_number_is_asked_for_and_is_text_in_a_name(number: bool) -> None:
+    app = app_of()
+    async with app.run_test() as pilot:
+        app.push_screen(Ask("Save to", str, number=number))
+        await until(pilot, lambda: isinstance(app.focused, Input))
+        before = app.stop_stamp()
+        assert app.take_stop_key("space") is number
+        assert (app.stop_stamp() != before) is number
+
+
+async def test_f12_and_f9_stop_in_every_field_and_nothing_else_does() -> None:
+    app = app_of()
+    async with app.run_test() as pilot:
+        app.push_screen(Ask("Reference", str))
+        await until(pilot, lambda: isinstance(app.focused, Input))
+        stamps = [app.stop_stamp()]
+        for key in ("f12", "f9"):
+            assert app.take_stop_key(key)
+            stamps.append(app.stop_stamp())
+        assert len(set(map(str, stamps))) == 3
+        assert not any(app.take_stop_key(key) for key in ("space", "enter", "r", "f1", "escape"))
+        assert app.stop_stamp() == stamps[-1]
+
+
+async def test_keys_that_were_not_taken_are_told_of_without_markup() -> None:
+    app = app_of()
+    async with app.run_test() as pilot:
+        app.keys_not_taken(3)
+        app.keys_not_taken(1)
+        app.keys_not_taken(2, late=True)
+        await pilot.pause()
+        assert [notice.message for notice in app._notifications] == [
+            "3 keys came at once and were not taken.",
+            "1 key did not come alone and was not taken.",
+            "2 keys came too late and were not taken.",
+        ]
+        assert not any(notice.markup for notice in app._notifications)
+
+
+async def test_what_is_known_of_a_key_is_known_while_it_has_its_effect() -> None:
+    app = app_of()
+    async with app.run_test() as pilot:
+        seen: list[object] = []
+        app.action_help = lambda: seen.append(app.stroke)  # type: ignore[method-assign]
+        assert app.stroke is None
+        app.post_message(Key("f1", None))
+        await until(pilot, lambda: bool(seen))
+        (stroke,) = seen
+        assert stroke is not None
+        await until(pilot, lambda: app.stroke is None)
+
+
+async def test_a_paste_outside_of_a_text_is_nothing() -> None:
+    app = app_of()
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: bool(app.connection.query("#lines")))
+        app.connection.query_one("#lines").focus()
+        await pilot.pause()
+        before = app.stop_stamp(), app.screen
+        app.post_message(Paste("q \r"))
+        await pilot.press("down")
+        assert (app.stop_stamp(), app.screen) == before

@@ -1,0 +1,56 @@
+"""The first start on a terminal: whether its F12 arrives, tried while no line is open."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+from tui.session.state import state_folder
+
+OFFER = "First start on this terminal: press F12, a stop key, to see whether it arrives."
+ARRIVED = "F12 arrived: it stops motors from this terminal, as Space and F9 do."
+
+
+def terminal_name() -> str:
+    """What the terminal calls itself."""
+    return os.environ.get("TERM", "")
+
+
+def was_tried() -> bool:
+    """Whether F12 arrived on this kind of terminal before."""
+    try:
+        tried = json.loads(_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return False
+    return isinstance(tried, list) and terminal_name() in tried
+
+
+def remember() -> None:
+    """F12 arrived; a folder that cannot be written is no error."""
+    file = _file()
+    try:
+        tried = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else []
+    except (OSError, ValueError):
+        tried = []
+    known = [*(tried if isinstance(tried, list) else []), terminal_name()]
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part")
+        part.write_text(json.dumps(sorted(set(map(str, known)))), encoding="utf-8")
+        part.replace(file)
+    except OSError:
+        return
+
+
+def unknown_text(data: bytes) -> str:
+    """What to say of a sequence that no known terminal sends."""
+    shown = "".join("ESC " if byte == 0x1B else chr(byte) for byte in data if byte < 0x7F)
+    return (
+        f"A key arrived that the panel does not know ({shown.strip()}). If it was F12, it does"
+        " nothing on this terminal: stop with Space, or set the terminal to send xterm's keys."
+    )
+
+
+def _file() -> Path:
+    return state_folder() / "terminals.json"

@@ -1,0 +1,49 @@
+"""Everything that was said about the drives of a line, newest last; for any thread."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import dataclass
+from threading import Lock
+
+KEPT = 500
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """One thing that was said; `wall` is time.time(), `device` None where it is about none."""
+
+    wall: float
+    device: int | None
+    kind: str
+    """`done`, `refused`, `stop`, `failed` or `told`."""
+    text: str
+
+
+class EventLog:
+    """Keeps the last events."""
+
+    def __init__(self, wall: Callable[[], float] = time.time) -> None:
+        self._wall = wall
+        self._lock = Lock()
+        self._events: deque[Event] = deque(maxlen=KEPT)
+
+    def add(self, kind: str, text: str, device: int | None = None) -> None:
+        """Keep an event; the same again right behind itself is kept once."""
+        with self._lock:
+            last = self._events[-1] if self._events else None
+            if last is not None and (last.device, last.kind, last.text) == (device, kind, text):
+                return
+            self._events.append(Event(self._wall(), device, kind, text))
+
+    def __bool__(self) -> bool:
+        """A log is there however empty it is."""
+        return True
+
+    @property
+    def events(self) -> tuple[Event, ...]:
+        """The events, oldest first."""
+        with self._lock:
+            return tuple(self._events)

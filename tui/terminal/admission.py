@@ -1,0 +1,90 @@
+"""Which keys may do something: one that came alone; of a piece, text and moves of a cursor."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from typing import Protocol
+
+from textual.app import App
+from textual.events import Key, Paste
+
+from .fields import takes_text
+from .stroke import Stroke, attach, stroke_of
+
+MOVES = frozenset(
+    {"up", "down", "left", "right", "pageup", "pagedown", "home", "end", "tab", "shift+tab"}
+)
+"""Keys that move a cursor, and that a piece may move it with."""
+
+EDITS = frozenset({"backspace", "delete"})
+
+TOLD_AFTER = 0.1
+"""Seconds after which no more keys of a piece are waited for before they are told of."""
+
+LATE: float = 3.0
+"""Seconds after which a key does what a key of a piece may: where the terminal took nothing, the
+panel stood still, and nobody expects its keys any more."""
+
+
+class Stamps(Protocol):
+    """What admission needs of the app, besides what every app has."""
+
+    def stop_stamp(self) -> object:
+        """Another object after every stop."""
+
+    def keys_not_taken(self, count: int, *, late: bool = False) -> None:
+        """Tell that keys came at once, or too late, and did nothing."""
+
+
+class Admission:
+    """Lets keys in, or counts them."""
+
+    def __init__(self, app: App[None], stamps: Stamps) -> None:
+        self._app = app
+        self._stamps = stamps
+        self._refused = 0
+        self._late = False
+        self._looking = False
+
+    def admits(self, event: Key | Paste) -> bool:
+        """Whether the app may take a key or a paste now, when its turn has come."""
+        if isinstance(event, Paste):
+            return takes_text(self._app.focused)
+        stroke = stroke_of(event)
+        if stroke is None:  # no terminal has sent it: a test, or the app itself
+            attach(event, Stroke(time.monotonic(), self._stamps.stop_stamp()))
+            return True
+        if stroke.stamp != self._stamps.stop_stamp():
+            return False  # a stop was the last word
+        late = time.monotonic() - stroke.read_at > LATE
+        if late:
+            attach(event, replace(stroke, alone=False, held=False, steps=False))
+        if (stroke.acts and not late) or self._harmless(event):
+            return True
+        self._count(late)
+        return False
+
+    def _harmless(self, event: Key) -> bool:
+        """Whether a key of a piece can only write text or move a cursor."""
+        if event.key in MOVES:
+            return True
+        typed = event.is_printable or event.key in EDITS
+        return typed and (takes_text(self._app.focused) or takes_text(self._app.screen))
+
+    def _count(self, late: bool) -> None:
+        self._refused += 1
+        self._late = self._late or late
+        if not self._looking:
+            self._looking = True
+            self._look(0)
+
+    def _look(self, before: int) -> None:
+        """Tell once no more keys of the piece come."""
+        if self._refused > before:
+            now = self._refused
+            self._app.set_timer(TOLD_AFTER, lambda: self._look(now))
+            return
+        count, late = self._refused, self._late
+        self._refused, self._late, self._looking = 0, False, False
+        self._stamps.keys_not_taken(count, late=late)

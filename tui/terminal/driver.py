@@ -1,0 +1,142 @@
+"""The driver of this platform, with keys read the panel's way.
+
+Textual hands keys to its event loop, which waits for the terminal whenever that takes no more
+bytes. The thread that reads the keys does not: there stop keys are recognised, and every key is
+given its stroke.
+"""
+
+from __future__ import annotations
+
+import os
+import selectors
+import time
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any, Protocol, cast
+
+from textual import constants, events
+from textual._xterm_parser import XTermParser
+from textual.driver import Driver
+from textual.message import Message
+
+from .reader import KeyReader, Pressed, Read, Stops
+from .stroke import attach
+from .tokens import Report
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from selectors import BaseSelector
+
+LOOK = 0.1
+"""Seconds between two looks whether the panel is to end."""
+
+AT_ONCE = 4096
+"""Bytes that are read in one go."""
+
+POSIX = "LinuxDriver"
+"""Textual's driver of every system that has pseudo-terminals."""
+
+FOCUS_REPORTS = "\x1b[?1004h"
+NO_REPORTS = "\x1b[?1000l\x1b[?1002l\x1b[?1003l\x1b[?1006l\x1b[?1004l"
+"""A program that died may have left the mouse reported: a click would be typed, a Space with it."""
+
+UNASKED = ("\x1b[>", "\x1b[<u", "\x1b]22;")
+"""How the kitty keyboard protocol is begun and ended, and how the mouse gets another shape."""
+
+
+class WithMouse(Protocol):
+    """What the driver asks of the app at its start."""
+
+    mouse: bool
+    """Whether the terminal is to report its mouse and to speak the kitty protocol."""
+
+
+@lru_cache(maxsize=1)
+def with_own_keys(driver: type[Driver]) -> type[Driver]:
+    """The driver of this platform, asking for less and reading keys the panel's way."""
+    quiet = _quiet(driver)
+    return _reading(quiet) if driver.__name__ == POSIX else _stopping(quiet)
+
+
+def _quiet(driver: type[Driver]) -> type[Driver]:
+    class QuietDriver(driver):  # type: ignore[valid-type, misc]
+        """Asks a terminal for its mouse and the kitty protocol only where the app says so."""
+
+        def __init__(self, app: Any, *, mouse: bool = True, **settings: Any) -> None:
+            self.wanted = mouse and cast("WithMouse", app).mouse
+            super().__init__(app, mouse=self.wanted, **settings)
+
+        def write(self, data: str) -> None:
+            if not self.wanted and data.startswith(UNASKED):
+                return
+            super().write(NO_REPORTS if data == FOCUS_REPORTS and not self.wanted else data)
+
+    return QuietDriver
+
+
+def _reading(driver: type[Driver]) -> type[Driver]:
+    class ReadingDriver(driver):  # type: ignore[valid-type, misc]
+        """Reads keys from a POSIX terminal."""
+
+        def run_input_thread(self) -> None:
+            """Read until the panel ends; in a thread of its own."""
+            read_keys(self)
+
+    return ReadingDriver
+
+
+def read_keys(driver: Any) -> None:
+    """Read the keys of a driver's terminal until its panel ends."""
+    stops = cast("Stops", driver._app)
+    keys = KeyReader(stops, mouse=driver.wanted, escape_delay=constants.ESCAPE_DELAY)
+    reports = XTermParser()
+    with selectors.SelectSelector() as selector:
+        selector.register(driver.fileno, selectors.EVENT_READ)
+        while not driver.exit_event.is_set():
+            for one in _look(driver, selector, keys):
+                for message in _messages(one, reports):
+                    driver.process_message(message)
+        if selector.select(0):  # what is typed while the panel ends is for nobody
+            os.read(driver.fileno, AT_ONCE)
+
+
+def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[Read]:
+    """Wait for bytes, or until something is known without."""
+    asked, deadline = time.monotonic(), keys.deadline
+    wait = LOOK if deadline is None else min(LOOK, max(0.0, deadline - asked))
+    if not selector.select(wait):
+        return keys.tick(time.monotonic())
+    # Where this thread was kept waiting, the bytes were there before now. The stamp comes before
+    # the bytes: where a stop of somebody else falls between, it voids them.
+    now, stamp = min(time.monotonic(), asked + wait), cast("Stops", driver._app).stop_stamp()
+    data = os.read(driver.fileno, AT_ONCE)
+    if not data:
+        driver.exit_event.wait(LOOK)
+    return keys.read(data, now, stamp)
+
+
+def _messages(read: Read, reports: XTermParser) -> Iterator[Message]:
+    """What Textual would make of it."""
+    if isinstance(read, Pressed):
+        event = events.Key(read.name, read.character)
+        attach(event, read.stroke)
+        yield event
+    elif isinstance(read, Report):
+        yield from (
+            message for message in reports.feed(read.text) if not isinstance(message, events.Key)
+        )
+    else:
+        yield events.Paste(read.text)
+
+
+def _stopping(driver: type[Driver]) -> type[Driver]:
+    class StoppingDriver(driver):  # type: ignore[valid-type, misc]
+        """Where Textual reads the keys itself, as on Windows: only stop keys are taken early."""
+
+        def process_message(self, message: Message) -> None:
+            if isinstance(message, events.Key):
+                app = cast("Stops", self._app)
+                if app.take_stop_key(message.key):
+                    return
+            super().process_message(message)
+
+    return StoppingDriver

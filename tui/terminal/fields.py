@@ -1,0 +1,27 @@
+"""What a focused widget does with text: none, numbers, or any text, spaces too.
+
+A widget says it by `takes_text` and `takes_space`; of Textual's own it is known.
+"""
+
+from __future__ import annotations
+
+from textual.widget import Widget
+
+# by their names: to import a text area takes longer than the whole first picture may
+TEXT_FIELDS = frozenset({"Input", "TextArea"})
+
+
+def takes_text(widget: Widget | None) -> bool:
+    """Whether what is typed becomes text in this widget."""
+    told = getattr(widget, "takes_text", None)
+    if told is not None:
+        return bool(told)
+    return any(kind.__name__ in TEXT_FIELDS for kind in type(widget).__mro__)
+
+
+def takes_space(widget: Widget | None) -> bool:
+    """Whether a space is text in this widget; in a field for numbers it is none."""
+    told = getattr(widget, "takes_space", None)
+    if told is not None:
+        return bool(told)
+    return takes_text(widget) and getattr(widget, "type", "text") == "text"
