@@ -252,3 +252,36 @@ def test_no_stop_word_runs_a_motor_in_any_state(family: str) -> None:
             assert chart_in_force(profile, raws) is chart
             stop = choose(chart, "stop", raws)
             assert not runs & set(stop.words)
+
+
+PRESSES = 400
+"""More stops than a drive could be asked between: a key that is held down."""
+
+
+async def test_a_stop_key_that_is_held_down_stops(start: Start, journal: Journal) -> None:
+    simulation, line = start(DriveSpec("atv71", 1, run_hz=20.0))
+    drive = simulation.drive(1)
+    await wait_for(lambda: drive.motor.frequency > 5)
+    stopper, session = Stopper(line, journal), DriveSession(line, 1, library.load("atv71"))
+    for _ in range(PRESSES):
+        # nothing is known of the drive: its words are read before one is chosen
+        stopper.stop([session])
+        await asyncio.sleep(0.001)
+        if writes(line):
+            break
+    else:
+        raise AssertionError("no stop went out while the key was held")
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+
+
+async def test_a_stop_behind_a_command_is_one_of_its_own(start: Start, journal: Journal) -> None:
+    """One that was begun before the drive was armed again does not count for it."""
+    _, line = start(DriveSpec("atv71", 1))
+    stopper, session = Stopper(line, journal), DriveSession(line, 1, library.load("atv71"))
+    stopper.stop([session])
+    session.arming.arm()
+    before = stopper.reports[1].time
+    stopper.stop([session])
+    assert stopper.reports[1].time > before
+    assert not session.arming.armed
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED

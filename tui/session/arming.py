@@ -27,6 +27,8 @@ class Arming:
         self._until: float | None = None
         self._span = ARMED_FOR
         self._why = ""
+        self.times = 0
+        """How often it was armed."""
 
     def arm(self, *, seconds: float = ARMED_FOR) -> None:
         """Let writes through from now on.
@@ -37,6 +39,7 @@ class Arming:
         if self._line.read_only:
             raise OrderRefused("The line is read-only: nothing is written.")
         self._span, self._why = seconds, ""
+        self.times += 1
         self._until = time.monotonic() + seconds
 
     def disarm(self, why: str = "") -> None:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import threading
 import time
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -114,7 +115,8 @@ class Stopper:
         self._events = events
         self._journal = journal
         self._reports: dict[int, StopReport] = {}
-        self._workers: dict[int, Worker] = {}
+        self._under_way: dict[int, _UnderWay] = {}
+        self._lock = threading.Lock()
 
     @property
     def reports(self) -> Mapping[int, StopReport]:
@@ -124,7 +126,11 @@ class Stopper:
     def stop(
         self, sessions: Iterable[DriveSession], order: OrderId = "stop", by: str = "the stop key"
     ) -> None:
-        """Order drives to stop; ends their work and their arming. Raises LineClosed."""
+        """Order drives to stop; ends their work and their arming. Raises LineClosed.
+
+        A stop whose word has not gone out yet is not begun anew: a key that is held down would
+        keep every one of them from going out.
+        """
         ordered = time.monotonic()
         wanted = list(sessions)
         for session in wanted:
@@ -133,12 +139,23 @@ class Stopper:
                 session.starts.withdraw(session)
         if len(wanted) > 1:
             self._line.spawn(lambda: self._broadcast(wanted, order), "stop all")
-        for session in wanted:
-            if (before := self._workers.get(session.device)) is not None:
-                before.cancel()
-            self._say(session, Phase.SENDING, "stop is being sent", ordered)
-            work = partial(self._stop, session, order, ordered)
-            self._workers[session.device] = self._line.spawn(work, f"stop {session.device}")
+        with self._lock:
+            for session in wanted:
+                self._begin(session, order, ordered)
+
+    def _begin(self, session: DriveSession, order: OrderId, ordered: float) -> None:
+        """Begin a stop of one drive, unless the same one goes out yet."""
+        device = session.device
+        before = self._under_way.get(device)
+        if before is not None:
+            if before.goes_out(session, order):
+                return
+            before.worker.cancel()
+        self._say(session, Phase.SENDING, "stop is being sent", ordered)
+        writer = Writer(session, self._journal, None)
+        one = _Stop(session, writer, order, ordered, self._say)
+        worker = self._line.spawn(partial(self._stop, one), f"stop {device}")
+        self._under_way[device] = _UnderWay(one, worker, session.arming.times)
 
     def wait(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
         """Wait from another thread until these stops have ended, or the time is up."""
@@ -184,9 +201,8 @@ class Stopper:
                         address, [word & 0xFFFF], limits=limits, priority=Priority.STOP
                     )
 
-    async def _stop(self, session: DriveSession, order: OrderId, ordered: float) -> None:
+    async def _stop(self, one: _Stop) -> None:
         error = "it did not answer"
-        one = _Stop(session, Writer(session, self._journal, None), order, ordered, self._say)
         for _ in range(TRIES):
             try:
                 text = await one.carry_out()
@@ -205,12 +221,8 @@ class Stopper:
                 if text is None:
                     return
                 error = text
-        self._say(
-            session,
-            Phase.FAILED,
-            f"NOT STOPPED: {error} Stop it at the machine.",
-            ordered,
-        )
+        told = f"NOT STOPPED: {error} Stop it at the machine."
+        self._say(one.session, Phase.FAILED, told, one.ordered)
 
 
 Say = Callable[[DriveSession, Phase, str, float], None]
@@ -227,6 +239,8 @@ class _Stop:
     say: Say
     wanted: OrderId = field(init=False)
     """The way to stop that was asked for."""
+    sent: bool = False
+    """Whether its words have gone out."""
     reader: Reader = field(init=False)
     held: dict[str, Raw] = field(default_factory=dict)
     """What command words held before they were written here: option bits are kept from it."""
@@ -295,6 +309,7 @@ class _Stop:
             await self.writer.write(
                 parameter, raw, why=why, priority=Priority.STOP, read_back=False
             )
+        self.sent = True
 
     async def _follow(self, chart: Chart, order: Order) -> str | None:
         """See the motor stop; returns why it does not, or nothing."""
@@ -354,3 +369,22 @@ class _Stop:
         word = readings[chart.status].raw
         kind = state_of(chart, word).kind if word is not None else "unknown"
         return kind, abs(number) if number is not None else None
+
+
+@dataclass(frozen=True, slots=True)
+class _UnderWay:
+    """A stop that was begun."""
+
+    stop: _Stop
+    worker: Worker
+    times: int
+    """How often the drive had been armed then."""
+
+    def goes_out(self, session: DriveSession, order: OrderId) -> bool:
+        """Whether it does all that another stop of the drive would do now.
+
+        Its words are on their way still, and nothing was written since: that needs arming.
+        """
+        same = self.stop.session is session and self.stop.wanted == order
+        waits = not self.worker.done() and not self.stop.sent
+        return same and waits and self.times == session.arming.times
