@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from benchmarks.hands import Counted, bursts, unarmed
+from benchmarks.hands import Counted, bursts, is_stop, unarmed
 from tests.programs import wait_until
 
 from .pty_panel import LINE_SETTLED, PtyPanel, Write, panel_on_a_pty
@@ -58,6 +58,19 @@ def test_enter_behind_a_stop_runs_nothing(panel: PtyPanel, stop: str) -> None:
     panel.settle(0.1)
     panel.type("\r")
     panel.stopped(before)
+
+
+@pytest.mark.parametrize("key", ["k", "e"])
+def test_the_other_stops_are_not_swallowed_by_the_open_line(panel: PtyPanel, key: str) -> None:
+    panel.run()
+    panel.open_line("f")
+    before = len(panel.log.writes)
+    panel.type(key)
+    at_rest(panel)
+    assert panel.log.writes[before:]
+    assert all(map(is_stop, panel.log.writes[before:]))
+    panel.type(" ")  # out of the state Quick stop active
+    panel.settle()
 
 
 @pytest.mark.parametrize("typed", ["\r", "30\r", "r30\r", "ar30\r"])

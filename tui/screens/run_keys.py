@@ -14,8 +14,12 @@ from tui.session.readings import Reading
 from tui.session.reference import reference_codes
 from tui.terminal.stroke import stroke_of
 
+from .monitor_actions import COMMAND_ACTIONS
 from .orders import OrderKeys
 from .run_line import GIVEN, STEPS, Purpose, RunLine, limits, proposed, run_lines
+
+STOP_KEYS = frozenset(one.keys for one in COMMAND_ACTIONS if one.id.startswith("stop_as("))
+"""Keys that stop in a way of their own, at once."""
 
 
 class RunKeys(OrderKeys):
@@ -77,14 +81,17 @@ class RunKeys(OrderKeys):
         return run_lines(line, self.session.profile, self._around or {}, now, width)
 
     def on_key(self, event: Key) -> None:
-        """While the line is open every key is the line's; one that it has not closes it."""
+        """While the line is open every key but a stop's is the line's; an unknown one closes it."""
         if self._line is None:
             super().on_key(event)
             return
-        event.stop()
-        event.prevent_default()
         line, key = self._line, event.key
         self._line = None
+        if key in STOP_KEYS:
+            self.look()
+            return  # never swallowed: what stops, stops here too
+        event.stop()
+        event.prevent_default()
         if key in STEPS and line.unit:
             if not _steps(event):
                 self._line = line
