@@ -22,6 +22,7 @@ from tui.terminal.admission import Admission
 from tui.terminal.driver import with_own_keys
 from tui.terminal.fields import takes_space
 from tui.terminal.names import STOP_KEYS
+from tui.terminal.stroke import stroke_of
 from tui.terminal.type_ahead import TypeAhead
 from tui.widgets.clock import Clock
 from tui.widgets.lean import LeanApp
@@ -119,13 +120,20 @@ class DrivePanelApp(LeanApp, Places, Leaving):
         """The driver of this platform, with the stop keys before everything else."""
         return with_own_keys(super().get_driver_class())
 
-    def take_stop_key(self, key: str) -> bool:
-        """Stop, if the key means that now; may be called in any thread."""
-        if key not in STOP_KEYS or (key == STOP_OUTSIDE_TEXT and takes_space(self.focused)):
+    def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
+        """Stop, if the key means that now; may be called in any thread.
+
+        `left_at` is when a key was read that may leave a text, like Escape: a Space behind it is no
+        text, though that key may not have had its effect yet.
+        """
+        left = left_at is not None and left_at > self._typed.done_to
+        if key not in STOP_KEYS:
             return False
+        if key == STOP_OUTSIDE_TEXT and takes_space(self.focused) and not left:
+            return False
+        self._stop(everything=key == STOP_ALL)
         if key == STOP and self._trying_f12:
             self._f12_arrived()
-        self._stop(everything=key == STOP_ALL)
         return True
 
     def sequence_swallowed(self, data: bytes) -> None:
@@ -235,7 +243,14 @@ class DrivePanelApp(LeanApp, Places, Leaving):
             if isinstance(event, Key):
                 for session in self.fleet.sessions if self.fleet else ():
                     session.arming.touch()
+        elif isinstance(event, Key) and self._is_void(event):
+            return
         await super().on_event(event)
+
+    def _is_void(self, key: Key) -> bool:
+        """Whether a stop came while a key went through the screen, before it has its effect."""
+        stroke = stroke_of(key)
+        return stroke is not None and stroke.stamp != self.stop_stamp()
 
     def _meant(self, fleet: Fleet) -> list[DriveSession]:
         """Whom the stop key stops: the drive that was opened, else every drive of the line."""

@@ -241,6 +241,40 @@ def test_space_stops_while_a_number_is_typed(fresh_panel: PtyPanel) -> None:
     panel.stops(before)
 
 
+@pytest.mark.parametrize(
+    ("pieces", "apart"),
+    [(("\x1b ",), 0.0), (("\x1b", " "), 0.02), (("AC\r ",), 0.0), (("AC\t", " "), 0.02)],
+)
+def test_space_behind_a_key_that_leaves_a_text_stops(
+    fresh_panel: PtyPanel, pieces: tuple[str, ...], apart: float
+) -> None:
+    panel = fresh_panel
+    panel.run()
+    panel.type("3")
+    panel.shows("/ search")
+    panel.type("/")
+    panel.settle(0.5)
+    before = len(panel.log.writes)
+    panel.type(*pieces, apart=apart)
+    wait_until(lambda: panel.look() and panel.stops(before) > 0, "the stop")
+    at_rest(panel)
+
+
+def test_space_is_text_in_a_text(fresh_panel: PtyPanel) -> None:
+    panel = fresh_panel
+    panel.type("3")
+    panel.shows("/ search")
+    panel.type("/")
+    panel.settle(0.5)
+    panel.type("of a")
+    panel.shows("of a")
+    panel.type(" ")
+    panel.settle(0.2)
+    panel.type("b")
+    panel.shows("of a b")
+    assert panel.log.writes == []
+
+
 def test_bursts_with_a_stop_run_nothing_behind_it(fresh_panel: PtyPanel) -> None:
     counted = Counted()
     bursts(fresh_panel, random.Random(7), 60, counted)

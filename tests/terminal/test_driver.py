@@ -24,7 +24,7 @@ class Stops:
         self.mouse = mouse
         self.taken: list[str] = []
 
-    def take_stop_key(self, key: str) -> bool:
+    def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
         if key not in ("space", "f12", "f9"):
             return False
         self.taken.append(key)

@@ -24,8 +24,8 @@ class Stops:
         self.typing = typing
         self.taken: list[str] = []
 
-    def take_stop_key(self, key: str) -> bool:
-        if key == "space" and self.typing:
+    def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
+        if key == "space" and self.typing and left_at is None:
             return False
         self.taken.append(key)
         return True
@@ -158,3 +158,17 @@ def test_random_bytes_never_crash(reads: list[tuple[float, bytes]], typing: bool
     _, keys, _ = read(*timed, typing=typing)
     for key in keys:
         assert key.stroke.alone or key.stroke.held or key.stroke.piece > 1
+
+
+@pytest.mark.parametrize("keys", [b"\x1b ", b"ab\r ", b"ab\t ", b"\x1bOP ", b"\x1b[5~ "])
+@pytest.mark.parametrize("cut", [None, 1, -1])
+def test_space_behind_a_key_that_may_leave_a_text_is_none(keys: bytes, cut: int | None) -> None:
+    reads = [(1.0, keys)] if cut is None else [(1.0, keys[:cut]), (1.02, keys[cut:])]
+    assert read(*reads, typing=True)[0] == ["space"]
+
+
+@pytest.mark.parametrize("keys", [b"ab ", b"a\x7f ", b"ab\x1b[D ", b"\xc3\xa9 "])
+def test_space_behind_what_edits_a_text_is_text(keys: bytes) -> None:
+    stops, pressed, _ = read((1.0, keys), typing=True)
+    assert stops == []
+    assert pressed[-1].name == "space"

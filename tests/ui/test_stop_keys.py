@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
+
 import pytest
 from textual.events import Key, Paste
 from textual.widgets import Input
 
+from tui.screens.base import PanelScreen
 from tui.screens.dialogs.ask import Ask
+from tui.terminal.stroke import Stroke, attach
 
 from .fakes import app_of
 from .test_flows import until
@@ -87,3 +92,54 @@ async def test_a_paste_outside_of_a_text_is_nothing() -> None:
         app.post_message(Paste("q \r"))
         await pilot.press("down")
         assert (app.stop_stamp(), app.screen) == before
+
+
+async def test_space_is_text_again_once_a_key_that_may_leave_has_had_its_effect() -> None:
+    app = app_of()
+    async with app.run_test() as pilot:
+        app.push_screen(Ask("Save to", lambda _: "not that"))
+        await until(pilot, lambda: isinstance(app.focused, Input))
+        await asyncio.sleep(Ask.SETTLED)
+        key, read_at = Key("enter", "\r"), time.monotonic()
+        assert app.take_stop_key("space", read_at)  # Enter may close the text yet
+        attach(key, Stroke(read_at, app.stop_stamp()))
+        app.post_message(key)
+        await until(pilot, lambda: not app.take_stop_key("space", read_at))
+        assert isinstance(app.focused, Input)
+
+
+async def test_a_stop_voids_a_key_that_is_on_its_way_through_the_screen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The screen may take seconds for it, where the terminal takes nothing."""
+    app = app_of()
+    done: list[str] = []
+    monkeypatch.setattr(app, "action_help", lambda: done.append("help"))
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: bool(app.connection.query("#lines")))
+        before = PanelScreen.on_key
+
+        def stopped_meanwhile(screen: PanelScreen, event: Key) -> None:
+            app.take_stop_key("f12")
+            before(screen, event)
+
+        for on_key, expected in ((stopped_meanwhile, []), (before, ["help"])):
+            monkeypatch.setattr(PanelScreen, "on_key", on_key)
+            key = Key("question_mark", "?")
+            attach(key, Stroke(time.monotonic(), app.stop_stamp()))
+            app.post_message(key)
+            await until(pilot, lambda: app.stroke is None)
+            await pilot.pause()
+            assert done == expected
+
+
+async def test_a_first_f12_stops_before_it_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
+    app = app_of()
+    stamps: list[object] = []
+    monkeypatch.setattr("tui.screens.first_keys.remember", lambda: stamps.append(app.stop_stamp()))
+    async with app.run_test():
+        app._trying_f12 = True
+        before = app.stop_stamp()
+        assert app.take_stop_key("f12")
+        assert before not in stamps
+        assert stamps

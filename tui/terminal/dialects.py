@@ -33,6 +33,8 @@ ESC: Final = "\x1b"
 PASTE_BEGINS: Final = "\x1b[200~"
 PASTE_ENDS: Final = "\x1b[201~"
 SPACE: Final = ("space", " ")
+SPACE_ALONE: Final = ("space", None)
+"""Space behind an ESC that may have been Escape: a stop, and no text."""
 
 _REPORT = re.compile(
     r"\x1b\[(\d+;\d+R"  # where the cursor stands
@@ -152,7 +154,7 @@ class Tokenizer:
         elif character in "[O" or character in _REPLY_BEGINS:
             self._introduce(character)
         else:
-            self._key(SPACE if character == " " else with_alt(character))
+            self._key(SPACE_ALONE if character == " " else with_alt(character))
 
     def _introduce(self, character: str) -> None:
         self._text += character
@@ -166,7 +168,7 @@ class Tokenizer:
             self._ground(character)
         elif character == " ":
             self._begin()
-            self._key(SPACE)
+            self._key(SPACE_ALONE)
         elif not "\x20" < character < "\x7f":
             self._state = self._ground
         else:
@@ -269,7 +271,7 @@ class Tokenizer:
         """
         if self._state not in (self._paste, self._reply) or self._now - self._last <= APART:
             return False
-        named = SPACE if text == " " else of_sequence(text[:LONGEST_KEY])
+        named = SPACE_ALONE if text == " " else of_sequence(text[:LONGEST_KEY])
         if named is None or named[0] not in STOP_KEYS:
             return False
         self._found.append(Key(*named, self._now, self._now, self._here))

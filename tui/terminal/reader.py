@@ -16,12 +16,18 @@ from .names import STOP_KEYS
 from .stroke import Stroke
 from .tokens import Key, Paste, Report, Token
 
+EDITING = frozenset({"backspace", "delete", "left", "right", "home", "end"})
+"""Keys that edit a text, besides those that write it; any other one may leave it."""
+
 
 class Stops(Protocol):
     """What the app is asked in the thread that reads the keys."""
 
-    def take_stop_key(self, key: str) -> bool:
-        """Stop, if the key means that now; True if it was taken."""
+    def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
+        """Stop, if the key means that now; True if it was taken.
+
+        `left_at` is when a key was read that may leave the text which a Space would belong to.
+        """
 
     def stop_stamp(self) -> object:
         """Another object after every stop."""
@@ -53,6 +59,7 @@ class KeyReader:
         self._decode = codecs.getincrementaldecoder("utf-8")("surrogateescape").decode
         self._tokens = Tokenizer(mouse=mouse, escape_delay=escape_delay)
         self._bursts = Bursts()
+        self._left_at: float | None = None
 
     def read(self, data: bytes, now: float, stamp: object = None) -> list[Read]:
         """Bytes that were read at this time, when the app's stamp of stops was this."""
@@ -78,12 +85,23 @@ class KeyReader:
                 reports.append(token)
             elif isinstance(token, Paste):
                 self._bursts.paste(token)
-            elif token.name in STOP_KEYS and self._stops.take_stop_key(token.name):
+            elif self._stopped(token):
                 self._bursts.stop(token)
+                self._left_at = None
             else:
+                self._left_at = self._left(token)
                 self._bursts.key(token)
         given = self._bursts.given(now, self._tokens.pending)
         return [*reports, *(_told(one) for one in given)]
+
+    def _stopped(self, key: Key) -> bool:
+        """Whether a key was a stop."""
+        return key.name in STOP_KEYS and self._stops.take_stop_key(key.name, self._left(key))
+
+    def _left(self, key: Key) -> float | None:
+        """When a key was read last, up to this one, that may leave a text."""
+        writes = key.character is not None and key.character.isprintable()
+        return self._left_at if writes or key.name in EDITING else key.began
 
 
 def _told(given: Given) -> Pressed | Paste:

@@ -35,6 +35,8 @@ class TypeAhead:
         self._waiting: deque[Typed] = deque()
         self._taken: Typed | None = None
         self._task: asyncio.Task[None] | None = None
+        self.done_to = float("-inf")
+        """When the last key was read that had its whole effect, or was not taken."""
 
     @property
     def stroke(self) -> Stroke | None:
@@ -69,6 +71,8 @@ class TypeAhead:
         self._call_next()
 
     def _call_next(self) -> None:
+        if (stroke := self.stroke) is not None:
+            self.done_to = max(self.done_to, stroke.read_at)
         self._taken = self._waiting.popleft() if self._waiting else None
         if self._taken is not None:
             self._app.post_message(self._taken)
