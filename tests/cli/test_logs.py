@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ast
 import logging
+import os
+import threading
 from pathlib import Path
 
 import tui
-from tests.programs import wait_until
-from tui.cli.logs import log_file, start_logging
+from tests.programs import PATIENCE, wait_until
+from tui.cli.logs import log_file, start_logging, stop_logging
 from tui.session.lines import open_line
 
 SOURCES = Path(tui.__file__).parent
@@ -26,6 +28,7 @@ def test_work_that_dies_leaves_its_traceback_in_the_log() -> None:
         wait_until(worker.done, "the worker's end")
     finally:
         opened.close()
+    stop_logging()
     said = log_file().read_text()
     assert "watching device 1 ended by an error" in said
     assert "Traceback" in said
@@ -52,4 +55,24 @@ def test_every_module_logs_by_its_own_name() -> None:
 def test_the_handler_hangs_above_every_module() -> None:
     start_logging(0)
     logging.getLogger("tui.anything.at.all").warning("heard")
+    stop_logging()
     assert "WARNING heard" in log_file().read_text()
+
+
+def test_a_disk_that_hangs_holds_up_nobody_who_logs() -> None:
+    """A stop logs what it does: in the thread of the keys, and in that of the line."""
+    log_file().parent.mkdir(parents=True, exist_ok=True)
+    os.mkfifo(log_file())  # to open it hangs until somebody reads it
+    start_logging(0)
+    done = threading.Event()
+
+    def log() -> None:
+        logging.getLogger("tui.session.stop").info("stop of device 1")
+        stop_logging()
+        done.set()
+
+    threading.Thread(target=log, daemon=True).start()
+    held_up = not done.wait(PATIENCE)
+    with log_file().open("rb") as disk:  # lets the writer go
+        assert b"stop of device 1" in disk.read()
+    assert not held_up

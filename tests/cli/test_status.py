@@ -11,7 +11,7 @@ from click.testing import CliRunner
 from tests.programs import drivepanel, free_port
 from tui.bus.errors import RequestRefused
 from tui.cli.errors import told
-from tui.cli.logs import log_file, start_logging
+from tui.cli.logs import log_file, start_logging, stop_logging
 from tui.drive.errors import ValueRefused
 
 from .commands import tcp_line
@@ -124,6 +124,7 @@ def test_an_unforeseen_error_goes_to_the_log() -> None:
     assert result.exit_code == 1
     assert "Traceback" not in result.output
     assert str(log_file()) in result.stderr
+    stop_logging()
     assert "nobody thought of this" in log_file().read_text()
     assert "Traceback" in log_file().read_text()
 

@@ -2,15 +2,53 @@
 
 from __future__ import annotations
 
+import atexit
 import logging
-from logging.handlers import RotatingFileHandler
+from contextlib import suppress
+from logging.handlers import QueueHandler, RotatingFileHandler
 from pathlib import Path
+from queue import Full, Queue
+from threading import Thread
 
 from tui.session.state import state_folder
 
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""
 LEVELS = (logging.INFO, logging.DEBUG)
+MOST = 10_000
+"""Entries that wait for a disk which takes none; later ones are lost."""
+PATIENCE = 2.0
+"""Seconds that who closes the log waits for the disk."""
+
+
+class Later(QueueHandler):
+    """Hands entries to a thread: a disk that hangs holds up no stop."""
+
+    def __init__(self, to: logging.Handler) -> None:
+        self._entries: Queue[logging.LogRecord | None] = Queue(MOST)
+        super().__init__(self._entries)
+        self._to = to
+        self._thread = Thread(target=self._work, name="log", daemon=True)
+        self._thread.start()
+        atexit.register(self.close)
+
+    def enqueue(self, record: logging.LogRecord) -> None:
+        """Give an entry to the thread; with too many waiting it is lost."""
+        with suppress(Full):
+            self._entries.put_nowait(record)
+
+    def close(self) -> None:
+        """Wait a moment for what is not on the disk yet."""
+        atexit.unregister(self.close)
+        with suppress(Full):
+            self._entries.put_nowait(None)
+        self._thread.join(PATIENCE)
+        super().close()
+
+    def _work(self) -> None:
+        while (entry := self._entries.get()) is not None:
+            self._to.handle(entry)
+        self._to.close()
 
 
 def log_file() -> Path:
@@ -24,12 +62,14 @@ def start_logging(verbose: int) -> None:
     logger.setLevel(LEVELS[min(verbose, len(LEVELS) - 1)])
     try:
         log_file().parent.mkdir(parents=True, exist_ok=True)
-        handler: logging.Handler = RotatingFileHandler(
+        file = RotatingFileHandler(
             log_file(), maxBytes=1_000_000, backupCount=3, encoding="utf-8", delay=True
         )
     except OSError:
-        handler = logging.NullHandler()
-    handler.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        handler: logging.Handler = logging.NullHandler()
+    else:
+        file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        handler = Later(file)
     stop_logging()
     logger.addHandler(handler)
     logger.propagate = False
