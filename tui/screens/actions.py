@@ -135,13 +135,14 @@ def of_screen(screen: str) -> list[Action]:
     return [action for action in ACTIONS if screen in action.screens]
 
 
-def line_of(screen: str, width: int, stops: str = "STOP") -> list[Key]:
+def line_of(screen: str, width: int, stops: str = "STOP", *, typing: bool = False) -> list[Key]:
     """The line of keys of a screen, the stop first; where it is narrow, without the last ones.
 
-    `stops` says whom the stop key stops.
+    `stops` says whom the stop key stops; while a text is `typing`, that key is F12.
     """
+    spaced = "F12" if typing else "Space"
     keys = [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
-    named = [(id, key, stops if id == "stop_by_space" else label) for id, key, label in keys]
+    named = [(i, spaced, stops) if i == "stop_by_space" else (i, k, text) for i, k, text in keys]
     return fitting(named, width, NEVER_DROPPED)
 
 

@@ -10,6 +10,7 @@ from textual.events import Key, Resize
 from textual.screen import Screen
 from textual.widgets import Input
 
+from tui.terminal.fields import takes_space
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
@@ -48,7 +49,8 @@ class PanelScreen(Screen[None]):
 
     def draw(self, width: int) -> None:
         """Put every line, here that of the keys; the screen is on top and has a size."""
-        self.put("keys", [key_line(line_of(self.name_of_screen, width, self.app.stops_whom))])
+        whom, typing = self.app.stops_whom, takes_space(self.focused)
+        self.put("keys", [key_line(line_of(self.name_of_screen, width, whom, typing=typing))])
 
     @property
     def name_of_screen(self) -> str:
