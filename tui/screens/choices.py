@@ -47,7 +47,7 @@ def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
     serial = tuple(LineChoice(path, description, path) for path, description in ports)
     lately = tuple(LineChoice(text, "") for text in recent)
     return [
-        Group("Serial ports", serial, "none found; r looks again"),
+        Group("Serial ports", serial, "none found: ^p, look again"),
         Group("Recent", lately, "none yet: n types a line"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in SIMULATED)),
     ]

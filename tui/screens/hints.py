@@ -7,7 +7,7 @@ from tui.drive import errors as drive
 
 HINTS: tuple[tuple[type[Exception], str], ...] = (
     (line.PortBusy, "Enter tries again."),
-    (line.PortMissing, "Plug in the adapter and press r, or choose another line."),
+    (line.PortMissing, "Plug in the adapter and press Enter, or choose another line."),
     (line.PortRefused, "Ask for the right to use the port (group dialout), or choose another."),
     (line.LinkSyntaxError, "n types the line again."),
     (line.NoAnswer, "Check address, baud, format and wiring; s asks again."),

@@ -291,7 +291,7 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     edit, result = editor.edits.get(code), editor.results.get(code)
     if code in editor.changed_elsewhere:
         before = _shown(editor, parameter, editor.changed_elsewhere[code])
-        said = f"Changed by somebody else: it was {before}. u drops your edit, y keeps it."
+        said = f"Changed by somebody else: it was {before}. Delete drops your edit, y keeps it."
         return Text(said, ALARM)
     if result is not None and not result.done:
         return Text(result.text, ALARM)
