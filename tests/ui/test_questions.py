@@ -184,6 +184,16 @@ async def test_a_voided_question_answers_no_and_takes_no_yes_any_more() -> None:
             assert asked.answers == [no]
 
 
+async def test_a_question_that_a_stop_ends_at_once_leaves_nothing_to_do() -> None:
+    question = confirm()
+    asked = Asked(question)
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        question.void()
+        await until(pilot, lambda: not question.query("#says"))
+        question._tell_scrolling()  # after the refresh that has come too late
+
+
 def ask() -> Ask:
     return Ask("Reference", lambda _: "", number=True)
 

@@ -29,8 +29,9 @@ class ParameterKeys(Arming):
 
     def list_again(self) -> None:
         """Make the list anew, by what was chosen and what is searched."""
-        self.listed.fill(self.editor, self.query_one("#search", Input).value)
-        self.look()
+        for search in self.query("#search").results(Input):  # none once the screen was left
+            self.listed.fill(self.editor, search.value)
+            self.look()
 
     def note(self, text: str) -> None:
         """Say something in the line of messages, in place of what work has come to."""

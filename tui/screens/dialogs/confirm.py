@@ -61,7 +61,8 @@ class Confirm(KeyQuestion[bool]):
         self.call_after_refresh(self._tell_scrolling)
 
     def _tell_scrolling(self) -> None:
-        if self.query_one("#says").max_scroll_y:
+        says = self.query("#says")  # none where a stop has ended the question meanwhile
+        if says and says.first().max_scroll_y:
             self._keys.append("   ").append_text(hint(("Up, Down", "scroll")))
             self.query_one("#hint", Plain).update(self._keys)
 
