@@ -52,7 +52,7 @@ class ControlSourceScreen(OrderKeys):
     def on_mount(self) -> None:
         """Show the list, and read what the drive holds."""
         self._list()
-        self.query_one(OptionList).focus()
+        self.query(OptionList).focus()
         self.run_worker(self._read(), exclusive=True, group="sources")
 
     async def _read(self) -> None:
@@ -69,8 +69,10 @@ class ControlSourceScreen(OrderKeys):
 
     def _list(self) -> None:
         """The configurations, with a mark at today's."""
+        if not (found := self.query(OptionList)):
+            return  # the screen was left before it stood
         today = source_in_force(self.session.profile, self._raws)
-        options = self.query_one(OptionList)
+        options = found.first()
         at = options.highlighted
         if at is None:
             at = self._sources.index(today) if today else 0

@@ -70,7 +70,7 @@ class FaultsScreen(OrderKeys):
         self._recorder.acknowledge()
         self._shown = self._recorder.latest
         self._list()
-        self.query_one(OptionList).focus()
+        self.query(OptionList).focus()
         self._read_again()
 
     def _read_again(self) -> None:
@@ -89,7 +89,9 @@ class FaultsScreen(OrderKeys):
         self.look()
 
     def _list(self) -> None:
-        options = self.query_one(OptionList)
+        if not (found := self.query(OptionList)):
+            return  # the screen was left before it stood
+        options = found.first()
         at = options.highlighted or 0
         profile = self.session.profile
         options.clear_options()
