@@ -188,7 +188,7 @@ def test_blocks(
     app.opened = fakes.opened()
     desk.session.arming = desk.session.work.arming = fakes.StillArming(desk.session.line, armed)
     console = DriveConsole(desk.session, desk.journal)
-    console.blocks = desk
+    console.blocks, console.monitor = desk, desk.monitor
     fakes.choose(app, console)
 
     async def show(pilot: Pilot[None]) -> None:

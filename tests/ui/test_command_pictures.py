@@ -173,7 +173,8 @@ def test_screens_of_commanding(
 
     async def read(codes: list[str], **_: Any) -> Any:
         profile = monitor.session.profile
-        return fakes.readings_of(profile, {code: held.get(code, 0) for code in codes}, fakes.NOW)
+        raws = {code: held.get(code, 0) for code in (*codes, "INR")}  # INR scales the ramps
+        return fakes.readings_of(profile, raws, fakes.NOW)
 
     monkeypatch.setattr(monitor.console, "read", read)
     if screen == "leave-running":

@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import pytest
 from textual.pilot import Pilot
+from textual.screen import ModalScreen
 from textual.widgets import OptionList
 
 from tui.app import DrivePanelApp
@@ -131,8 +132,10 @@ async def test_frames_help_and_palette_open_and_close() -> None:
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         await pilot.press("question_mark")
         await until(pilot, lambda: isinstance(app.screen, HelpScreen))
-        await pilot.press("escape", "ctrl+p")
-        await pilot.pause(0.2)
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        await pilot.press("ctrl+p")
+        await until(pilot, lambda: isinstance(app.screen, ModalScreen))
         await pilot.press("escape")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
 
@@ -226,6 +229,7 @@ async def test_only_changed_lines_are_drawn() -> None:
         await until(pilot, lambda: "RUNNING" in shown(app, "state"))
         word = screen.query_one("#word", Lines)
         await pilot.pause(1.0)
+        screen.look()
         before = word.redrawn
         screen.look()
         screen.look()

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import time
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -101,6 +104,13 @@ def compared(editor: Editor) -> None:
     editor.other_label = "pump-2.toml"
 
 
+WALL = 1_795_259_250.0
+FILES = (
+    "pump-2.toml",
+    "atv71-2-20261120-0959.toml",
+    "a-name-that-is-longer-than-its-column-2026.toml",
+)
+"""Files that can be opened, the newest first."""
 STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
     "settings": (plain, fakes.READY, None, []),
     "found": (plain, fakes.READY, None, ["slash", *"ramp", "enter"]),
@@ -118,6 +128,7 @@ STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
     "names": (plain, fakes.READY, 52.0, ["slash", *"stt", "enter", "enter"]),
     "confirm": (plain, fakes.READY, 52.0, ["slash", *"fry", "enter", "y"]),
     "save": (done, fakes.READY, 52.0, ["S"]),
+    "open": (plain, fakes.READY, None, ["ctrl+o", "down"]),
     "factory": (done, fakes.READY, 52.0, ["F"]),
     "help": (plain, fakes.READY, 52.0, ["question_mark"]),
 }
@@ -126,10 +137,19 @@ STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
 @SIZES
 @pytest.mark.parametrize("state", STATES)
 def test_parameters(
-    snap_compare: Compare, state: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+    snap_compare: Compare,
+    state: str,
+    size: tuple[int, int],
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
 ) -> None:
     prepare, drive, armed, keys = STATES[state]
     monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
+    time.tzset()
+    monkeypatch.chdir(tmp_path)
+    for age, name in enumerate(FILES):
+        (tmp_path / name).touch()
+        os.utime(tmp_path / name, (WALL - 90_000 * age,) * 2)
     console = editor_of(drive, armed=armed)
     prepare(console.editor)
     app = fakes.app_of()

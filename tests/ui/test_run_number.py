@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.drive import library
-from tui.screens.run_line import LONGEST, SETTLED, STEPS, RunLine, proposed, run_lines
+from tui.screens.run_line import LONGEST, STEPS, RunLine, proposed, run_lines
 
 from . import fakes
 
@@ -57,11 +57,6 @@ def test_arrows_step_within_the_limits(key: str, ends: str) -> None:
     for _ in range(40):
         line = line.stepped(key, Decimal(10), Decimal(50))
     assert Decimal(line.text) == (Decimal(50) if STEPS[key] > 0 else Decimal(10))
-
-
-def test_enter_counts_once_the_line_has_stood_for_a_moment() -> None:
-    assert not LINE.counts(100.0 + SETTLED - 0.01)
-    assert LINE.counts(100.0 + SETTLED + 0.01)
 
 
 @given(st.text(alphabet="0123456789.,", max_size=30))

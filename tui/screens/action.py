@@ -15,6 +15,7 @@ KEY_NAMES = {
     "ctrl+l": "^l",
     "ctrl+s": "^s",
     "ctrl+o": "^o",
+    "shift+tab": "Shift+Tab",
     "pageup": "PgUp",
     "pagedown": "PgDn",
 }

@@ -14,7 +14,6 @@ from textual.screen import ModalScreen
 from tui.widgets.palette import ALARM, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
 from tui.widgets.plain import Plain
 
-from .action import KEY_NAMES
 from .actions import of_screen
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
@@ -26,6 +25,8 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
     ("│", "white", "on a bar: the reference"),
     ("●", "white", "a bit that is 1"),
 )
+WITHOUT_KEY = "^p"
+"""Where an action without a key of its own is found: in the list of all."""
 STYLES = {"green": RUNNING, "red": FAULT, "amber": ALARM, "grey": FAINT, "white": PLAIN}
 
 
@@ -55,7 +56,7 @@ def help_text(screen: str) -> Table:
         Text.assemble((f"Keys on {screen.capitalize()}", TITLE), ("   Esc closes", FAINT)),
     )
     for action in of_screen(screen):
-        key = action.shown or KEY_NAMES["ctrl+p"]  # what has no key is in the list of actions
+        key = action.shown or WITHOUT_KEY
         table.add_row(Text(key, KEY, no_wrap=True), Text(action.help, PLAIN))
     table.add_row("", "")
     table.add_row("", Text("Signs", TITLE))
