@@ -19,14 +19,15 @@ NO_SEARCH = ["backspace"] * 4
 STEPS: tuple[tuple[list[str], float, str], ...] = (
     (["question_mark"], 0.5, "help"),
     (["escape", "a"], 1.0, "armed"),
-    (["c"], 1.5, ""),
+    (["r", *"42"], 1.0, "run-line"),
+    (["escape", "6"], 1.5, ""),
     (["down"], 0.5, "control-source"),
-    (["escape", "3"], 6.0, ""),
+    (["3"], 6.0, ""),
     (["slash", *"ramp", "enter"], 1.5, "parameters-found"),
     (["slash", *NO_SEARCH, *"acc", "enter", "enter"], 0.5, ""),
     ([*"5.03"], 0.5, "parameters-edit"),
     (["enter", "slash", *NO_SEARCH, *"speed", "enter", "minus"], 1.0, "parameters"),
-    (["a", "a", "w"], 0.5, "parameters-write"),
+    (["a", "w"], 0.5, "parameters-write"),
     (["escape", "4"], 3.0, ""),
     (["down", "down", "enter", *"lcr"], 0.5, "blocks-pick"),
     (["enter", "down", "enter", *"uln"], 0.5, ""),
@@ -90,7 +91,7 @@ async def _run(size: tuple[int, int]) -> None:
         simulation.drive(WATCHED).provoke(FAULT_CODE)
         await pilot.pause(4.0)
         save("monitor-fault")
-        await pilot.press("h")
+        await pilot.press("5")
         await pilot.pause(2.0)
         save("faults")
 
