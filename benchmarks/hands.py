@@ -29,6 +29,8 @@ STOPS = (b" ", b"\x1b[24~", b"\x1b[20~")
 KEYS = [bytes([code]) for code in range(33, 127) if code != ord("q")]
 """Without q, which leaves a panel whose motor stands, and ends the count."""
 KEYS += [b"\r", b"\t", b"\x7f", b"\x1b[A", b"\x1b[B", b"\x1b[5~", b"\x1b[6~", b"\x1b", b"\x1bOP"]
+TEXTS = {b"/", b"n"}
+"""Keys that open a text, where a Space is one: a search, the name of a line."""
 QUIET = 0.15
 """Seconds after a piece in which whatever it does has been sent."""
 AWAY = 0.12
@@ -50,6 +52,8 @@ class Counted:
     still_armed: int = 0
     stopless: int = 0
     """Stop keys that no stop frame followed."""
+    typed: int = 0
+    """Spaces that went into a text which keys before them had opened."""
 
 
 def is_stop(write: Write) -> bool:
@@ -119,10 +123,12 @@ def bursts(panel: PtyPanel, chance: random.Random, count: int, counted: Counted)
         counted.pieces += 1
         counted.keys += len(before_keys) + 1
         at = next((i for i, write in enumerate(sent) if is_stop(write)), None)
-        counted.stopless += at is None
+        typed = at is None and stop == b" " and not TEXTS.isdisjoint(before_keys)
+        counted.typed += typed
+        counted.stopless += at is None and not typed
         counted.stops += sum(map(is_stop, sent))
         _count(sent[at or 0 :], counted)
-        counted.still_armed += not _disarmed(panel)
+        counted.still_armed += not typed and not _disarmed(panel)
         if after_keys:
             mark = len(panel.log.writes)
             send(panel, chance, after_keys)
