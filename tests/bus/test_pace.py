@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.bus.pace import SHARE, Pace
+from tui.bus.schedule.pace import SHARE, Pace
 
 
 def test_a_line_with_time_to_spare_keeps_every_wish() -> None:

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import pytest
 
-from tui.bus.backoff import pause
-from tui.bus.devices import LONG_MEMORY, SHORT_MEMORY, Devices
 from tui.bus.errors import LineBusy, LineClosed, Superseded
-from tui.bus.jobs import Job, JobQueue
 from tui.bus.line import Priority, Timing
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
-from tui.bus.rtu import Piece
+from tui.bus.rtu.frames import Piece
+from tui.bus.schedule.backoff import pause
+from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, Devices
+from tui.bus.schedule.queue import Job, JobQueue
 from tui.bus.trace import Trace
 from tui.wire.frames import frame
 

@@ -8,11 +8,11 @@ from collections.abc import Sequence
 
 import pytest
 
-from tui.bus import connection
 from tui.bus.errors import ExchangeError
 from tui.bus.line import Line, LineStatus, Priority, Timing
 from tui.bus.link import RtuTcpLink, SerialLink
-from tui.bus.serial_thread import ThreadedSerial
+from tui.bus.schedule import connection
+from tui.bus.transport.serial_thread import ThreadedSerial
 from tui.wire.frames import frame
 
 from .conftest import OpenLine

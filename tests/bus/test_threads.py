@@ -13,7 +13,7 @@ import pytest
 from tui.bus.errors import LineClosed, LineError
 from tui.bus.line import Line, LineStatus, Priority
 from tui.bus.link import SerialLink
-from tui.bus.ports import is_pseudo_terminal, list_ports
+from tui.bus.transport.ports import is_pseudo_terminal, list_ports
 
 from .conftest import WIDE, OpenLine
 from .peer import PtyPeer, eventually, honest, silent

@@ -12,7 +12,7 @@ import pytest
 
 from tui.bus.errors import LineLost, NoAnswer
 from tui.bus.line import LineState, LineStatus, Priority, Reply, Worker
-from tui.bus.pace import Pace
+from tui.bus.schedule.pace import Pace
 from tui.session.drive import DriveSession
 from tui.session.due import Due
 from tui.session.monitor import FORGOTTEN_AFTER, Monitor, Snapshot

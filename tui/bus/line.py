@@ -8,10 +8,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
-from .devices import Devices
-from .engine import Engine
 from .errors import RequestRefused, WrongReply
-from .jobs import Answer, Job
 from .limits import Limits, refusal
 from .link import Link
 from .model import (
@@ -24,7 +21,6 @@ from .model import (
     Reply,
     Timing,
 )
-from .pace import Pace
 from .requests import (
     BROADCAST,
     Diagnose,
@@ -38,8 +34,12 @@ from .requests import (
     objects_of,
     words_of,
 )
+from .schedule.engine import Engine
+from .schedule.pace import Pace
+from .schedule.patience import Devices
+from .schedule.queue import Answer, Job
+from .schedule.worker import Work, Worker
 from .trace import Frame
-from .worker import Work, Worker
 
 __all__ = [
     "Counters",

@@ -10,8 +10,8 @@ from typing import Protocol
 from .errors import LineLost
 from .expectation import Expectation
 from .model import Timing
-from .rtu import Piece
-from .rtu_exchange import Verdict
+from .rtu.exchange import Verdict
+from .rtu.frames import Piece
 from .tally import Tally
 from .trace import Trace
 

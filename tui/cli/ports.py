@@ -14,7 +14,7 @@ from .say import say
 @told
 def ports(as_json: bool) -> None:
     """List the serial ports of this machine and who holds them."""
-    from tui.bus.ports import holder, list_ports
+    from tui.bus.transport.ports import holder, list_ports
 
     from .output import print_json
 

@@ -111,7 +111,7 @@ def _serve(
         simulation.serve_pty(pty)
         return f"serial:{pty}"
     if serial is not None:
-        from tui.bus.ports import open_serial
+        from tui.bus.transport.ports import open_serial
 
         timing = simulation.timing
         simulation.serve_stream(open_serial(serial, timing.baud, timing.format))

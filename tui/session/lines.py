@@ -82,7 +82,7 @@ def check_line(text: str) -> None:
 
 def serial_ports() -> list[tuple[str, str]]:
     """Paths and descriptions of the serial ports of this machine."""
-    from tui.bus.ports import list_ports
+    from tui.bus.transport.ports import list_ports
 
     return [(port.path, port.description) for port in list_ports()]
 

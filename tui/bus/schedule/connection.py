@@ -8,19 +8,19 @@ import os
 import socket
 from collections.abc import Callable
 
+from ..errors import LineError, LineLost
+from ..link import Link, RtuTcpLink, SerialLink, TcpLink, label
+from ..master import Master, Surroundings
+from ..model import LineState, LineStatus
+from ..rtu.master import RtuMaster
+from ..tcp.master import TcpMaster
+from ..transport.base import Transport
+from ..transport.ports import is_pseudo_terminal, open_serial, other_openers
+from ..transport.serial_posix import PosixSerial
+from ..transport.serial_thread import ThreadedSerial
+from ..transport.tcp import TcpTransport
 from .backoff import pause
 from .dispatcher import Dispatcher
-from .errors import LineError, LineLost
-from .link import Link, RtuTcpLink, SerialLink, TcpLink, label
-from .master import Master, Surroundings
-from .model import LineState, LineStatus
-from .ports import is_pseudo_terminal, open_serial, other_openers
-from .rtu_master import RtuMaster
-from .serial_posix import PosixSerial
-from .serial_thread import ThreadedSerial
-from .tcp_master import TcpMaster
-from .tcp_transport import TcpTransport
-from .transport import Transport
 
 log = logging.getLogger(__name__)
 

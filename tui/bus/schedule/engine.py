@@ -8,16 +8,16 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
+from ..errors import LineClosed, LineError, LineLost, PortBusy, PortMissing, PortRefused
+from ..link import Link, TcpLink, label
+from ..master import Clock, Surroundings
+from ..model import LineState, LineStatus, Timing
+from ..tally import Tally
+from ..trace import Trace
 from .connection import Connection
-from .devices import Devices
 from .dispatcher import Dispatcher
-from .errors import LineClosed, LineError, LineLost, PortBusy, PortMissing, PortRefused
-from .jobs import Job
-from .link import Link, TcpLink, label
-from .master import Clock, Surroundings
-from .model import LineState, LineStatus, Timing
-from .tally import Tally
-from .trace import Trace
+from .patience import Devices
+from .queue import Job
 from .worker import Work, Worker
 
 T = TypeVar("T")

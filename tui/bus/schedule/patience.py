@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from statistics import median
 
+from ..expectation import EXCEPTION, Expectation
+from ..limits import CAUTIOUS, Limits
+from ..model import DeviceState, Priority, Timing
+from ..requests import Read, WriteMany
+from ..rtu.frames import Piece
 from .backoff import pause
-from .expectation import EXCEPTION, Expectation
-from .limits import CAUTIOUS, Limits
-from .model import DeviceState, Priority, Timing
-from .requests import Read, WriteMany
-from .rtu import Piece
 
 RECENT = 16
 """Turnarounds remembered for each function."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import serial
 from serial.tools import list_ports as system_ports
 
-from .errors import PortBusy, PortMissing, PortRefused
+from ..errors import PortBusy, PortMissing, PortRefused
 
 BUSY = frozenset({errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK})
 MISSING = frozenset({errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR})

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from tui.wire.frames import frame_end, is_whole
 
-from .expectation import EXCEPTION, Expectation, exception_code, exception_extents
+from ..expectation import EXCEPTION, Expectation, exception_code, exception_extents
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,8 +8,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from .expectation import Expectation
-from .rtu import Match, Piece, begins_reply, find_reply, pieces
+from ..expectation import Expectation
+from .frames import Match, Piece, begins_reply, find_reply, pieces
 
 NOISE = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""

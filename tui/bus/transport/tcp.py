@@ -6,7 +6,7 @@ import asyncio
 import socket
 import time
 
-from .transport import Receiver
+from .base import Receiver
 
 UNACKNOWLEDGED = 5000
 """Milliseconds after which sent bytes without acknowledgement end the connection (Linux)."""

@@ -9,7 +9,7 @@ import time
 
 import serial
 
-from .transport import Receiver
+from .base import Receiver
 
 LUMP = 4096
 COARSE = 0.0025

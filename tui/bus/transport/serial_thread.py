@@ -9,7 +9,7 @@ from contextlib import suppress
 
 import serial
 
-from .transport import Receiver
+from .base import Receiver
 
 READ_TIMEOUT = 0.05
 COARSE = 0.002

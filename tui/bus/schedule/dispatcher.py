@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Iterable
 
-from .devices import Devices
-from .errors import (
+from ..errors import (
     ChecksumFault,
     DeviceException,
     LineClosed,
@@ -16,14 +15,15 @@ from .errors import (
     RequestRefused,
     WrongReply,
 )
-from .jobs import Answer, Job, JobQueue
-from .limits import STANDARD_EXCEPTIONS
-from .master import Clock, Master, Outcome, Sending
-from .model import Priority, Timing
-from .requests import BROADCAST, Read
-from .rtu import Piece
-from .rtu_exchange import Kind
-from .tally import Tally
+from ..limits import STANDARD_EXCEPTIONS
+from ..master import Clock, Master, Outcome, Sending
+from ..model import Priority, Timing
+from ..requests import BROADCAST, Read
+from ..rtu.exchange import Kind
+from ..rtu.frames import Piece
+from ..tally import Tally
+from .patience import Devices
+from .queue import Answer, Job, JobQueue
 
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""

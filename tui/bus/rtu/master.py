@@ -8,12 +8,12 @@ from collections.abc import Callable
 
 from tui.wire.frames import MAX_FRAME, frame
 
-from .errors import LineLost
-from .link import Link, RtuTcpLink, character_time, silence
-from .master import Outcome, Sending, Surroundings, settle
-from .rtu import pieces
-from .rtu_exchange import Kind, RtuExchange, Verdict
-from .transport import Transport
+from ..errors import LineLost
+from ..link import Link, RtuTcpLink, character_time, silence
+from ..master import Outcome, Sending, Surroundings, settle
+from ..transport.base import Transport
+from .exchange import Kind, RtuExchange, Verdict
+from .frames import pieces
 
 BABBLE = 1.0
 """Seconds to wait for silence on a line that never falls silent, before sending all the same."""

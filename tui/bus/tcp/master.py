@@ -8,11 +8,11 @@ from collections.abc import Callable
 from pymodbus.framer.socket import FramerSocket
 from pymodbus.pdu import DecodePDU
 
-from .errors import LineLost
-from .expectation import exception_code
-from .master import Outcome, Sending, Surroundings, settle
-from .rtu_exchange import Kind, Verdict
-from .transport import Transport
+from ..errors import LineLost
+from ..expectation import exception_code
+from ..master import Outcome, Sending, Surroundings, settle
+from ..rtu.exchange import Kind, Verdict
+from ..transport.base import Transport
 
 HEADER = 7
 """Transaction id, protocol id, length, unit id."""

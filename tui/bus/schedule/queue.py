@@ -7,11 +7,11 @@ from collections.abc import Callable
 from concurrent.futures import Future
 from dataclasses import dataclass, field
 
-from .errors import LineBusy, LineError, Superseded
-from .expectation import Expectation
-from .limits import Limits
-from .model import Priority
-from .requests import BROADCAST, Request
+from ..errors import LineBusy, LineError, Superseded
+from ..expectation import Expectation
+from ..limits import Limits
+from ..model import Priority
+from ..requests import BROADCAST, Request
 
 
 @dataclass(frozen=True, slots=True)

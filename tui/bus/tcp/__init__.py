@@ -1,0 +1,1 @@
+"""Modbus TCP: one request with its reply."""
