@@ -30,7 +30,7 @@ from rich.table import Table
 from benchmarks.hello import TEXTS
 from benchmarks.terminal import Figures, Key, Terminal, press_often, spread, steady
 from benchmarks.wire import ROOT
-from tui.cli.panel import run_panel
+from tui.cli.commands.panel import run_panel
 
 SIZES = ((80, 24), (120, 40))
 SLOW = 20_000.0

@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
-from tui.cli.logs import stop_logging
+from tui.cli.shared.logs import stop_logging
 
 settings.register_profile("drivepanel", deadline=None)
 settings.load_profile("drivepanel")

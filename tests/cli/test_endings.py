@@ -14,7 +14,7 @@ import pytest
 from rich.console import Console
 
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, port_of, served, simulated
-from tui.cli.output import readings_table
+from tui.cli.shared.output import readings_table
 from tui.drive import library
 from tui.drive.values import decode
 from tui.session.monitor import monitoring_codes

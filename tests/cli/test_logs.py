@@ -10,7 +10,7 @@ from pathlib import Path
 
 import tui
 from tests.programs import PATIENCE, wait_until
-from tui.cli.logs import log_file, start_logging, stop_logging
+from tui.cli.shared.logs import log_file, start_logging, stop_logging
 from tui.session.lines import open_line
 
 SOURCES = Path(tui.__file__).parent
@@ -45,7 +45,7 @@ def test_every_module_logs_by_its_own_name() -> None:
                 name = path.relative_to(SOURCES).as_posix()
                 named.setdefault(name, []).extend(ast.unparse(each) for each in node.args)
     # the one that hangs the handler, and the one that silences pymodbus
-    assert named.pop("cli/logs.py") == ["PANEL", "PANEL"]
+    assert named.pop("cli/shared/logs.py") == ["PANEL", "PANEL"]
     assert named["bus/line.py"] == ["'pymodbus'", "'pymodbus'"]
     del named["bus/line.py"]
     assert len(named) > 3

@@ -10,8 +10,8 @@ from click.testing import CliRunner
 
 from tests.programs import drivepanel, free_port
 from tui.bus.errors import RequestRefused
-from tui.cli.errors import told
-from tui.cli.logs import log_file, start_logging, stop_logging
+from tui.cli.shared.errors import told
+from tui.cli.shared.logs import log_file, start_logging, stop_logging
 from tui.drive.errors import ValueRefused
 
 from .commands import tcp_line

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from tests.drive.test_add_a_drive import example
-from tui.cli.output import json_text
-from tui.cli.say import printable
+from tui.cli.shared.output import json_text
+from tui.cli.shared.say import printable
 from tui.drive.plain import commands
 from tui.simulator import DriveSpec, Simulation
 

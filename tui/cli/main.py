@@ -9,8 +9,8 @@ import click
 
 import tui
 
-from .errors import plain_usage
-from .logs import start_logging
+from .shared.errors import plain_usage
+from .shared.logs import start_logging
 
 COMMANDS = {
     "backup": ("backup", "Write every parameter of a drive to a file."),
@@ -63,7 +63,7 @@ class Commands(click.Group):
         if cmd_name != "panel" and cmd_name not in COMMANDS:
             return None
         module = "panel" if cmd_name == "panel" else COMMANDS[cmd_name][0]
-        found: Any = getattr(importlib.import_module(f"tui.cli.{module}"), cmd_name)
+        found: Any = getattr(importlib.import_module(f"tui.cli.commands.{module}"), cmd_name)
         assert isinstance(found, click.Command)
         return found
 

@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import LINE_TROUBLE, Failure, told
-from .options import (
+from ..shared.errors import LINE_TROUBLE, Failure, told
+from ..shared.options import (
     Target,
     connect,
     drive_options,
@@ -22,7 +22,7 @@ from .options import (
     on_line,
     read_only_option,
 )
-from .watch_outputs import JsonOutput, Output, csv_output, text_output
+from ..shared.watch_outputs import JsonOutput, Output, csv_output, text_output
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession

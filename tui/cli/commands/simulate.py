@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import told
-from .say import say
+from ..shared.errors import told
+from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, FaultRates, Simulation

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .block_output import show_blocks, show_neighbours
-from .errors import DONE, DRIVE_REFUSED, REFUSED_HERE, USAGE, Failure, told
-from .options import (
+from ..shared.block_output import show_blocks, show_neighbours
+from ..shared.errors import DONE, DRIVE_REFUSED, REFUSED_HERE, USAGE, Failure, told
+from ..shared.options import (
     Target,
     connect,
     json_option,
@@ -19,9 +19,9 @@ from .options import (
     read_only_option,
     settings_options,
 )
+from ..shared.say import say
+from ..shared.sets import dry_run_option, write_down
 from .orders import arm_option, close_journal, need_arming, permit_of
-from .say import say
-from .sets import dry_run_option, write_down
 
 if TYPE_CHECKING:
     from tui.drive.mapping import Assignment

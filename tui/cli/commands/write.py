@@ -6,11 +6,17 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import DONE, told
-from .options import Target, connect, line_argument, on_line, read_only_option, settings_options
-from .orders import arm_option, close_journal, need_arming, permit_of
-from .say import say
-from .sets import (
+from ..shared.errors import DONE, told
+from ..shared.options import (
+    Target,
+    connect,
+    line_argument,
+    on_line,
+    read_only_option,
+    settings_options,
+)
+from ..shared.say import say
+from ..shared.sets import (
     codes_of,
     confirm_option,
     dry_run_option,
@@ -19,6 +25,7 @@ from .sets import (
     say_result,
     status_of_results,
 )
+from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.edits import Edits

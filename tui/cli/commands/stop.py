@@ -10,8 +10,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
-from .options import (
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
+from ..shared.options import (
     Target,
     connect,
     drive_options,
@@ -20,8 +20,8 @@ from .options import (
     read_only_option,
     unidentified,
 )
+from ..shared.say import say
 from .orders import close_journal, complain
-from .say import say
 
 if TYPE_CHECKING:
     from tui.drive.schema import OrderId

@@ -8,9 +8,9 @@ import click
 
 from tui.drive.plain import plain
 
-from .errors import told
-from .options import device_option, json_option, line_argument, on_line, read_only_option
-from .say import say
+from ..shared.errors import told
+from ..shared.options import device_option, json_option, line_argument, on_line, read_only_option
+from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.identify import DriveIdentity
@@ -27,7 +27,7 @@ def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> Non
     """Ask a drive who it is (function 43)."""
     from tui.session.identify import identify as ask
 
-    from .output import print_json
+    from ..shared.output import print_json
 
     async def work(opened: OpenLine) -> DriveIdentity:
         return await ask(opened.line, device)

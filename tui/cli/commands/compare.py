@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import USAGE, Failure, told
-from .options import Target, devices_option
-from .say import say
-from .sets import set_in, set_of_drive
+from ..shared.errors import USAGE, Failure, told
+from ..shared.options import Target, devices_option
+from ..shared.say import say
+from ..shared.sets import set_in, set_of_drive
 
 if TYPE_CHECKING:
     from tui.drive.compare import Format

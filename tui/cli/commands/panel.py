@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import USAGE, Failure, told
-from .options import SLAVE_ADDRESS, read_only_option
-from .signals import ending_by_signal
+from ..shared.errors import USAGE, Failure, told
+from ..shared.options import SLAVE_ADDRESS, read_only_option
+from ..shared.signals import ending_by_signal
 
 if TYPE_CHECKING:
     from tui.session.lines import OpenLine

@@ -6,10 +6,16 @@ from pathlib import Path
 
 import click
 
-from .errors import told
-from .options import Target, line_argument, settings_options
-from .say import say
-from .sets import file_argument, force_option, refuse_existing, set_of_drive, write_down
+from ..shared.errors import told
+from ..shared.options import Target, line_argument, settings_options
+from ..shared.say import say
+from ..shared.sets import (
+    file_argument,
+    force_option,
+    refuse_existing,
+    set_of_drive,
+    write_down,
+)
 
 
 @click.command()

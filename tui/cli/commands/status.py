@@ -10,8 +10,8 @@ import click
 
 from tui.drive.plain import plain
 
-from .errors import told
-from .options import (
+from ..shared.errors import told
+from ..shared.options import (
     Target,
     connect,
     drive_options,
@@ -20,7 +20,7 @@ from .options import (
     on_line,
     read_only_option,
 )
-from .say import say
+from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.drive.profile import Profile
@@ -180,7 +180,7 @@ def watch_json(watch: Watch | None) -> dict[str, Any] | None:
 
 def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
     """What is SHOWN, by quantity; null where the family does not tell it or it was not read."""
-    from .output import reading_json
+    from ..shared.output import reading_json
 
     values: dict[str, Any] = {}
     for quantity in SHOWN:
@@ -227,7 +227,7 @@ def status(
     as_json: bool,
 ) -> None:
     """Tell what a drive does, who commands it, and what it does when the line falls silent."""
-    from .output import print_json
+    from ..shared.output import print_json
 
     async def work(opened: OpenLine) -> Status:
         return await status_of_drive(await connect(opened, target), opened)

@@ -21,8 +21,8 @@ from tui.bus.errors import LineError
 from tui.session.keeper import left_alone_text
 from tui.session.recording import StartKeeper
 
-from .errors import DRIVE_REFUSED, REFUSED_HERE, Failure, told
-from .options import (
+from ..shared.errors import DRIVE_REFUSED, REFUSED_HERE, Failure, told
+from ..shared.options import (
     Target,
     drive_options,
     json_option,
@@ -30,6 +30,7 @@ from .options import (
     on_line,
     read_only_option,
 )
+from ..shared.say import printable
 from .orders import (
     arm_drive,
     arm_option,
@@ -41,7 +42,6 @@ from .orders import (
     watch_of,
     watched,
 )
-from .say import printable
 from .status import fault_text, shown_values, values_json
 
 if TYPE_CHECKING:
@@ -298,7 +298,7 @@ class Run:
         return "  ".join([latest.state.headline, *(f"{k} {v}" for k, v in values.items())])
 
     def _tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
-        from .output import iso_time, json_text
+        from ..shared.output import iso_time, json_text
 
         now = time.time()
         if not self.wish.as_json:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import click
 
-from .errors import told
-from .options import json_option
-from .say import say
+from ..shared.errors import told
+from ..shared.options import json_option
+from ..shared.say import say
 
 
 @click.command()
@@ -16,7 +16,7 @@ def ports(as_json: bool) -> None:
     """List the serial ports of this machine and who holds them."""
     from tui.bus.transport.ports import holder, list_ports
 
-    from .output import print_json
+    from ..shared.output import print_json
 
     found = [(port, holder(port.path)) for port in list_ports()]
     if as_json:

@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import DONE, DRIVE_REFUSED, status_of, told
-from .options import (
+from ..shared.errors import DONE, DRIVE_REFUSED, status_of, told
+from ..shared.options import (
     Target,
     connect,
     devices_option,
@@ -18,9 +18,8 @@ from .options import (
     profile_option,
     read_only_option,
 )
-from .orders import arm_option, close_journal, need_arming, permit_of
-from .say import say
-from .sets import (
+from ..shared.say import say
+from ..shared.sets import (
     codes_of,
     confirm_option,
     counter,
@@ -32,6 +31,7 @@ from .sets import (
     set_in,
     status_of_results,
 )
+from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.parameter_set import ParameterSet

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import told
-from .options import json_option
-from .say import say
+from ..shared.errors import told
+from ..shared.options import json_option
+from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.drive.profile import Profile
@@ -42,7 +42,7 @@ def profiles(profile_id: str | None, file: Path | None, as_json: bool) -> None:
 def _list(as_json: bool) -> None:
     from tui.drive import library
 
-    from .output import print_json
+    from ..shared.output import print_json
 
     found = library.listings()
     if as_json:
@@ -58,7 +58,7 @@ def _list(as_json: bool) -> None:
 
 
 def _show(profile: Profile, as_json: bool) -> None:
-    from .output import console, print_json
+    from ..shared.output import console, print_json
 
     if as_json:
         import msgspec

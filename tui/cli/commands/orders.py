@@ -13,9 +13,16 @@ import click
 from tui.drive.orders import OrderRefused
 from tui.session.work import Kind, Outcome
 
-from .errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
-from .options import Target, connect, drive_options, line_argument, on_line, read_only_option
-from .say import say
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
+from ..shared.options import (
+    Target,
+    connect,
+    drive_options,
+    line_argument,
+    on_line,
+    read_only_option,
+)
+from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.command import Commander

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import click
 
-from .errors import DRIVE_REFUSED, told
-from .options import (
+from ..shared.errors import DRIVE_REFUSED, told
+from ..shared.options import (
     Target,
     connect,
     drive_options,
@@ -16,7 +16,7 @@ from .options import (
     on_line,
     read_only_option,
 )
-from .say import say
+from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
@@ -44,7 +44,7 @@ def read(
     """
     from tui.session.reader import Reader
 
-    from .output import print_json, print_readings, readings_json
+    from ..shared.output import print_json, print_readings, readings_json
 
     async def work(opened: OpenLine) -> tuple[DriveSession, dict[str, Reading]]:
         session = await connect(opened, target)
