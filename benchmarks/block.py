@@ -21,12 +21,12 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from tui.drive.library import load
-from tui.drive.mapping import empty, pick
-from tui.drive.mapping_wire import cost
-from tui.drive.profile import Profile
+from tui.drive.blocks.assignment import empty, pick
+from tui.drive.blocks.wire_cost import cost
+from tui.drive.profile.library import load
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block
 from tui.drive.read_plan import WireTiming
-from tui.drive.schema import Block
 from tui.session.drive import DriveSession
 from tui.session.lines import open_line
 from tui.session.monitor import Monitor, Snapshot, rates_of

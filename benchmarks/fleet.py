@@ -26,7 +26,7 @@ from rich.table import Table
 from benchmarks.wire import Record, WireLine, Worker, share
 from tui.bus.line import Line
 from tui.bus.link import parse_link
-from tui.drive.library import load
+from tui.drive.profile.library import load
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.session.drive import DriveSession
 from tui.session.monitor import Monitor, monitoring_codes

@@ -28,7 +28,7 @@ from benchmarks.masters import (
     worker,
 )
 from benchmarks.wire import Record, WireLine, share
-from tui.drive.library import load
+from tui.drive.profile.library import load
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.values import word_count
 from tui.session.monitor import monitoring_codes

@@ -27,7 +27,7 @@ from typing import Any
 from serial import PARITY_NONE
 
 from benchmarks.wire import ROOT, Record, WireLine, Worker
-from tui.drive.library import load
+from tui.drive.profile.library import load
 from tui.session.monitor import SHORTEST_PERIOD, monitoring_codes
 
 DEVICE = 1

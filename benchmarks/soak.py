@@ -36,7 +36,7 @@ from benchmarks.wire import share
 from tui.bus.errors import LineError
 from tui.bus.line import Line
 from tui.bus.link import parse_link
-from tui.drive.library import load
+from tui.drive.profile.library import load
 from tui.session.drive import DriveSession
 from tui.session.keeper import Keeper
 from tui.session.monitor import Monitor, Snapshot

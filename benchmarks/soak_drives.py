@@ -12,9 +12,9 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 from tui.drive.chart import watched_codes
-from tui.drive.library import load
 from tui.drive.orders import deciding_codes
-from tui.drive.profile import Profile
+from tui.drive.profile.library import load
+from tui.drive.profile.profile import Profile
 from tui.drive.values import from_words, to_words, word_count
 from tui.simulator import DriveSpec, FaultRates, LineTiming, Simulation
 

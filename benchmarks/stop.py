@@ -66,7 +66,7 @@ def panel() -> None:
     from tui.bus.errors import LineError
     from tui.bus.line import Priority
     from tui.drive.errors import DriveError
-    from tui.drive.library import load
+    from tui.drive.profile.library import load
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.monitor import Monitor

@@ -23,8 +23,8 @@ from rich.table import Table
 from benchmarks.wire import Record, WireLine
 from tui.bus.line import Line
 from tui.bus.link import parse_link
-from tui.drive.library import load
-from tui.drive.profile import Profile
+from tui.drive.profile.library import load
+from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.values import word_count
 from tui.session.asking import neighbours

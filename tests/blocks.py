@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Block
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block
 
 
 def block_of(profile: Profile, direction: str) -> Block:

@@ -97,7 +97,7 @@ def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> No
     assert done.returncode == 0, done.stderr
     loaded = set(done.stdout.split())
     assert "tui.screens.connection" in loaded
-    unwanted = {"pymodbus", "msgspec", "tui.bus.line", "tui.drive.profile", "tui.simulator"}
+    unwanted = {"pymodbus", "msgspec", "tui.bus.line", "tui.drive.profile.profile", "tui.simulator"}
     assert not loaded & unwanted
     assert not {"tui.session.monitor", "tui.screens.monitor", "tui.session.journal"} & loaded
 
@@ -124,7 +124,7 @@ def test_the_installed_wheel_works_in_another_folder(tmp_path: Path) -> None:
     site = tmp_path / "site"
     with zipfile.ZipFile(wheel) as packed:
         packed.extractall(site)
-    show = f"import sys; sys.path.insert(0, {str(site)!r}); import tui.drive.library as l; "
+    show = f"import sys; sys.path.insert(0, {str(site)!r}); import tui.drive.profile.library as l; "
     done = run(
         sys.executable,
         "-c",

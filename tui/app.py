@@ -34,7 +34,7 @@ from .screens.leaving import Leaving
 from .screens.places import Places
 
 if TYPE_CHECKING:
-    from tui.drive.schema import OrderId
+    from tui.drive.profile.schema import OrderId
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet

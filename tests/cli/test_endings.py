@@ -15,7 +15,7 @@ from rich.console import Console
 
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, port_of, served, simulated
 from tui.cli.shared.output import readings_table
-from tui.drive import library
+from tui.drive.profile import library
 from tui.drive.values import decode
 from tui.session.monitor import monitoring_codes
 from tui.session.readings import Quality, Reading

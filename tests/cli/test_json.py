@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from tests.programs import drivepanel
-from tui.drive import library
+from tui.drive.profile import library
 from tui.session.monitor import monitoring_codes
 
 from .commands import tcp_line

@@ -10,10 +10,10 @@ from typing import get_args
 import msgspec
 import pytest
 
-from tui.drive import library
 from tui.drive.errors import ProfileError
-from tui.drive.memory_orders import MemoryRefused, factory_order, save_order
-from tui.drive.schema import Confidence, Parameter, ProfileData
+from tui.drive.profile import library
+from tui.drive.profile.schema import Confidence, Parameter, ProfileData
+from tui.drive.settings.memory_orders import MemoryRefused, factory_order, save_order
 from tui.drive.values import decode, encode
 
 README = Path(__file__).parents[2] / "profiles" / "README.md"

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from tui.drive import library
 from tui.drive.control_source import changes, source_codes, source_in_force
+from tui.drive.profile import library
 from tui.drive.values import check_raw
 
 FAMILIES = ["atv21", "atv31", "atv312", "atv71"]

@@ -9,8 +9,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.drive import library
-from tui.drive.edits import (
+from tui.drive.errors import UnknownParameter, ValueRefused
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.edits import (
     Edit,
     Edits,
     consequences,
@@ -19,8 +21,6 @@ from tui.drive.edits import (
     ordered,
     problems,
 )
-from tui.drive.errors import UnknownParameter, ValueRefused
-from tui.drive.profile import Profile
 from tui.drive.shown import shown
 
 ATV71, ATV31, ATV312, ATV21 = (library.load(p) for p in ("atv71", "atv31", "atv312", "atv21"))

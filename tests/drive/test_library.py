@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from tui.drive import json_schema, library
 from tui.drive.errors import ProfileError, UnknownParameter, UnknownProfile
-from tui.drive.profile import notations, parse_address
+from tui.drive.profile import json_schema, library
+from tui.drive.profile.profile import notations, parse_address
 
 SMALL = """\
 [profile]
@@ -130,7 +130,7 @@ def test_a_listing_reads_the_head_alone(tmp_path: Path, monkeypatch: pytest.Monk
 def test_a_listing_imports_no_decoder() -> None:
     code = (
         "import sys; from tui.drive import library; library.listings();"
-        "print([m for m in ('tomli', 'tomllib', 'tui.drive.decode') if m in sys.modules])"
+        "print([m for m in ('tomli', 'tomllib', 'tui.drive.profile.decode') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -7,9 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.blocks import block_of
-from tui.drive import library
-from tui.drive.errors import DriveError, UnknownParameter
-from tui.drive.mapping import (
+from tui.drive.blocks.assignment import (
     UNUSED,
     Assignment,
     MappingError,
@@ -29,11 +27,13 @@ from tui.drive.mapping import (
     steps,
     target,
 )
-from tui.drive.mapping_file import dumps, loads
-from tui.drive.mapping_wire import cost, frame, microseconds, saving, stretches
+from tui.drive.blocks.file import dumps, loads
+from tui.drive.blocks.user_words import UserWord, format_named, is_no_value, word_named
+from tui.drive.blocks.wire_cost import cost, frame, microseconds, saving, stretches
+from tui.drive.errors import DriveError, UnknownParameter
+from tui.drive.profile import library
+from tui.drive.profile.schema import Block
 from tui.drive.read_plan import WireTiming, plan_reads
-from tui.drive.schema import Block
-from tui.drive.user_words import UserWord, format_named, is_no_value, word_named
 from tui.wire.frames import crc16, hex_text
 
 ATV21, ATV71 = library.load("atv21"), library.load("atv71")

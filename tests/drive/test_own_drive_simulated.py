@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from tui.cli.main import main
-from tui.drive import library
+from tui.drive.profile import library
 from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.lines import open_line

@@ -11,14 +11,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tui.drive import library
-from tui.drive.compare import Side, compare, factory_side, side_of, told
 from tui.drive.errors import UnknownProfile
-from tui.drive.parameter_set import Head, ParameterSet, SetError, dumps
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter
-from tui.drive.set_file import FileThere, read_set, write_file
-from tui.drive.set_reading import loads
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
+from tui.drive.settings.compare import Side, compare, factory_side, side_of, told
+from tui.drive.settings.parameter_set import Head, ParameterSet, SetError, dumps
+from tui.drive.settings.set_file import FileThere, read_set, write_file
+from tui.drive.settings.set_reading import loads
 from tui.drive.values import is_enumeration, raw_range, type_range
 
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]

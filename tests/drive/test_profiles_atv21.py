@@ -8,8 +8,8 @@ import pytest
 
 from tui.drive.chart import read_chart
 from tui.drive.errors import ValueRefused
-from tui.drive.library import identify, load_file, packaged_folder
-from tui.drive.profile import Profile, is_verified
+from tui.drive.profile.library import identify, load_file, packaged_folder
+from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.read_plan import plan_reads
 from tui.drive.values import decode, encode, speed_from_frequency
 

@@ -6,9 +6,9 @@ from decimal import Decimal
 
 import pytest
 
-from tui.drive import library
 from tui.drive.chart import state_of
-from tui.drive.profile import Profile
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
 from tui.drive.values import encode
 
 

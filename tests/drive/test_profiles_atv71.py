@@ -6,9 +6,9 @@ import pytest
 
 from tui.drive.chart import UNKNOWN, read_chart, state_of
 from tui.drive.errors import ValueRefused
-from tui.drive.library import identify, load_file, packaged_folder
-from tui.drive.profile import Profile, is_verified
-from tui.drive.schema import Chart, Erratum
+from tui.drive.profile.library import identify, load_file, packaged_folder
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import Chart, Erratum
 from tui.drive.values import check_raw, decode, encode, from_words, raw_range
 
 

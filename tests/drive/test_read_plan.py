@@ -10,9 +10,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tui.drive.errors import DriveError, UnknownParameter
-from tui.drive.profile import Profile
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import ProfileData
 from tui.drive.read_plan import ReadPlan, WireTiming, plan_reads
-from tui.drive.schema import ProfileData
 
 TIMING = WireTiming(character=11 / 19200, silence=3.5 * 11 / 19200, turnaround=0.005)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.drive.shown import depends_on, limits_text, shown, shown_text, typed_text
 
 ATV31 = library.load("atv31")

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tui.drive import library
 from tui.drive.errors import ValueRefused
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
 from tui.drive.values import (
     decode,
     encode,

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import pytest
 
-from tui.drive import library
-from tui.drive.schema import StateKind
-from tui.drive.writable import (
+from tui.drive.profile import library
+from tui.drive.profile.schema import StateKind
+from tui.drive.settings.writable import (
     AT_REST,
     is_order,
     is_setting,

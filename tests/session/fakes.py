@@ -12,8 +12,8 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import DeviceState, Line, Priority, Reply
 from tui.bus.link import SerialLink
-from tui.drive.profile import Profile
-from tui.drive.schema import ProfileData
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import ProfileData
 
 
 class FakeLine:

@@ -11,9 +11,9 @@ from typing import Any
 
 from tui.bus.line import Line, LineStatus
 from tui.bus.link import RtuTcpLink, SerialLink
-from tui.drive import library
-from tui.drive.edits import Edits
-from tui.drive.profile import Profile
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.edits import Edits
 from tui.session.applying import Applied, apply_edits
 from tui.session.asking import Asker
 from tui.session.drive import DriveSession

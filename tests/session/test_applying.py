@@ -9,7 +9,7 @@ import pytest
 
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
-from tui.drive.memory_orders import MemoryRefused
+from tui.drive.settings.memory_orders import MemoryRefused
 from tui.session import asking
 from tui.session.applying import Applied, Outcome, Result, apply_edits
 from tui.session.memory import factory_reset, save_to_eeprom

@@ -17,8 +17,8 @@ import pytest
 from tests.session.sets_bench import state_known
 from tui.bus.line import Line
 from tui.bus.link import SerialLink
-from tui.drive import library
 from tui.drive.orders import OrderRefused
+from tui.drive.profile import library
 from tui.session import arming
 from tui.session.arming import ARMED_FOR
 from tui.session.command import Commander

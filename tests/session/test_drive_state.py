@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.drive.profile import Profile
+from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.drive_state import channel_text, drive_state
 from tui.session.readings import Quality, Reading

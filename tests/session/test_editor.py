@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from tui.drive.errors import ValueRefused
-from tui.drive.parameter_set import dumps
-from tui.drive.rows import FILTERS, rows
-from tui.drive.set_file import read_set, write_file
+from tui.drive.settings.parameter_set import dumps
+from tui.drive.settings.selection import FILTERS, rows
+from tui.drive.settings.set_file import read_set, write_file
 from tui.session.editor import Editor
 from tui.session.upload import Upload
 

@@ -12,9 +12,9 @@ from tests.blocks import block_of
 from tests.session.sets_bench import Bench, bench, state_known
 from tui.bus.errors import RequestRefused
 from tui.bus.line import Reply
+from tui.drive.blocks.assignment import Assignment, MappingError, empty, pick
+from tui.drive.blocks.wire_cost import frame, reach
 from tui.drive.errors import DriveError, ValueRefused
-from tui.drive.mapping import Assignment, MappingError, empty, pick
-from tui.drive.mapping_wire import frame, reach
 from tui.session import exchange as module
 from tui.session.command import Commander
 from tui.session.exchange import Exchanged

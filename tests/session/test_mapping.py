@@ -14,11 +14,11 @@ from tests.blocks import block_of
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.line import Reply
-from tui.drive import library
-from tui.drive.mapping import Assignment, empty, factory, pick
-from tui.drive.mapping_wire import frame, span
-from tui.drive.schema import Block
-from tui.drive.user_words import COUNT, UserWord
+from tui.drive.blocks.assignment import Assignment, empty, factory, pick
+from tui.drive.blocks.user_words import COUNT, UserWord
+from tui.drive.blocks.wire_cost import frame, span
+from tui.drive.profile import library
+from tui.drive.profile.schema import Block
 from tui.session.drive import DriveSession
 from tui.session.lines import open_line
 from tui.session.mapping import Force, Mapper, wire_timing

@@ -25,7 +25,7 @@ from tui.bus.errors import (
 )
 from tui.bus.line import Identification, Line, Priority
 from tui.bus.link import SerialLink
-from tui.drive import library
+from tui.drive.profile import library
 from tui.session.addresses import parse_addresses
 from tui.session.drive import DriveSession
 from tui.session.identify import ScanResult, identify, scan

@@ -15,8 +15,8 @@ import pytest
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Line, Priority, Reply
 from tui.bus.link import SerialLink
-from tui.drive import library
 from tui.drive.orders import OrderRefused
+from tui.drive.profile import library
 from tui.session import monitor as monitor_module
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession

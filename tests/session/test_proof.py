@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.blocks import block_of
-from tui.drive import library
+from tui.drive.profile import library
 from tui.drive.values import decode, type_range
 from tui.session.proof import Proof
 from tui.session.readings import Quality, Reading

@@ -8,14 +8,14 @@ import pytest
 
 from tests.session.sets_bench import FAMILIES, Bench, bench
 from tui.bus.errors import RequestRefused
-from tui.drive import library
-from tui.drive.compare import Side, compare, side_of
-from tui.drive.parameter_set import Head, ParameterSet, dumps
-from tui.drive.profile import is_verified
-from tui.drive.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
-from tui.drive.set_reading import loads
+from tui.drive.profile import library
+from tui.drive.profile.profile import is_verified
+from tui.drive.settings.compare import Side, compare, side_of
+from tui.drive.settings.parameter_set import Head, ParameterSet, dumps
+from tui.drive.settings.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
+from tui.drive.settings.set_reading import loads
+from tui.drive.settings.writable import is_setting, line_setting
 from tui.drive.values import raw_range
-from tui.drive.writable import is_setting, line_setting
 from tui.session.applying import Outcome, Result
 from tui.session.identify import identify
 from tui.session.memory import factory_reset

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import pytest
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.session.drive import DriveSession
 from tui.session.lines import OpenLine, open_line
 from tui.session.monitor import Monitor, Snapshot

@@ -10,8 +10,8 @@ import pytest
 
 from tui.bus.line import Line, Priority
 from tui.bus.link import SerialLink
-from tui.drive import library
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
+from tui.drive.profile import library
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.reader import Reader

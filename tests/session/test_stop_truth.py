@@ -6,9 +6,9 @@ from decimal import Decimal
 
 import pytest
 
-from tui.drive import library
 from tui.drive.orders import nearest_stop
-from tui.drive.schema import OrderId
+from tui.drive.profile import library
+from tui.drive.profile.schema import OrderId
 from tui.session.events import EventLog
 
 from .test_owners import bench, until

@@ -8,8 +8,8 @@ import pytest
 
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Priority, Reply
-from tui.drive import library
 from tui.drive.orders import OrderRefused, stop_in_any
+from tui.drive.profile import library
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.limits import limits_of

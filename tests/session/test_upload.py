@@ -6,9 +6,9 @@ import pytest
 
 from tests.session.sets_bench import FAMILIES, bench
 from tui.bus.errors import LineError
-from tui.drive import library
-from tui.drive.parameter_set import dumps
-from tui.drive.set_reading import loads
+from tui.drive.profile import library
+from tui.drive.settings.parameter_set import dumps
+from tui.drive.settings.set_reading import loads
 from tui.session.upload import Upload, readable_codes, setting_codes
 from tui.simulator import FaultRates
 

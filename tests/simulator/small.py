@@ -6,8 +6,8 @@ from typing import Any
 
 import msgspec
 
-from tui.drive.profile import Profile
-from tui.drive.schema import ProfileData
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import ProfileData
 
 
 def parameter(code: str, address: int, access: str = "rw", **more: Any) -> dict[str, Any]:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tui.drive.chart import read_chart, watched_codes
-from tui.drive.library import load
-from tui.drive.schema import Parameter, Quantity
+from tui.drive.profile.library import load
+from tui.drive.profile.schema import Parameter, Quantity
 from tui.simulator import DriveSpec, SimulatedDrive
 
 FAMILIES = ("atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca")

@@ -12,8 +12,8 @@ from textual.pilot import Pilot
 from tui.app import DrivePanelApp
 from tui.bus.line import Counters, DeviceState, Frame, Line, LineState, LineStatus
 from tui.bus.link import SerialLink
-from tui.drive import library
-from tui.drive.profile import Profile
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.arming import Arming
 from tui.session.console import DriveConsole

@@ -13,7 +13,7 @@ from textual.app import App, ComposeResult
 from textual.containers import Horizontal
 from textual.widgets import DataTable, Digits, Footer, Sparkline
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens.monitor import REFRESH
 from tui.session.drive import DriveSession
 from tui.session.lines import OpenLine, demo_line

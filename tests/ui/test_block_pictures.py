@@ -8,10 +8,10 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from tui.drive import library
-from tui.drive.mapping import target
-from tui.drive.schema import Block
-from tui.drive.user_words import UserWord
+from tui.drive.blocks.assignment import target
+from tui.drive.blocks.user_words import UserWord
+from tui.drive.profile import library
+from tui.drive.profile.schema import Block
 from tui.screens.blocks import BlocksScreen
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession

@@ -8,7 +8,7 @@ from typing import Any, cast
 import pytest
 from textual.pilot import Pilot
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens.monitor import MonitorScreen
 from tui.session.fault_record import FaultRecord, Moment, Recorder
 from tui.session.fleet import FoundDrive

@@ -11,7 +11,7 @@ from textual.events import Key
 from textual.screen import ModalScreen
 from textual.widgets import Input
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens.action import Action
 from tui.screens.actions import ACTIONS, CONNECTION, EVERYWHERE, PLACES, elsewhere, line_of
 from tui.widgets.monitor_orders import order_keys

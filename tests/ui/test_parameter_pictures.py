@@ -11,7 +11,7 @@ import pytest
 from rich.text import Text
 from textual.pilot import Pilot
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens.parameters import ParametersScreen
 from tui.session.applying import Outcome, Result
 from tui.session.console import DriveConsole

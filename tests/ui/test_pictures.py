@@ -12,7 +12,7 @@ from textual.widgets import OptionList
 
 from tui.bus.errors import PortBusy
 from tui.bus.line import LineState
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens.connection import ConnectionScreen
 from tui.screens.monitor import MonitorScreen
 from tui.session.console import DriveConsole

@@ -8,8 +8,8 @@ from hypothesis import strategies as st
 from rich.text import Text
 
 from tui.bus.line import Frame
-from tui.drive import library
-from tui.drive.profile import Profile
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.actions import CONNECTION, EVERYWHERE, MONITOR, line_of, of_screen
 from tui.screens.frames import frame_line

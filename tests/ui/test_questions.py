@@ -9,7 +9,7 @@ from typing import Any, cast
 import pytest
 from textual.screen import ModalScreen
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens.blocks import BlocksScreen
 from tui.screens.control_source import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask

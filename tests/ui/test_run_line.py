@@ -8,7 +8,7 @@ from decimal import Decimal
 
 import pytest
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens import run_line
 from tui.screens.run_line import RunLine, proposed
 

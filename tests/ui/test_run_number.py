@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.drive import library
+from tui.drive.profile import library
 from tui.screens.run_line import LONGEST, STEPS, RunLine, proposed, run_lines
 
 from . import fakes

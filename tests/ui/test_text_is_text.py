@@ -17,7 +17,7 @@ from rich.text import Text
 from textual.widgets import Input
 
 from tui.app import DrivePanelApp
-from tui.drive.restore_plan import Item
+from tui.drive.settings.restore_plan import Item
 from tui.screens.blocks import BlocksScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm

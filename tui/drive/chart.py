@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from .profile import Profile
-from .schema import ChannelBits, Chart, DirectionBit, State, StateKind, StatusBit
+from .profile.profile import Profile
+from .profile.schema import ChannelBits, Chart, DirectionBit, State, StateKind, StatusBit
 
 UNKNOWN = State(id="unknown", name="Unknown", kind="unknown", mask=0, value=0)
 Direction = Literal["forward", "reverse"]

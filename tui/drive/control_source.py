@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from .profile import Profile, is_verified
-from .schema import ControlSource, Parameter
+from .profile.profile import Profile, is_verified
+from .profile.schema import ControlSource, Parameter
 
 
 @dataclass(frozen=True, slots=True)

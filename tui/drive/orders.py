@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 
 from .chart import state_of
 from .errors import DriveError
-from .profile import Profile
-from .schema import Chart, Order, OrderId, Parameter
+from .profile.profile import Profile
+from .profile.schema import Chart, Order, OrderId, Parameter
 
 GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
 """Ways to stop that trip no drive, the gentlest first."""

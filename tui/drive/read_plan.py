@@ -12,8 +12,8 @@ from dataclasses import dataclass
 from itertools import product
 
 from .errors import DriveError
-from .profile import Profile
-from .schema import Block, Parameter
+from .profile.profile import Profile
+from .profile.schema import Block, Parameter
 from .values import word_count
 
 REQUEST_CHARACTERS = 8

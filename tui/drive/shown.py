@@ -10,8 +10,8 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from decimal import Decimal
 
-from .profile import Profile
-from .schema import Parameter
+from .profile.profile import Profile
+from .profile.schema import Parameter
 from .values import Value, decode, raw_range
 
 

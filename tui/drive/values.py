@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
 
 from .errors import ValueRefused
-from .schema import Bit, Parameter
+from .profile.schema import Bit, Parameter
 
 NOT_AVAILABLE = "-----"
 

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from functools import partial
 from pathlib import Path
 
+from tui.drive.blocks.assignment import no_blocks
+from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, word_named
 from tui.drive.errors import DriveError
-from tui.drive.mapping import no_blocks
-from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, word_named
 from tui.session.mapping_desk import MappingDesk
 
 from .arming import Arming
@@ -95,8 +95,8 @@ class BlockKeys(Arming):
         self.app.push_screen(asked, given)
 
     def _save(self, path: Path) -> None:
-        from tui.drive.mapping_file import dumps
-        from tui.drive.set_file import write_file
+        from tui.drive.blocks.file import dumps
+        from tui.drive.settings.set_file import write_file
 
         desk, profile = self.desk, self.session.profile
         plans = [plan for block in desk.blocks if (plan := desk.proposed(block))]
@@ -122,8 +122,8 @@ class BlockKeys(Arming):
         self.app.push_screen(PickFile(question, [], [Path.cwd(), state_folder()]), given)
 
     def _load(self, path: Path) -> None:
-        from tui.drive.mapping import MappingError
-        from tui.drive.mapping_file import loads
+        from tui.drive.blocks.assignment import MappingError
+        from tui.drive.blocks.file import loads
 
         try:
             text = path.read_text(encoding="utf-8")

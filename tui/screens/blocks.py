@@ -8,8 +8,8 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
 
-from tui.drive.mapping import describe, no_blocks, refusing
-from tui.drive.schema import Block
+from tui.drive.blocks.assignment import describe, no_blocks, refusing
+from tui.drive.profile.schema import Block
 from tui.session.console import DriveConsole
 from tui.widgets.block_view import (
     WIDE,

@@ -11,7 +11,7 @@ from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
 from tui.drive.control_source import changes, source_codes, source_in_force
-from tui.drive.schema import ControlSource
+from tui.drive.profile.schema import ControlSource
 from tui.session.console import DriveConsole
 from tui.widgets.control_source import change_lines, diagram, note_lines
 from tui.widgets.drawing import armed_text, rule

@@ -12,7 +12,7 @@ from textual.containers import Horizontal, Vertical
 from textual.events import Resize
 from textual.timer import Timer
 
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 from tui.session.console import DriveConsole
 from tui.session.readings import Rating
 from tui.session.stop import Phase, StopReport

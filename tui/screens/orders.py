@@ -7,7 +7,7 @@ from decimal import Decimal
 from functools import partial
 
 from tui.drive.orders import OrderRefused, chart_in_force, interlock
-from tui.drive.schema import CommandOption, OrderId
+from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
 from tui.widgets.monitor_view import Control
 

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from textual.notifications import SeverityLevel
     from textual.widget import AwaitMount
 
-    from tui.drive.schema import OrderId
+    from tui.drive.profile.schema import OrderId
     from tui.session.console import DriveConsole
     from tui.session.events import EventLog
     from tui.session.fleet import Fleet

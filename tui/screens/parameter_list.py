@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from tui.drive.rows import FILTERS, Facts, FilterId, rows
+from tui.drive.settings.selection import FILTERS, Facts, FilterId, rows
 from tui.session.editor import Editor
 from tui.widgets.parameter_view import Item, items_of
 

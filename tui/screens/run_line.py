@@ -11,8 +11,8 @@ from typing import Literal
 from rich.text import Text
 
 from tui.drive.errors import ValueRefused
-from tui.drive.profile import Profile
-from tui.drive.schema import Quantity
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Quantity
 from tui.session.readings import Reading
 from tui.session.reference import LIMITS, parse_reference
 from tui.widgets.drawing import short

@@ -94,7 +94,7 @@ class Scanning(ConnectionView):
 
     async def _equip(self, identity: DriveIdentity) -> None:
         """Keep a drive that answered with its profile: the typed one, else the one that fits."""
-        from tui.drive import library
+        from tui.drive.profile import library
         from tui.session.drive import DriveSession
 
         typed = self.form.profile
@@ -124,7 +124,7 @@ class Scanning(ConnectionView):
             await self._equip(drive.identity)
             drive = self.found.get(device)
         if drive is None or drive.console is None:
-            from tui.drive import library
+            from tui.drive.profile import library
 
             known = ", ".join(listing.id for listing in library.listings())
             self.say(

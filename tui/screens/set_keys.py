@@ -15,7 +15,7 @@ from .dialogs.files import fault_of_new
 from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
-    from tui.drive.parameter_set import ParameterSet
+    from tui.drive.settings.parameter_set import ParameterSet
 
 
 class SetKeys(ParameterKeys):
@@ -25,7 +25,7 @@ class SetKeys(ParameterKeys):
 
     def action_save_file(self) -> None:
         """Ask for a file, read everything, write it."""
-        from tui.drive.parameter_set import dumps
+        from tui.drive.settings.parameter_set import dumps
 
         about = "Every readable parameter, in units and raw, one a line (TOML)."
         profile = self.session.profile
@@ -63,7 +63,7 @@ class SetKeys(ParameterKeys):
         self.app.push_screen(asked, told)
 
     async def _read_to_file(self, path: Path, text: Callable[[ParameterSet], str]) -> None:
-        from tui.drive.set_file import write_file
+        from tui.drive.settings.set_file import write_file
         from tui.session.upload import Upload
 
         def progress(done: int, count: int) -> None:
@@ -123,7 +123,7 @@ class SetKeys(ParameterKeys):
             self.note(str(error))
 
     async def _compare_file(self, name: str) -> None:
-        from tui.drive.set_file import read_set
+        from tui.drive.settings.set_file import read_set
 
         path = Path(name)
         # by its name alone: a long path leaves no room for what is wrong in the file
@@ -189,7 +189,7 @@ class SetKeys(ParameterKeys):
 
 def plan_values(plan: object) -> dict[str, int]:
     """The raw values that a plan would write, by code."""
-    from tui.drive.restore_plan import RestorePlan
+    from tui.drive.settings.restore_plan import RestorePlan
 
     assert isinstance(plan, RestorePlan)
     return {edit.code: edit.new for edit in plan.edits}

@@ -10,8 +10,8 @@ from tui.drive.errors import DriveError
 from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
-    from tui.drive.profile import Profile
-    from tui.drive.schema import MemoryOrder
+    from tui.drive.profile.profile import Profile
+    from tui.drive.profile.schema import MemoryOrder
 
 
 class WriteKeys(ParameterKeys):
@@ -45,13 +45,13 @@ class WriteKeys(ParameterKeys):
 
     def action_save_eeprom(self) -> None:
         """Copy to EEPROM, after saying what happens."""
-        from tui.drive.memory_orders import save_order
+        from tui.drive.settings.memory_orders import save_order
 
         self._memory("Save to EEPROM?", save_order, self.editor.save)
 
     def action_factory(self) -> None:
         """Recall the factory settings, after saying what happens."""
-        from tui.drive.memory_orders import factory_order
+        from tui.drive.settings.memory_orders import factory_order
 
         self._memory("Recall the factory settings?", factory_order, self.editor.factory)
 

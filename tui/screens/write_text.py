@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.drive.edits import Edit, Edits, consequences, cuts_line, ordered, problems
+from tui.drive.settings.edits import Edit, Edits, consequences, cuts_line, ordered, problems
 from tui.session.editor import Editor
 
 SHOWN = 9

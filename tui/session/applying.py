@@ -18,10 +18,10 @@ from tui.bus.errors import (
     RequestRefused,
     WrongReply,
 )
-from tui.drive.edits import Edit, Edits, cuts_line, limit_pairs, ordered, problems
 from tui.drive.errors import DriveError
+from tui.drive.settings.edits import Edit, Edits, cuts_line, limit_pairs, ordered, problems
+from tui.drive.settings.writable import option_code, refusal, waits_for_reset
 from tui.drive.shown import shown
-from tui.drive.writable import option_code, refusal, waits_for_reset
 
 from .arming import NotArmed
 from .asking import Asker

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from tui.bus.errors import ChecksumFault, NoAnswer, WrongReply
 from tui.bus.line import Priority
 from tui.drive.chart import watched_codes
-from tui.drive.profile import Profile
-from tui.drive.schema import StateKind
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import StateKind
 
 from .drive import DriveSession
 from .drive_state import drive_state

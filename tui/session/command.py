@@ -27,7 +27,7 @@ from tui.drive.orders import (
     walk,
     with_options,
 )
-from tui.drive.schema import Chart, CommandOption, ControlSource, Order, OrderId, State
+from tui.drive.profile.schema import Chart, CommandOption, ControlSource, Order, OrderId, State
 from tui.drive.values import from_words
 
 from .arming import ARMED_FOR

@@ -5,7 +5,7 @@ from __future__ import annotations
 from tui.bus.line import Priority
 from tui.drive.control_source import changes, source_codes
 from tui.drive.orders import OrderRefused
-from tui.drive.schema import ControlSource
+from tui.drive.profile.schema import ControlSource
 from tui.drive.values import check_raw
 
 from .drive import DriveSession

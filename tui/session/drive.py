@@ -8,7 +8,7 @@ import time
 from tui.bus.line import Line
 from tui.bus.link import label
 from tui.drive.chart import UNKNOWN, ChartState, read_chart
-from tui.drive.profile import Profile
+from tui.drive.profile.profile import Profile
 
 from .arming import Arming
 from .identify import DriveIdentity

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.drive.chart import UNKNOWN, ChartState, Direction, read_chart
-from tui.drive.profile import Profile
-from tui.drive.schema import Bit, FaultCode, Parameter, StateKind
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Bit, FaultCode, Parameter, StateKind
 from tui.drive.values import set_bits
 
 from .readings import Quality, Reading

@@ -16,16 +16,16 @@ from typing import Any
 
 from tui.bus.errors import LineError, NoAnswer
 from tui.bus.line import Priority, Worker
-from tui.drive.edits import Edits
 from tui.drive.errors import DriveError, ValueRefused
 from tui.drive.orders import OrderRefused
-from tui.drive.parameter_set import ParameterSet
-from tui.drive.restore_plan import RestorePlan
-from tui.drive.rows import Facts
-from tui.drive.schema import Parameter, StateKind
+from tui.drive.profile.schema import Parameter, StateKind
+from tui.drive.settings.edits import Edits
+from tui.drive.settings.parameter_set import ParameterSet
+from tui.drive.settings.restore_plan import RestorePlan
+from tui.drive.settings.selection import Facts
+from tui.drive.settings.writable import Refusal, refusal
 from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
-from tui.drive.writable import Refusal, refusal
 
 from .applying import Applied, Result, apply_edits
 from .asking import Asker, neighbours
@@ -286,8 +286,8 @@ class Editor:
 
     async def plan(self) -> RestorePlan:
         """What it takes to make the drive hold the set; reads it. Raises the line's errors."""
-        from tui.drive import library
-        from tui.drive.restore_plan import Options, plan_restore
+        from tui.drive.profile import library
+        from tui.drive.settings.restore_plan import Options, plan_restore
 
         from .restoring import held_by
 

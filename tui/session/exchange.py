@@ -11,13 +11,13 @@ from dataclasses import dataclass, field
 
 from tui.bus.errors import LineError, RequestRefused
 from tui.bus.line import Priority
-from tui.drive.mapping import UNUSED, Assignment, describe, problems, refusing, target
-from tui.drive.mapping_wire import reach, span
+from tui.drive.blocks.assignment import UNUSED, Assignment, describe, problems, refusing, target
+from tui.drive.blocks.wire_cost import reach, span
 from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
+from tui.drive.settings.writable import AT_REST, is_order
 from tui.drive.shown import depends_on
 from tui.drive.values import check_raw, from_words, to_words
-from tui.drive.writable import AT_REST, is_order
 
 from .asking import Asker
 from .drive import DriveSession

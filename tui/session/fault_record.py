@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 from datetime import datetime
 
-from tui.drive.schema import FaultCode
+from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
 
 from .drive import DriveSession

@@ -12,7 +12,7 @@ from functools import partial
 from types import MappingProxyType
 
 from tui.bus.line import Line
-from tui.drive.schema import OrderId
+from tui.drive.profile.schema import OrderId
 
 from .console import DriveConsole
 from .drive import DriveSession

@@ -15,8 +15,8 @@ from tui.bus.errors import (
     RequestRefused,
 )
 from tui.bus.line import Identification, Line, Priority
-from tui.drive import library
 from tui.drive.errors import DriveError
+from tui.drive.profile import library
 
 IDENTIFY = 43
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6

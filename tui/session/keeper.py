@@ -17,8 +17,8 @@ from tui.bus.errors import LineError
 from tui.bus.line import Line, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
-from tui.drive.profile import Profile
-from tui.drive.schema import Reaction
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Reaction
 
 from .drive import DriveSession
 from .drive_state import DriveState, drive_state

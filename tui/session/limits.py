@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tui.bus.limits import Limits, Window
-from tui.drive.profile import Profile
-from tui.drive.schema import Block
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block
 
 
 def limits_of(profile: Profile) -> Limits:

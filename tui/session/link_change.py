@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from tui.bus.link import Link, SerialLink, label
-from tui.drive.edits import Edit
-from tui.drive.profile import Profile
-from tui.drive.schema import LinkChoice, LinkSetting
-from tui.drive.writable import CUTTING, line_setting, waits_for_reset
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import LinkChoice, LinkSetting
+from tui.drive.settings.edits import Edit
+from tui.drive.settings.writable import CUTTING, line_setting, waits_for_reset
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,10 +15,10 @@ from enum import StrEnum
 from tui.bus.errors import DeviceException
 from tui.bus.line import Priority
 from tui.bus.link import TcpLink, character_time, silence
-from tui.drive.mapping import UNUSED, Assignment, assignment, target
-from tui.drive.mapping_wire import span
+from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, target
+from tui.drive.blocks.wire_cost import span
+from tui.drive.profile.schema import Block, Parameter
 from tui.drive.read_plan import WireTiming
-from tui.drive.schema import Block, Parameter
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 

@@ -14,8 +14,7 @@ from typing import Any
 
 from tui.bus.errors import LineError
 from tui.bus.line import Worker
-from tui.drive.errors import DriveError
-from tui.drive.mapping import (
+from tui.drive.blocks.assignment import (
     Assignment,
     Change,
     MappingError,
@@ -27,11 +26,12 @@ from tui.drive.mapping import (
     problems,
     slots_of,
 )
-from tui.drive.mapping_wire import Saving, Stretch, saving, stretches
+from tui.drive.blocks.user_words import UserWords
+from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
+from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
-from tui.drive.schema import Block
-from tui.drive.user_words import UserWords
-from tui.drive.writable import AT_REST
+from tui.drive.profile.schema import Block
+from tui.drive.settings.writable import AT_REST
 
 from .drive import DriveSession
 from .exchange import exchange

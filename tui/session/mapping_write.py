@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.bus.errors import DeviceException, RequestRefused
-from tui.drive.mapping import (
+from tui.drive.blocks.assignment import (
     Assignment,
     Change,
     MappingError,
@@ -19,8 +19,8 @@ from tui.drive.mapping import (
     refusing,
     steps,
 )
-from tui.drive.schema import Block
-from tui.drive.writable import AT_REST
+from tui.drive.profile.schema import Block
+from tui.drive.settings.writable import AT_REST
 
 from .asking import Asker
 from .drive import DriveSession

@@ -7,11 +7,11 @@ import time
 from collections.abc import Collection
 
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
-from tui.drive.memory_orders import MemoryRefused, factory_order, save_order
-from tui.drive.profile import is_verified
-from tui.drive.schema import MemoryOrder
+from tui.drive.profile.profile import is_verified
+from tui.drive.profile.schema import MemoryOrder
+from tui.drive.settings.memory_orders import MemoryRefused, factory_order, save_order
+from tui.drive.settings.writable import AT_REST, is_setting, line_setting
 from tui.drive.values import from_words
-from tui.drive.writable import AT_REST, is_setting, line_setting
 
 from .asking import Asker
 from .drive import DriveSession

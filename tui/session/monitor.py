@@ -19,8 +19,8 @@ from tui.bus.line import LineState, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
-from tui.drive.profile import Profile
-from tui.drive.schema import Quantity
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Quantity
 
 from .drive import DriveSession
 from .drive_state import DriveState, drive_state

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
+from tui.drive.blocks.assignment import Assignment, MappingError, describe, target
+from tui.drive.blocks.wire_cost import frame, reach, together
 from tui.drive.errors import ValueRefused
-from tui.drive.mapping import Assignment, MappingError, describe, target
-from tui.drive.mapping_wire import frame, reach, together
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
 from tui.drive.shown import shown_text, typed_text
 from tui.drive.values import encode, to_words
 from tui.wire.frames import hex_text

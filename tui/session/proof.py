@@ -11,8 +11,8 @@ from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Block, Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import from_words, word_count
 
 from .readings import Reading

@@ -11,9 +11,9 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Line, Priority, Reply
 from tui.bus.link import TcpLink, character_time, silence
 from tui.drive.chart import read_chart
-from tui.drive.profile import Profile, is_verified
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import Block, Parameter
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
-from tui.drive.schema import Block, Parameter
 from tui.drive.shown import depends_on, shown
 from tui.drive.values import Value, from_words, percent_of, word_count
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal
 from enum import StrEnum
 
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 from tui.drive.values import NOT_AVAILABLE, Value
 
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from decimal import Decimal
 
 from tui.drive.errors import ValueRefused
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter, Quantity
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter, Quantity
 from tui.drive.values import encode
 
 from .readings import Reading

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from tui.bus.errors import DeviceException
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
 
 
 def device_refusal(

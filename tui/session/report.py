@@ -7,13 +7,13 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
+from tui.drive.blocks.assignment import target
 from tui.drive.chart import read_chart
-from tui.drive.compare import compare, factory_side, side_of
 from tui.drive.control_source import source_in_force
-from tui.drive.mapping import target
-from tui.drive.parameter_set import ParameterSet, lacking
-from tui.drive.profile import Profile
-from tui.drive.schema import Block, Quantity
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block, Quantity
+from tui.drive.settings.compare import compare, factory_side, side_of
+from tui.drive.settings.parameter_set import ParameterSet, lacking
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, set_bits
 

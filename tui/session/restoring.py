@@ -13,11 +13,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from tui.bus.errors import LineError, RequestRefused
-from tui.drive.edits import Edits
-from tui.drive.parameter_set import ParameterSet
-from tui.drive.profile import Profile
-from tui.drive.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
-from tui.drive.writable import waits_for_reset
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.edits import Edits
+from tui.drive.settings.parameter_set import ParameterSet
+from tui.drive.settings.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
+from tui.drive.settings.writable import waits_for_reset
 
 from .applying import Applied, Progress, Result, apply_edits
 from .drive import DriveSession

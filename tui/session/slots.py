@@ -15,8 +15,8 @@ from dataclasses import dataclass, field
 
 from tui.bus.errors import DeviceException
 from tui.bus.line import Line, Priority
-from tui.drive.profile import Profile
-from tui.drive.schema import Block
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block
 
 from .proof import SURE, Proof
 from .readings import Reading

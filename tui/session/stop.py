@@ -30,7 +30,7 @@ from tui.drive.orders import (
     target,
     with_options,
 )
-from tui.drive.schema import Chart, Order, OrderId
+from tui.drive.profile.schema import Chart, Order, OrderId
 from tui.drive.values import from_words
 
 from .drive import DriveSession

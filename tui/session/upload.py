@@ -8,11 +8,11 @@ from datetime import datetime
 
 import tui
 from tui.bus.line import Priority
-from tui.drive.parameter_set import Head, ParameterSet
-from tui.drive.profile import Profile
-from tui.drive.restore_plan import rating_codes
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.parameter_set import Head, ParameterSet
+from tui.drive.settings.restore_plan import rating_codes
+from tui.drive.settings.writable import is_setting
 from tui.drive.shown import scale_sources
-from tui.drive.writable import is_setting
 
 from .asking import Asker, neighbours
 from .drive import DriveSession

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from tui.bus.errors import DeviceException
 from tui.bus.line import Priority
-from tui.drive.mapping import MappingError
-from tui.drive.user_words import COUNT, UserWord, UserWords, format_named, is_no_value
+from tui.drive.blocks.assignment import MappingError
+from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, is_no_value
 
 from .drive import DriveSession
 from .state import state_folder

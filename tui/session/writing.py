@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from tui.bus.errors import DeviceException, LineError, RequestRefused, Superseded
 from tui.bus.line import Priority
 from tui.drive.errors import DriveError
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, to_words
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Block, Function, Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block, Function, Parameter
 from tui.drive.values import from_words, is_enumeration, raw_range, to_words, word_count
 
 from .registers import Registers

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from enum import Enum
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter, Quantity
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter, Quantity
 
 from .motor import MotorState, Rating, Stop
 from .registers import Registers

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from tui.drive.schema import Function
+from tui.drive.profile.schema import Function
 
 from .access import Refused, past_limit
 from .rules import Refusals

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from tui.drive.schema import Parameter, Quantity
+from tui.drive.profile.schema import Parameter, Quantity
 
 from .altivar21_words import show_altivar21_words
 from .body import Body, Fallback

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from enum import Enum
 
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 
 from .altivar_words import show_altivar_words
 from .body import Body, Fallback

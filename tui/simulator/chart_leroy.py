@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 
 from .body import Body, Fallback
 from .motor import Order, Stop

@@ -11,8 +11,8 @@ from dataclasses import replace
 from random import Random
 from typing import Protocol
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Function, Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Function, Parameter
 from tui.drive.values import type_range
 
 from .access import DriveWords

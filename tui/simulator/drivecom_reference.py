@@ -6,7 +6,7 @@ communication variables, high resolution.
 
 from __future__ import annotations
 
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 
 from .body import Body, Fallback
 from .io_profile import IoCommand

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tui.drive.profile import Profile
+from tui.drive.profile.profile import Profile
 
 from .altivar_words import FaultRecords
 from .body import ActiveFault, Body

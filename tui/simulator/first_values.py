@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from decimal import ROUND_HALF_UP, Decimal
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter, Quantity
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter, Quantity
 from tui.drive.values import is_enumeration, raw_range, type_range
 
 from .motor import Rating

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Protocol
 
-from tui.drive.schema import Function, Identification
+from tui.drive.profile.schema import Function, Identification
 
 from .access import Refused, past_limit
 from .rules import Refusals

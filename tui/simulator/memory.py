@@ -6,7 +6,7 @@ A save, and a recall, are only taken while the motor is not supplied.
 
 from __future__ import annotations
 
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 
 from .body import Body
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Model
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Model
 
 from .motor import rating_of
 

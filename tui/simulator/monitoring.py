@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
-from tui.drive.schema import Quantity
+from tui.drive.profile.schema import Quantity
 from tui.drive.values import speed_from_frequency
 
 from .body import Body

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 
-from tui.drive.profile import Profile
-from tui.drive.schema import Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
 from tui.drive.values import from_words, to_words, type_range, word_count
 
 ORDERS = frozenset(

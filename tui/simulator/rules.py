@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from tui.drive.profile import Profile
+from tui.drive.profile.profile import Profile
 
 Kind = Literal["drivecom", "altivar21", "leroy-somer"]
 

@@ -6,8 +6,8 @@ import threading
 from collections.abc import Mapping, Sequence
 from types import TracebackType
 
-from tui.drive.library import load
-from tui.drive.profile import Profile
+from tui.drive.profile.library import load
+from tui.drive.profile.profile import Profile
 
 from .conversation import Conversation, RtuConversation, TcpConversation
 from .drive import SimulatedDrive

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tui.drive.profile import Profile
-from tui.drive.schema import LinkChoice, LinkSetting, Parameter
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import LinkChoice, LinkSetting, Parameter
 
 from .registers import Registers
 from .spec import LineTiming

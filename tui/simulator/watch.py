@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tui.drive.schema import CommunicationFault, Reaction
+from tui.drive.profile.schema import CommunicationFault, Reaction
 
 from .body import Body, Fallback
 from .motor import Stop

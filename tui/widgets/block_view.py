@@ -7,11 +7,11 @@ from collections.abc import Sequence
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.mapping import Assignment, describe, target
-from tui.drive.mapping_wire import Saving, Stretch, frame, microseconds, together
-from tui.drive.profile import is_verified
-from tui.drive.schema import Block, Parameter
-from tui.drive.user_words import UserWords
+from tui.drive.blocks.assignment import Assignment, describe, target
+from tui.drive.blocks.user_words import UserWords
+from tui.drive.blocks.wire_cost import Saving, Stretch, frame, microseconds, together
+from tui.drive.profile.profile import is_verified
+from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.mapping import BlockView, Force, Slot, wire_timing
 from tui.session.mapping_desk import MappingDesk

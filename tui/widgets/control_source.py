@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from tui.drive.control_source import Change
-from tui.drive.profile import Profile
-from tui.drive.schema import ControlSource, Way
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import ControlSource, Way
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE
 

@@ -7,8 +7,8 @@ from datetime import datetime
 
 from rich.text import Text
 
-from tui.drive.profile import Profile
-from tui.drive.schema import FaultCode
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.fault_record import FaultRecord, Moment
 from tui.session.journal import Entry

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from rich.text import Text
 
-from tui.drive.profile import Profile, is_verified
-from tui.drive.schema import MonitoringValue, Parameter, Quantity
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.readings import Quality, Reading
 

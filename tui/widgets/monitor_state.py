@@ -6,7 +6,7 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.bus.line import LineStatus
-from tui.drive.schema import Quantity
+from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.keeper import TOLD_AFTER

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
-from tui.drive.schema import Parameter, Quantity
+from tui.drive.profile.schema import Parameter, Quantity
 from tui.session.monitor import STALE_CYCLES
 
 from .drawing import cut, rule, trend

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tui.bus.line import Counters, LineState, LineStatus
-from tui.drive.profile import Profile
-from tui.drive.schema import MonitoringValue
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import MonitoringValue
 from tui.session.identify import DriveIdentity
 from tui.session.keeper import Watch
 from tui.session.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint

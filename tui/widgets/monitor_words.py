@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from rich.text import Text
 
-from tui.drive.profile import is_verified
-from tui.drive.schema import Bit, Parameter
+from tui.drive.profile.profile import is_verified
+from tui.drive.profile.schema import Bit, Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.readings import Quality
 

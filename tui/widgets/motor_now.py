@@ -5,8 +5,8 @@ from __future__ import annotations
 from rich.text import Text
 
 from tui.bus.line import LineStatus
-from tui.drive.profile import Profile
-from tui.drive.schema import Quantity
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Quantity
 from tui.session.keeper import GLANCE, Look
 from tui.session.monitor import STALE_CYCLES, Snapshot
 from tui.session.readings import Quality

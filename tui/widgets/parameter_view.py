@@ -9,12 +9,12 @@ from rich.console import Console
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.profile import is_verified
-from tui.drive.rows import not_factory
-from tui.drive.schema import Parameter
+from tui.drive.profile.profile import is_verified
+from tui.drive.profile.schema import Parameter
+from tui.drive.settings.selection import not_factory
+from tui.drive.settings.writable import marks, waits_for_reset
 from tui.drive.shown import limits_text, shown
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
-from tui.drive.writable import marks, waits_for_reset
 from tui.session.editor import Editor
 
 from .drawing import armed_text, cut, short

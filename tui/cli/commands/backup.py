@@ -30,7 +30,7 @@ def backup(target: Target, file: Path, force: bool) -> None:
     The file is TOML, made for a diff. To change a value by hand, write it into `value` and take
     `raw` out of that line.
     """
-    from tui.drive.parameter_set import dumps
+    from tui.drive.settings.parameter_set import dumps
 
     refuse_existing(file, force=force)
     session, values = set_of_drive(target)

@@ -24,7 +24,7 @@ from ..shared.sets import dry_run_option, write_down
 from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
-    from tui.drive.mapping import Assignment
+    from tui.drive.blocks.assignment import Assignment
     from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
     from tui.session.mapping import BlockView
@@ -103,7 +103,7 @@ def _check_usage(wanted: Wanted) -> None:
 
 
 async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> int:
-    from tui.drive.mapping import MappingError, has_blocks, no_blocks
+    from tui.drive.blocks.assignment import MappingError, has_blocks, no_blocks
 
     if not has_blocks(session.profile):
         if wanted.action != "show":
@@ -152,7 +152,7 @@ def _status(views: list[BlockView]) -> int:
 
 
 def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
-    from tui.drive.mapping_file import dumps
+    from tui.drive.blocks.file import dumps
 
     plans = [plan for view in views if (plan := view.plan) is not None]
     if len(plans) != len(views):
@@ -168,7 +168,7 @@ def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
 
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.bus.errors import DeviceException
-    from tui.drive.mapping import changes, describe, problems, refusing
+    from tui.drive.blocks.assignment import changes, describe, problems, refusing
     from tui.session.journal import Journal
     from tui.session.mapping_write import AssignmentRefused, write_assignment
     from tui.session.writing import NotTaken
@@ -211,7 +211,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
 
 async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int], list[Assignment]]:
     """What the slots hold, and the assignments that are wanted in their place."""
-    from tui.drive.mapping import MappingError, assignment, factory, pick, place_of
+    from tui.drive.blocks.assignment import MappingError, assignment, factory, pick, place_of
     from tui.session.mapping import Mapper
 
     profile = session.profile
@@ -242,8 +242,8 @@ async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int],
 
 
 def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
-    from tui.drive.mapping import MappingError
-    from tui.drive.mapping_file import loads
+    from tui.drive.blocks.assignment import MappingError
+    from tui.drive.blocks.file import loads
 
     if wanted.action != "load":
         return {}

@@ -13,8 +13,8 @@ from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
 
 if TYPE_CHECKING:
-    from tui.drive.compare import Format
-    from tui.drive.parameter_set import ParameterSet
+    from tui.drive.settings.compare import Format
+    from tui.drive.settings.parameter_set import ParameterSet
 
 FACTORY = "factory"
 DIFFERENT = 1
@@ -48,10 +48,10 @@ def compare(
     Measurements, counters and orders are no settings. Ends with 0 where all are equal and with 1
     where some differ.
     """
-    from tui.drive import library
-    from tui.drive.compare import compare as rows_of
-    from tui.drive.compare import factory_side, side_of
-    from tui.drive.compare import told as table
+    from tui.drive.profile import library
+    from tui.drive.settings.compare import compare as rows_of
+    from tui.drive.settings.compare import factory_side, side_of
+    from tui.drive.settings.compare import told as table
 
     if len(devices) > 2:
         raise click.UsageError("-d is given once, or once for A and once for B.")

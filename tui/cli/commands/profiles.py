@@ -12,7 +12,7 @@ from ..shared.options import json_option
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.drive.profile import Profile
+    from tui.drive.profile.profile import Profile
 
 
 @click.command()
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 @told
 def profiles(profile_id: str | None, file: Path | None, as_json: bool) -> None:
     """List the profiles, show one, or check a file."""
-    from tui.drive import library
+    from tui.drive.profile import library
 
     if file is not None:
         checked = library.load_file(file)
@@ -40,7 +40,7 @@ def profiles(profile_id: str | None, file: Path | None, as_json: bool) -> None:
 
 
 def _list(as_json: bool) -> None:
-    from tui.drive import library
+    from tui.drive.profile import library
 
     from ..shared.output import print_json
 
@@ -67,7 +67,7 @@ def _show(profile: Profile, as_json: bool) -> None:
         return
     from rich.table import Table
 
-    from tui.drive.profile import is_verified, notations
+    from tui.drive.profile.profile import is_verified, notations
     from tui.drive.values import raw_range
 
     link = profile.data.link

@@ -34,8 +34,8 @@ from ..shared.sets import (
 from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
-    from tui.drive.parameter_set import ParameterSet
-    from tui.drive.restore_plan import Options, RestorePlan
+    from tui.drive.settings.parameter_set import ParameterSet
+    from tui.drive.settings.restore_plan import Options, RestorePlan
     from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
 
@@ -88,7 +88,7 @@ def restore(
     values = set_in(file)
 
     async def one(opened: OpenLine, device: int) -> int:
-        from tui.drive.restore_plan import Options
+        from tui.drive.settings.restore_plan import Options
 
         session = await connect(opened, Target(line_text, device, profile_id))
         codes = codes_of(session, confirmed)
@@ -126,7 +126,7 @@ async def _in_turn(
 
 
 async def _tell(session: DriveSession, values: ParameterSet, options: Options) -> int:
-    from tui.drive import library
+    from tui.drive.profile import library
     from tui.session.restoring import plan_for
 
     source = library.load(values.head.profile)
@@ -137,7 +137,7 @@ async def _tell(session: DriveSession, values: ParameterSet, options: Options) -
 
 def say_plan(session: DriveSession, plan: RestorePlan) -> None:
     """The plan: what is written in its order, and what is left out with its reason."""
-    from tui.drive.edits import ordered
+    from tui.drive.settings.edits import ordered
 
     items = {item.code: item for item in plan.of_kind("write")}
     held = {edit.code: edit.old for edit in plan.edits if edit.old is not None}
@@ -162,7 +162,7 @@ def say_plan(session: DriveSession, plan: RestorePlan) -> None:
 async def _restore(
     session: DriveSession, values: ParameterSet, options: Options, *, save: bool
 ) -> int:
-    from tui.drive import library
+    from tui.drive.profile import library
     from tui.session.journal import Journal
     from tui.session.memory import save_to_eeprom
     from tui.session.restoring import Mark

@@ -45,7 +45,7 @@ from .orders import (
 from .status import fault_text, shown_values, values_json
 
 if TYPE_CHECKING:
-    from tui.drive.schema import OrderId
+    from tui.drive.profile.schema import OrderId
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
     from tui.session.keeper import Watch

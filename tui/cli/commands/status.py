@@ -23,8 +23,8 @@ from ..shared.options import (
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.drive.profile import Profile
-    from tui.drive.schema import Quantity
+    from tui.drive.profile.profile import Profile
+    from tui.drive.profile.schema import Quantity
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
     from tui.session.keeper import Watch

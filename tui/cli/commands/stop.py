@@ -24,7 +24,7 @@ from ..shared.say import say
 from .orders import close_journal, complain
 
 if TYPE_CHECKING:
-    from tui.drive.schema import OrderId
+    from tui.drive.profile.schema import OrderId
     from tui.session.drive import DriveSession
     from tui.session.identify import DriveIdentity
     from tui.session.lines import OpenLine
@@ -109,7 +109,7 @@ class Found:
 
 async def _wanted(opened: OpenLine, target: Target) -> Found:
     """The wanted drive; raises UsageError where it is not known what stops it."""
-    from tui.drive import library
+    from tui.drive.profile import library
     from tui.session.identify import identify
 
     if target.profile_id is None:
@@ -247,8 +247,8 @@ def _session(opened: OpenLine, identity: DriveIdentity, profile_id: str | None) 
     A drive that does not say who it is may belong to several families: where the same words stop
     them all, which one it is does not matter.
     """
-    from tui.drive import library
     from tui.drive.orders import stop_alike
+    from tui.drive.profile import library
     from tui.session.drive import DriveSession
 
     named = identity.profile or profile_id

@@ -28,7 +28,7 @@ from ..shared.sets import (
 from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
-    from tui.drive.edits import Edits
+    from tui.drive.settings.edits import Edits
     from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
 
@@ -87,8 +87,8 @@ def _pairs(wanted: tuple[str, ...]) -> list[tuple[str, str]]:
 
 async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
     """The edits against what the drive holds; what is to be known of them is said."""
-    from tui.drive.edits import Edits, consequences
     from tui.drive.errors import ValueRefused
+    from tui.drive.settings.edits import Edits, consequences
     from tui.drive.shown import scale_sources
     from tui.session.asking import Asker
 

@@ -10,7 +10,7 @@ from .say import say
 if TYPE_CHECKING:
     from rich.table import Table
 
-    from tui.drive.mapping_wire import Stretch
+    from tui.drive.blocks.wire_cost import Stretch
     from tui.session.drive import DriveSession
     from tui.session.mapping import BlockView, Slot
 
@@ -58,7 +58,7 @@ def _head(session: DriveSession, line_text: str) -> dict[str, Any]:
 
 def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
     """Microseconds of a fast cycle of the monitoring set, directly and with these slots."""
-    from tui.drive.mapping_wire import saving
+    from tui.drive.blocks.wire_cost import saving
     from tui.session.mapping import wire_timing
     from tui.session.monitor import rates_of
 
@@ -69,7 +69,7 @@ def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
 
 
 def _frame(session: DriveSession, view: BlockView) -> str:
-    from tui.drive.mapping_wire import frame
+    from tui.drive.blocks.wire_cost import frame
     from tui.wire.frames import hex_text
 
     inputs = view.plan if view.block.direction == "read" else None
@@ -131,7 +131,7 @@ def _table(session: DriveSession, view: BlockView) -> Table:
 
 
 def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...]:
-    from tui.drive.mapping import describe
+    from tui.drive.blocks.assignment import describe
 
     stands = describe(session.profile, view.block, slot.raw)
     if slot.parameter is None:
@@ -156,8 +156,8 @@ def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...
 
 def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> None:
     """Print that there is no block, and which neighbours are worth reading in one request."""
-    from tui.drive.mapping import no_blocks
-    from tui.drive.mapping_wire import stretches
+    from tui.drive.blocks.assignment import no_blocks
+    from tui.drive.blocks.wire_cost import stretches
     from tui.session.mapping import wire_timing
     from tui.session.monitor import monitoring_codes
 

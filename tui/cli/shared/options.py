@@ -122,7 +122,7 @@ async def connect(opened: OpenLine, target: Target) -> DriveSession:
 
     Raises UnidentifiedDrive with what to type where the drive does not say who it is.
     """
-    from tui.drive import library
+    from tui.drive.profile import library
     from tui.session.drive import DriveSession
     from tui.session.identify import identify
 
@@ -151,7 +151,7 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
 
 def unidentified(identity: DriveIdentity) -> click.UsageError:
     """The error for a drive that no profile was named for and none fits."""
-    from tui.drive import library
+    from tui.drive.profile import library
 
     who = f"as {identity.reference!r}" if identity.reference else "but does not say who it is"
     fits = identity.candidates or tuple(listing.id for listing in library.listings())

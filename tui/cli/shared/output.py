@@ -154,7 +154,7 @@ def readings_table(
 
 
 def _cells(reading: Reading) -> tuple[str, ...]:
-    from tui.drive.profile import is_verified, notations
+    from tui.drive.profile.profile import is_verified, notations
 
     code, number, wire = notations(reading.parameter)
     return (

@@ -16,7 +16,7 @@ from .options import Target, connect, on_line
 from .say import say, say_over
 
 if TYPE_CHECKING:
-    from tui.drive.parameter_set import ParameterSet
+    from tui.drive.settings.parameter_set import ParameterSet
     from tui.session.applying import Result
     from tui.session.drive import DriveSession
     from tui.session.lines import OpenLine
@@ -45,8 +45,8 @@ dry_run_option = click.option(
 
 def set_in(path: Path) -> ParameterSet:
     """The parameter set in a file; raises Failure with status 2 for a bad one."""
-    from tui.drive.parameter_set import SetError
-    from tui.drive.set_file import read_set
+    from tui.drive.settings.parameter_set import SetError
+    from tui.drive.settings.set_file import read_set
 
     try:
         return read_set(path)
@@ -62,8 +62,8 @@ def refuse_existing(file: Path, *, force: bool) -> None:
 
 def write_down(file: Path, text: str, *, force: bool = False) -> None:
     """Write a file whole or not at all; raises Failure with status 2 where that cannot be."""
-    from tui.drive.parameter_set import SetError
-    from tui.drive.set_file import write_file
+    from tui.drive.settings.parameter_set import SetError
+    from tui.drive.settings.set_file import write_file
 
     try:
         write_file(file, text, force=force)

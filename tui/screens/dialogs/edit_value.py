@@ -13,7 +13,7 @@ from textual.containers import Vertical
 from textual.widgets import Input, OptionList
 
 from tui.drive.errors import DriveError
-from tui.drive.schema import Parameter
+from tui.drive.profile.schema import Parameter
 from tui.drive.values import encode
 from tui.session.editor import Editor
 from tui.widgets.fields import NumberInput

@@ -10,9 +10,9 @@ from textual.binding import Binding
 from textual.containers import Vertical
 from textual.widgets import Input, OptionList
 
-from tui.drive.mapping import choices
-from tui.drive.profile import Profile, is_verified
-from tui.drive.schema import Block, Parameter
+from tui.drive.blocks.assignment import choices
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import Block, Parameter
 from tui.widgets.drawing import cut
 from tui.widgets.fields import Field
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG

@@ -13,7 +13,7 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 
 from tui.drive.plain import plain
-from tui.drive.restore_plan import Item
+from tui.drive.settings.restore_plan import Item
 from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
 

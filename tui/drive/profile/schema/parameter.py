@@ -6,7 +6,15 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import BitNumber, Confidence, DecimalText, Effective, Identifier, Table, WordAddress
+from .base import (
+    BitNumber,
+    Confidence,
+    DecimalText,
+    Effective,
+    Identifier,
+    Table,
+    WordAddress,
+)
 
 WordType = Literal["uint16", "int16", "uint32", "int32"]
 Access = Literal["r", "rw", "rw-stopped", "w"]

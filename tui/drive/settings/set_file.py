@@ -6,7 +6,7 @@ import os
 from contextlib import suppress
 from pathlib import Path
 
-from . import library
+from ..profile import library
 from .parameter_set import ParameterSet, SetError
 from .set_reading import loads
 

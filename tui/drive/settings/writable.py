@@ -6,8 +6,8 @@ from collections.abc import Collection
 from dataclasses import dataclass
 from typing import Literal
 
-from .profile import Profile, is_verified
-from .schema import Block, LinkSetting, Parameter, Quantity, StateKind
+from ..profile.profile import Profile, is_verified
+from ..profile.schema import Block, LinkSetting, Parameter, Quantity, StateKind
 
 Reason = Literal["read-only", "forbidden", "order", "unverified", "running"]
 

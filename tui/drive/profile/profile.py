@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterable, Mapping
 from decimal import Decimal
 from functools import cached_property
 
-from .errors import UnknownParameter
+from ..errors import UnknownParameter
 from .schema import Chart, FaultCode, Function, Parameter, ProfileData, Quantity
 
 _HEX = re.compile(r"^(?:16#|0x)([0-9a-f]+)$", re.IGNORECASE)

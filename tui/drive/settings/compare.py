@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Literal
 
+from ..profile.profile import Profile
+from ..profile.schema import Parameter
+from ..shown import shown
+from ..values import Value
 from .parameter_set import ParameterSet, lacking
-from .profile import Profile
-from .schema import Parameter
-from .shown import shown
-from .values import Value
 from .writable import is_setting
 
 Format = Literal["text", "markdown", "csv"]

@@ -9,10 +9,10 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from .errors import DriveError, UnknownParameter
-from .profile import Profile, is_verified, parse_address
-from .schema import Block, Parameter
-from .values import word_count
+from ..errors import DriveError, UnknownParameter
+from ..profile.profile import Profile, is_verified, parse_address
+from ..profile.schema import Block, Parameter
+from ..values import word_count
 
 UNUSED = 0
 """The raw value of a slot that stands for nothing."""

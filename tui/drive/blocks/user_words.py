@@ -10,9 +10,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal, get_args
 
-from .mapping import NONE, MappingError
-from .profile import Profile, parse_address
-from .values import NOT_AVAILABLE
+from ..profile.profile import Profile, parse_address
+from ..values import NOT_AVAILABLE
+from .assignment import NONE, MappingError
 
 COUNT = 4
 Format = Literal["hex", "signed", "unsigned"]

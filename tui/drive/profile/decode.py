@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 import tomli
 
-from .errors import ProfileError
+from ..errors import ProfileError
 from .schema import ProfileData
 
 _PLACE = re.compile(r" - at `\$(.*)`$")

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from .errors import DriveError
-from .profile import Profile
-from .schema import MemoryOrder
+from ..errors import DriveError
+from ..profile.profile import Profile
+from ..profile.schema import MemoryOrder
 
 
 class MemoryRefused(DriveError):

@@ -9,10 +9,10 @@ from typing import Any
 
 import tomli
 
-from .errors import DriveError
-from .mapping import UNUSED, Assignment, MappingError, raw_named, target
-from .profile import Profile
-from .schema import Block
+from ..errors import DriveError
+from ..profile.profile import Profile
+from ..profile.schema import Block
+from .assignment import UNUSED, Assignment, MappingError, raw_named, target
 
 FORMAT = 1
 HEAD = "mapping"

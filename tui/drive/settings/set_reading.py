@@ -10,12 +10,12 @@ from typing import Any
 
 import tomli
 
-from .errors import ValueRefused
+from ..errors import ValueRefused
+from ..profile.profile import Profile
+from ..profile.schema import Parameter
+from ..shown import shown
+from ..values import encode, type_range
 from .parameter_set import ABSENT, END, FORMAT, HEADER, Head, ParameterSet, SetError, lacking
-from .profile import Profile
-from .schema import Parameter
-from .shown import shown
-from .values import encode, type_range
 
 _AT = re.compile(r"\(at line (\d+), column \d+\)|\(at end of document\)")
 _KEY = re.compile(r"\s*(\"(?:[^\"\\]|\\.)*\"|'[^']*'|[A-Za-z0-9_-]+)\s*=")

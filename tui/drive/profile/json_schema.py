@@ -1,6 +1,7 @@
 """The JSON Schema of a profile, for editors that complete and check TOML.
 
-`python -m tui.drive.json_schema` prints it; the committed copy is profiles/profile.schema.json.
+`python -m tui.drive.profile.json_schema` prints it; the committed copy is
+profiles/profile.schema.json.
 """
 
 from __future__ import annotations

@@ -6,9 +6,9 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from ..profile.profile import Profile, is_verified, notations
+from ..profile.schema import Parameter
 from .edits import Edits
-from .profile import Profile, is_verified, notations
-from .schema import Parameter
 from .writable import is_setting
 
 FilterId = Literal[

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
 
-from .errors import ProfileError, UnknownProfile
+from ..errors import ProfileError, UnknownProfile
 from .profile import Profile
 
 _HEAD_KEY = re.compile(r'^(id|name|vendor|version|summary)\s*=\s*"((?:[^"\\]|\\.)*)"', re.MULTILINE)
@@ -38,7 +38,7 @@ class Listing:
 
 def packaged_folder() -> Path:
     """The folder of the profiles that come with the panel, in a wheel or a checkout."""
-    package = Path(__file__).resolve().parent.parent
+    package = Path(__file__).resolve().parents[2]
     installed = package / "_profiles"
     return installed if installed.is_dir() else package.parent / "profiles"
 

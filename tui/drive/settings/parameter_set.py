@@ -12,10 +12,10 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from .errors import DriveError
-from .profile import Profile
-from .schema import Parameter
-from .shown import scale_sources, shown
+from ..errors import DriveError
+from ..profile.profile import Profile
+from ..profile.schema import Parameter
+from ..shown import scale_sources, shown
 
 FORMAT = 1
 HEADER = "set"

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 from tui.wire.frames import read_frame, read_write_frame, write_frame
 
-from .mapping import Assignment, target
-from .profile import Profile
-from .read_plan import ReadRequest, WireTiming, plan_reads, request_of, run_length
-from .schema import Parameter
-from .values import word_count
+from ..profile.profile import Profile
+from ..profile.schema import Parameter
+from ..read_plan import ReadRequest, WireTiming, plan_reads, request_of, run_length
+from ..values import word_count
+from .assignment import Assignment, target
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
+from ..errors import ProfileError
+from ..values import raw_range, type_range, word_count
 from .decode import line_of
-from .errors import ProfileError
 from .schema import Parameter, ProfileData
-from .values import raw_range, type_range, word_count
 
 Place = list[str | int]
 Finding = tuple[Place, str]

@@ -7,7 +7,15 @@ from .block import Block
 from .chart import Chart, CommandExample, Reference
 from .control_source import ControlSource
 from .identification import Erratum, Head, Identification, Source
-from .link import Addresses, Connector, ExceptionCode, Function, LineRule, Link, Reading
+from .link import (
+    Addresses,
+    Connector,
+    ExceptionCode,
+    Function,
+    LineRule,
+    Link,
+    Reading,
+)
 from .memory import Memory
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter

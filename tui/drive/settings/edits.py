@@ -9,11 +9,11 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from decimal import Decimal
 
-from .errors import ValueRefused
-from .profile import Profile
-from .schema import Parameter
-from .shown import number_of, scale_sources, shown
-from .values import check_raw, encode
+from ..errors import ValueRefused
+from ..profile.profile import Profile
+from ..profile.schema import Parameter
+from ..shown import number_of, scale_sources, shown
+from ..values import check_raw, encode
 from .writable import CUTTING, line_setting, never_set, warning
 
 

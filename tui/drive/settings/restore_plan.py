@@ -6,12 +6,12 @@ from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
+from ..errors import ValueRefused
+from ..profile.profile import Profile, is_verified
+from ..profile.schema import Parameter, Quantity
+from ..shown import number_of, scale_sources, shown
 from .edits import Edit, Edits, problems
-from .errors import ValueRefused
 from .parameter_set import ParameterSet, lacking
-from .profile import Profile, is_verified
-from .schema import Parameter, Quantity
-from .shown import number_of, scale_sources, shown
 from .writable import CUTTING, is_setting, line_setting, needs_standstill
 
 Kind = Literal["write", "equal", "skip"]

@@ -1,0 +1,1 @@
+"""A drive as a file describes it: its schema, loading, decoding, checking."""
