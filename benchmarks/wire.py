@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from tui.simulator import DriveSpec, LineTiming, Simulation
-from tui.simulator.conversation import RtuConversation
-from tui.simulator.endpoints import PtyEndpoint
+from tui.simulator.server.conversation import RtuConversation
+from tui.simulator.server.endpoints import PtyEndpoint
 
 ROOT = Path(__file__).resolve().parents[1]
 

@@ -129,7 +129,7 @@ def test_a_listing_reads_the_head_alone(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_a_listing_imports_no_decoder() -> None:
     code = (
-        "import sys; from tui.drive import library; library.listings();"
+        "import sys; from tui.drive.profile import library; library.listings();"
         "print([m for m in ('tomli', 'tomllib', 'tui.drive.profile.decode') if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 from tui.simulator import DriveSpec, FaultRates, LineTiming, SimulatedDrive
-from tui.simulator.conversation import IDLE, RtuConversation, TcpConversation
-from tui.simulator.faults import FaultPlan
-from tui.simulator.frames import seal
-from tui.simulator.line import SimulatedLine
+from tui.simulator.server.conversation import IDLE, RtuConversation, TcpConversation
+from tui.simulator.server.faults import FaultPlan
+from tui.simulator.server.frames import seal
+from tui.simulator.server.line import SimulatedLine
 
 from .small import PROFILES
 

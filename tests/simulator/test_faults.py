@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from tui.simulator import FaultRates
-from tui.simulator.faults import FaultPlan
-from tui.simulator.frames import is_whole, seal
+from tui.simulator.server.faults import FaultPlan
+from tui.simulator.server.frames import is_whole, seal
 
 FRAME = seal(bytes.fromhex("020308002802580 1F40000".replace(" ", "")))
 

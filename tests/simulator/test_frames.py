@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.simulator.frames import crc16, is_whole, request_length, seal
+from tui.simulator.server.frames import crc16, is_whole, request_length, seal
 
 from .manual import FRAMES, Frame
 

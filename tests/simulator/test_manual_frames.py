@@ -13,7 +13,7 @@ import tty
 import pytest
 
 from tui.simulator import FaultRates, Simulation
-from tui.simulator.frames import seal
+from tui.simulator.server.frames import seal
 
 from .manual import EXAMPLES, FRAMES, NEVER_ANSWERED, Example
 

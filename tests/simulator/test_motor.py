@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tui.simulator.motor import MotorState, Order, approach, rating_of, step
+from tui.simulator.plant.motor import MotorState, Order, approach, rating_of, step
 
 RATING = rating_of("ATV71HU15M3")
 GO = Order(energised=True, target=50.0, acceleration=10.0, deceleration=5.0)

@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from tui.simulator import DriveSpec, LineTiming, Simulation, SimulatorError
-from tui.simulator.frames import seal
+from tui.simulator.server.frames import seal
 
 from .small import PROFILES
 from .test_manual_frames import read

@@ -9,7 +9,7 @@ from pymodbus.framer.rtu import FramerRTU
 
 from tests.simulator.manual import FRAMES, Frame
 from tui.bus.requests import Read, ReadWrite, WriteMany
-from tui.simulator import frames as witness
+from tui.simulator.server import frames as witness
 from tui.wire.frames import (
     crc16,
     frame,

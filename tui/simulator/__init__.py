@@ -1,8 +1,8 @@
 """Simulated drives on a simulated line, served over a pseudo-terminal, a port or TCP."""
 
 from .drive import SimulatedDrive
-from .endpoints import ByteStream
 from .errors import SimulatorError
+from .server.endpoints import ByteStream
 from .simulation import Simulation
 from .spec import DriveSpec, FaultRates, LineTiming, parse_drives
 

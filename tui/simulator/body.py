@@ -8,7 +8,7 @@ from enum import Enum
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 
-from .motor import MotorState, Rating, Stop
+from .plant.motor import MotorState, Rating, Stop
 from .registers import Registers
 from .rules import Traits
 

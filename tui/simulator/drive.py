@@ -15,26 +15,26 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Function, Parameter
 from tui.drive.values import type_range
 
-from .access import DriveWords
 from .body import ActiveFault, Body
-from .cards import CardWords, card_word, card_words
-from .chart_altivar21 import EMERGENCY_FAULT, Altivar21Chart
-from .chart_drivecom import DrivecomChart
-from .chart_leroy import LeroySomerChart
+from .charts.altivar21 import EMERGENCY_FAULT, Altivar21Chart
+from .charts.drivecom import DrivecomChart
+from .charts.leroy import LeroySomerChart
 from .errors import SimulatorError
-from .fault_history import FaultHistory, fault_raw
-from .first_values import first_values
-from .functions import Server, identity_of
-from .load import Load, Wanderer
-from .memory import Memory
-from .models import model_words
-from .monitoring import show_motor
-from .motor import MotorState, Order, Stop, rating_of, step
+from .plant.fault_history import FaultHistory, fault_raw
+from .plant.first_values import first_values
+from .plant.load import Load, Wanderer
+from .plant.memory import Memory
+from .plant.models import model_words
+from .plant.monitoring import show_motor
+from .plant.motor import MotorState, Order, Stop, rating_of, step
+from .plant.watch import Consequence, Watch
 from .registers import Registers
 from .rules import Kind, traits_of
+from .server.access import DriveWords
+from .server.cards import CardWords, card_word, card_words
+from .server.functions import Server, identity_of
+from .server.station import Station
 from .spec import DriveSpec, LineTiming
-from .station import Station
-from .watch import Consequence, Watch
 
 REFERENCES = frozenset({"command_word", "command_frequency", "command_speed"})
 """Orders that start the watch where it needs one."""

@@ -9,12 +9,12 @@ from types import TracebackType
 from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile
 
-from .conversation import Conversation, RtuConversation, TcpConversation
 from .drive import SimulatedDrive
-from .endpoints import ByteStream, Endpoint, PtyEndpoint, StreamEndpoint, TcpEndpoint
 from .errors import SimulatorError
-from .faults import FaultPlan
-from .line import SimulatedLine
+from .server.conversation import Conversation, RtuConversation, TcpConversation
+from .server.endpoints import ByteStream, Endpoint, PtyEndpoint, StreamEndpoint, TcpEndpoint
+from .server.faults import FaultPlan
+from .server.line import SimulatedLine
 from .spec import DriveSpec, FaultRates, LineTiming
 
 TICK = 0.05

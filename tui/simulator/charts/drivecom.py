@@ -12,13 +12,13 @@ from enum import Enum
 
 from tui.drive.profile.schema import Parameter
 
+from ..body import Body, Fallback
+from ..plant.motor import Order, Stop
+from ..rules import MODBUS_COMMAND, MODBUS_REFERENCE
 from .altivar_words import show_altivar_words
-from .body import Body, Fallback
 from .drivecom_reference import DrivecomReference
 from .drivecom_status import Appearance, extended_status_word, status_word
 from .io_profile import IoCommand, io_status, read_io_command
-from .motor import Order, Stop
-from .rules import MODBUS_COMMAND, MODBUS_REFERENCE
 
 
 class State(Enum):

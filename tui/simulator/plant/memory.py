@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from tui.drive.profile.schema import Parameter
 
-from .body import Body
+from ..body import Body
 
 CMI_FACTORY, CMI_SAVE, CMI_RESTORE = 1 << 0, 1 << 1, 1 << 2
 SAVE_TIME = 0.5

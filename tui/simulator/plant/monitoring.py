@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import speed_from_frequency
 
-from .body import Body
+from ..body import Body
 from .motor import MotorState
 
 Converter = Callable[[Body, MotorState], float]

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from random import Random
 
+from ..spec import FaultRates
 from .frames import seal
-from .spec import FaultRates
 
 Sendings = list[tuple[float, bytes]]
 """What is put on the wire instead of a reply: delays in s, and bytes."""

@@ -7,10 +7,10 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from .drive import SimulatedDrive
-from .errors import SimulatorError
+from ..drive import SimulatedDrive
+from ..errors import SimulatorError
+from ..spec import LineTiming
 from .frames import is_whole, seal
-from .spec import LineTiming
 
 FRESH = 0.004
 """Age in s up to which the drives' values are fresh enough to answer with."""

@@ -8,8 +8,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Function, Parameter
 from tui.drive.values import from_words, is_enumeration, raw_range, to_words, word_count
 
-from .registers import Registers
-from .rules import Traits
+from ..registers import Registers
+from ..rules import Traits
 
 NO_VALUE = 0x8000
 

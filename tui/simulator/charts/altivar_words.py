@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from .body import Body
-from .motor import Stop
+from ..body import Body
+from ..plant.motor import Stop
 
 RECORDED: Mapping[str, str] = {
     "EP": "ETA",

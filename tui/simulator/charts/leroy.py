@@ -11,8 +11,8 @@ from dataclasses import replace
 
 from tui.drive.profile.schema import Parameter
 
-from .body import Body, Fallback
-from .motor import Order, Stop
+from ..body import Body, Fallback
+from ..plant.motor import Order, Stop
 
 CONTROL_WORD, CONTROL_ON, STATUS_WORD = "6.42", "6.43", "10.40"
 BIT_PARAMETERS: Mapping[int, str] = {

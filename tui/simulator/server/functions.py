@@ -9,8 +9,8 @@ from typing import Protocol
 
 from tui.drive.profile.schema import Function, Identification
 
+from ..rules import Refusals
 from .access import Refused, past_limit
-from .rules import Refusals
 
 MEI_IDENTIFICATION = 14
 COUNTER_RESET, CHECKSUM_COUNT, FRAME_COUNT, ECHO = 10, 12, 14, 0

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from .body import Body
+from ..body import Body
 
 ANALOGUE_FULL = 1023
 ANALOGUE_HZ = 50.0

@@ -5,8 +5,8 @@ from __future__ import annotations
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import LinkChoice, LinkSetting, Parameter
 
-from .registers import Registers
-from .spec import LineTiming
+from ..registers import Registers
+from ..spec import LineTiming
 
 SHORTEST_TURNAROUND = 0.0015
 """PX-MODBUS manual 4, 15.06: never less, in s."""

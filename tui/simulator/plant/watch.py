@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 from tui.drive.profile.schema import CommunicationFault, Reaction
 
-from .body import Body, Fallback
+from ..body import Body, Fallback
 from .motor import Stop
 
 NO_MONITORING = 1 << 14

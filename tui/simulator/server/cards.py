@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 
 from tui.drive.profile.schema import Function
 
+from ..rules import Refusals
 from .access import Refused, past_limit
-from .rules import Refusals
 
 MEMORY_WORDS = 2048
 """%MW0 to %MW2047 of the programmable card."""

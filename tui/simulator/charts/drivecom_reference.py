@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from tui.drive.profile.schema import Parameter
 
-from .body import Body, Fallback
+from ..body import Body, Fallback
 from .io_profile import IoCommand
 
 CMD_REVERSE = 1 << 11

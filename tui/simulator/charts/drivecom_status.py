@@ -7,8 +7,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .body import Body
-from .motor import Stop
+from ..body import Body
+from ..plant.motor import Stop
 
 WARM_MOTOR = 100.0
 

@@ -10,9 +10,9 @@ from dataclasses import dataclass, replace
 
 from tui.drive.profile.schema import Parameter, Quantity
 
+from ..body import Body, Fallback
+from ..plant.motor import Order, Stop
 from .altivar21_words import show_altivar21_words
-from .body import Body, Fallback
-from .motor import Order, Stop
 
 (PRESETS, RAMP_2, INJECTION, REVERSE, RUN, COAST, EMERGENCY, RESET, OWN_REFERENCE, OWN_COMMAND) = (
     0x0007,

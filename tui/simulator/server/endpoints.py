@@ -18,8 +18,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Protocol
 
+from ..errors import SimulatorError
 from .conversation import Conversation
-from .errors import SimulatorError
 
 CHUNK = 4096
 STREAM_PAUSE = 0.005

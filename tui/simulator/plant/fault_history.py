@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from tui.drive.profile.profile import Profile
 
-from .altivar_words import FaultRecords
-from .body import ActiveFault, Body
-from .errors import SimulatorError
+from ..body import ActiveFault, Body
+from ..charts.altivar_words import FaultRecords
+from ..errors import SimulatorError
 
 
 def fault_raw(profile: Profile, fault: str | int) -> int:

@@ -1,0 +1,1 @@
+"""A simulated drive as a Modbus server: functions, access, conversation, endpoints."""
