@@ -27,9 +27,9 @@ from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block
 from tui.drive.read_plan import WireTiming
+from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
-from tui.session.lines import open_line
-from tui.session.monitor import Monitor, Snapshot, rates_of
+from tui.session.monitor.monitor import Monitor, Snapshot, rates_of
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 EIGHT = ("ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT")

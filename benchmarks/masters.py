@@ -28,7 +28,7 @@ from serial import PARITY_NONE
 
 from benchmarks.wire import ROOT, Record, WireLine, Worker
 from tui.drive.profile.library import load
-from tui.session.monitor import SHORTEST_PERIOD, monitoring_codes
+from tui.session.monitor.monitor import SHORTEST_PERIOD, monitoring_codes
 
 DEVICE = 1
 PATIENCE = 20.0
@@ -66,7 +66,7 @@ def _reader(job: dict[str, Any]) -> dict[str, object]:
     from tui.bus.line import Line
     from tui.bus.link import parse_link
     from tui.session.drive import DriveSession
-    from tui.session.reader import Reader
+    from tui.session.read.reader import Reader
 
     profile = load(job["family"])
     line = Line(parse_link(job["text"]))

@@ -38,10 +38,10 @@ from tui.bus.line import Line
 from tui.bus.link import parse_link
 from tui.drive.profile.library import load
 from tui.session.drive import DriveSession
-from tui.session.keeper import Keeper
-from tui.session.monitor import Monitor, Snapshot
-from tui.session.reader import Reader
-from tui.session.readings import Reading
+from tui.session.monitor.line_watch import Keeper
+from tui.session.monitor.monitor import Monitor, Snapshot
+from tui.session.read.reader import Reader
+from tui.session.reading import Reading
 
 PERIOD = 0.5
 """Wished cycle of each monitor in s, the panel's usual one."""

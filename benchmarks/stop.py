@@ -69,8 +69,8 @@ def panel() -> None:
     from tui.drive.profile.library import load
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
-    from tui.session.monitor import Monitor
-    from tui.session.reader import Reader
+    from tui.session.monitor.monitor import Monitor
+    from tui.session.read.reader import Reader
 
     text, drives, own_keys = sys.argv[1], json.loads(sys.argv[2]), sys.argv[3] == "own"
 

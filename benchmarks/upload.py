@@ -27,9 +27,9 @@ from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.values import word_count
-from tui.session.asking import neighbours
 from tui.session.drive import DriveSession
-from tui.session.upload import Upload, readable_codes
+from tui.session.read.retrying_reader import neighbours
+from tui.session.read.upload import Upload, readable_codes
 from tui.simulator import LineTiming
 
 FAMILIES = ("atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca")

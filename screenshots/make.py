@@ -39,9 +39,9 @@ STEPS: tuple[tuple[list[str], float, str], ...] = (
 
 async def main() -> None:
     """One run a size: every screen in a usual state."""
-    import tui.session.lines
+    from tui.session.connect import open_line
 
-    tui.session.lines.serial_ports = list  # the same on every machine: no port
+    open_line.serial_ports = list  # the same on every machine: no port
     with tempfile.TemporaryDirectory() as folder:
         os.environ["DRIVEPANEL_STATE"] = os.environ["DRIVEPANEL_CONFIG"] = folder
         for size in SIZES:
@@ -53,7 +53,7 @@ async def _run(size: tuple[int, int]) -> None:
 
     from tui.app import DrivePanelApp
     from tui.screens.monitor import MonitorScreen
-    from tui.session.lines import demo_line
+    from tui.session.connect.open_line import demo_line
 
     app = DrivePanelApp(open_line=lambda *_, **__: demo_line(DRIVES), start="demo")
 

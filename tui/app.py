@@ -15,9 +15,9 @@ from textual.events import Event, Key, Paste
 
 from tui.bus.errors import LineClosed
 from tui.drive.plain import plain
+from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.events import EventLog
-from tui.session.lines import OpenLine, open_line
-from tui.session.state import remember_line, state_folder
+from tui.session.paths import remember_line, state_folder
 from tui.terminal.admission import Admission
 from tui.terminal.driver import with_own_keys
 from tui.terminal.fields import takes_space
@@ -35,11 +35,11 @@ from .screens.places import Places
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
+    from tui.session.command.stop import StopSummary
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.stop import StopSummary
     from tui.terminal.stroke import Stroke
 
 log = logging.getLogger(__name__)
@@ -305,7 +305,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
         reports = list(self.fleet.stopper.reports.values()) if self.fleet else []
         if not reports:
             return
-        from tui.session.stop import StopSummary
+        from tui.session.command.stop import StopSummary
 
         last = max(report.time for report in reports)
         stop = StopSummary([report for report in reports if report.time >= last - 0.1])
@@ -356,7 +356,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
             opening.add_done_callback(_close_unwanted)
             raise
         from tui.session.fleet import Fleet
-        from tui.session.recording import StartKeeper
+        from tui.session.starts.keeper import StartKeeper
 
         # the motors of a simulated line end with it
         starts = StartKeeper("panel") if self.opened.simulation is None else None

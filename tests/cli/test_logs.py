@@ -11,7 +11,7 @@ from pathlib import Path
 import tui
 from tests.programs import PATIENCE, wait_until
 from tui.cli.shared.logs import log_file, start_logging, stop_logging
-from tui.session.lines import open_line
+from tui.session.connect.open_line import open_line
 
 SOURCES = Path(tui.__file__).parent
 
@@ -67,7 +67,7 @@ def test_a_disk_that_hangs_holds_up_nobody_who_logs() -> None:
     done = threading.Event()
 
     def log() -> None:
-        logging.getLogger("tui.session.stop").info("stop of device 1")
+        logging.getLogger("tui.session.command.stop").info("stop of device 1")
         stop_logging()
         done.set()
 

@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 from tui.cli.main import main
-from tui.session.lines import open_line
+from tui.session.connect.open_line import open_line
 
 
 class FakePanel:
@@ -76,7 +76,7 @@ def test_a_line_chosen_in_the_demo_is_that_line(
 ) -> None:
     asked: list[tuple[str, dict[str, Any]]] = []
     monkeypatch.setattr(
-        "tui.session.lines.open_line", lambda text, **how: asked.append((text, how))
+        "tui.session.connect.open_line.open_line", lambda text, **how: asked.append((text, how))
     )
     assert CliRunner().invoke(main, ["demo"]).exit_code == 0
     panel.given["open_line"]("/dev/ttyUSB0", read_only=True, wait=4.0)

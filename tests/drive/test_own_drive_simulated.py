@@ -11,10 +11,10 @@ from click.testing import CliRunner
 
 from tui.cli.main import main
 from tui.drive.profile import library
+from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
-from tui.session.lines import open_line
-from tui.session.reader import Reader
+from tui.session.read.reader import Reader
 from tui.simulator import DriveSpec, SimulatedDrive, Simulation
 
 README = Path(__file__).parents[2] / "profiles" / "README.md"

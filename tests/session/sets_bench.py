@@ -14,11 +14,11 @@ from tui.bus.link import RtuTcpLink, SerialLink
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.edits import Edits
-from tui.session.applying import Applied, apply_edits
-from tui.session.asking import Asker
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
-from tui.session.monitor import Monitor
+from tui.session.monitor.monitor import Monitor
+from tui.session.read.retrying_reader import Asker
+from tui.session.settings.apply import Applied, apply_edits
 from tui.session.work import Permit
 from tui.simulator import DriveSpec, FaultRates, Simulation
 from tui.simulator.drive import SimulatedDrive

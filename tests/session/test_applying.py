@@ -10,9 +10,9 @@ import pytest
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.settings.memory_orders import MemoryRefused
-from tui.session import asking
-from tui.session.applying import Applied, Outcome, Result, apply_edits
-from tui.session.memory import factory_reset, save_to_eeprom
+from tui.session.read import retrying_reader
+from tui.session.settings.apply import Applied, Outcome, Result, apply_edits
+from tui.session.settings.eeprom import factory_reset, save_to_eeprom
 from tui.simulator import FaultRates
 
 
@@ -237,7 +237,7 @@ async def test_a_read_only_line_writes_nothing() -> None:
 async def test_nobody_answers_before_anything_was_written(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(asking, "TRIES", 1)
+    monkeypatch.setattr(retrying_reader, "TRIES", 1)
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.power_off()

@@ -21,11 +21,11 @@ from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.session import arming
 from tui.session.arming import ARMED_FOR
-from tui.session.command import Commander
+from tui.session.command.commander import Commander
+from tui.session.command.stop import Phase, Stopper
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
-from tui.session.stop import Phase, Stopper
 from tui.session.work import Kind, Outcome
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive

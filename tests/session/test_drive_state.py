@@ -7,7 +7,7 @@ import pytest
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.drive_state import channel_text, drive_state
-from tui.session.readings import Quality, Reading
+from tui.session.reading import Quality, Reading
 
 from .fakes import parameter, profile_of
 

@@ -12,8 +12,8 @@ from tui.drive.errors import ValueRefused
 from tui.drive.settings.parameter_set import dumps
 from tui.drive.settings.selection import FILTERS, rows
 from tui.drive.settings.set_file import read_set, write_file
-from tui.session.editor import Editor
-from tui.session.upload import Upload
+from tui.session.read.upload import Upload
+from tui.session.settings.editor import Editor
 
 from .test_command import FAMILIES, Bench, bench
 

@@ -15,16 +15,16 @@ from tui.bus.line import Reply
 from tui.drive.blocks.assignment import Assignment, MappingError, empty, pick
 from tui.drive.blocks.wire_cost import frame, reach
 from tui.drive.errors import DriveError, ValueRefused
-from tui.session import exchange as module
-from tui.session.command import Commander
-from tui.session.exchange import Exchanged
-from tui.session.mapping_desk import MappingDesk
-from tui.session.mapping_write import AssignmentRefused
-from tui.session.monitor import Monitor
-from tui.session.outputs import Meant, meant, refuse_pending
-from tui.session.stop import Stopper
+from tui.session.blocks import exchange as module
+from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.exchange import Exchanged
+from tui.session.blocks.outputs import Meant, meant, refuse_pending
+from tui.session.blocks.write import AssignmentRefused
+from tui.session.command.commander import Commander
+from tui.session.command.stop import Stopper
+from tui.session.monitor.monitor import Monitor
+from tui.session.settings.write import NotTaken
 from tui.session.work import Permit
-from tui.session.writing import NotTaken
 
 EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]
 EXAMPLE_OUT = ["CMD", "LFRD", "HSP", "LSP", "ACC", "DEC"]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tui.session.fault_record import Recorder, record_name, record_text
+from tui.session.monitor.fault_record import Recorder, record_name, record_text
 
 from .test_command import Bench, bench
 

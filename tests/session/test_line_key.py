@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tui.session.line_key import line_key
+from tui.session.connect.line_key import line_key
 
 
 def test_a_port_is_found_behind_its_links(tmp_path: Path) -> None:

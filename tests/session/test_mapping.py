@@ -19,13 +19,13 @@ from tui.drive.blocks.user_words import COUNT, UserWord
 from tui.drive.blocks.wire_cost import frame, span
 from tui.drive.profile import library
 from tui.drive.profile.schema import Block
+from tui.session.blocks.mapping import Force, Mapper, wire_timing
+from tui.session.blocks.user_words import load_words, read_words, save_words
+from tui.session.blocks.verdict import Verdict
+from tui.session.blocks.write import AssignmentRefused, write_assignment
+from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
-from tui.session.lines import open_line
-from tui.session.mapping import Force, Mapper, wire_timing
-from tui.session.mapping_write import AssignmentRefused, write_assignment
-from tui.session.reader import Reader
-from tui.session.user_words import load_words, read_words, save_words
-from tui.session.verdict import Verdict
+from tui.session.read.reader import Reader
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 NO_WORDS = (UserWord(),) * COUNT

@@ -26,15 +26,15 @@ from tui.bus.errors import (
 from tui.bus.line import Identification, Line, Priority
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
-from tui.session.addresses import parse_addresses
+from tui.session.connect.addresses import parse_addresses
+from tui.session.connect.identify import ScanResult, identify, scan
+from tui.session.connect.open_line import OpenLine, check_line, demo_line, open_line
 from tui.session.drive import DriveSession
-from tui.session.identify import ScanResult, identify, scan
-from tui.session.keeper import Keeper
-from tui.session.lines import OpenLine, check_line, demo_line, open_line
-from tui.session.monitor import Monitor, Snapshot
-from tui.session.reader import Reader
-from tui.session.readings import Quality
-from tui.session.state import recent_lines, remember_line, state_folder
+from tui.session.monitor.line_watch import Keeper
+from tui.session.monitor.monitor import Monitor, Snapshot
+from tui.session.paths import recent_lines, remember_line, state_folder
+from tui.session.read.reader import Reader
+from tui.session.reading import Quality
 from tui.simulator import DriveSpec, Simulation
 
 DRIVES = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}

@@ -17,12 +17,12 @@ from tui.bus.line import Line, Priority, Reply
 from tui.bus.link import SerialLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
-from tui.session import monitor as monitor_module
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.fleet import Fleet
 from tui.session.journal import Journal
-from tui.session.reader import Reader
+from tui.session.monitor import monitor as monitor_module
+from tui.session.read.reader import Reader
 from tui.session.work import Kind
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive

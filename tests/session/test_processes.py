@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from tests.programs import wait_until
-from tui.session.processes import Processes
+from tui.session.starts.processes import Processes
 
 BEHIND = " ".join(["0"] * 18)
 """The fields of a stat line between the state and the start."""

@@ -9,8 +9,8 @@ import pytest
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Priority
 from tui.session.drive import DriveSession
-from tui.session.reader import PLANS_KEPT, Reader
-from tui.session.readings import Quality, Rating
+from tui.session.read.reader import PLANS_KEPT, Reader
+from tui.session.reading import Quality, Rating
 
 from .fakes import FakeLine, parameter, profile_of
 

@@ -8,9 +8,9 @@ import pytest
 
 from tests.programs import wait_until
 from tests.session.sets_bench import FAMILIES, bench
-from tui.session.identify import identify
+from tui.session.connect.identify import identify
+from tui.session.read.upload import Upload
 from tui.session.report import entries_of, report
-from tui.session.upload import Upload
 
 SECTIONS = [
     "## Line settings of the drive",

@@ -16,11 +16,11 @@ from tui.drive.settings.restore_plan import PLAIN, Held, Options, RestorePlan, p
 from tui.drive.settings.set_reading import loads
 from tui.drive.settings.writable import is_setting, line_setting
 from tui.drive.values import raw_range
-from tui.session.applying import Outcome, Result
-from tui.session.identify import identify
-from tui.session.memory import factory_reset
-from tui.session.restoring import Mark, Restored, plan_for, restore
-from tui.session.upload import Upload
+from tui.session.connect.identify import identify
+from tui.session.read.upload import Upload
+from tui.session.settings.apply import Outcome, Result
+from tui.session.settings.eeprom import factory_reset
+from tui.session.settings.restore import Mark, Restored, plan_for, restore
 
 ATV71, ATV312, ATV31 = (library.load(p) for p in ("atv71", "atv312", "atv31"))
 

@@ -11,10 +11,10 @@ from typing import Protocol
 import pytest
 
 from tui.drive.profile import library
+from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.drive import DriveSession
-from tui.session.lines import OpenLine, open_line
-from tui.session.monitor import Monitor, Snapshot
-from tui.session.readings import Quality
+from tui.session.monitor.monitor import Monitor, Snapshot
+from tui.session.reading import Quality
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 SCATTERED = {"NCV": 7, "VCAL": 2, "INV": 120, "LSP": 41, "HSP": 523, "ACC": 37, "DEC": 59}

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from tui.session.identify import DriveIdentity
-from tui.session.start_record import StartRecord, offer
+from tui.session.connect.identify import DriveIdentity
+from tui.session.starts.record import StartRecord, offer
 
 ZONE = timezone(timedelta(hours=2))
 NOW = datetime(2026, 3, 5, 18, 2, tzinfo=ZONE)

@@ -23,11 +23,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.programs import PATIENCE, wait_until
-from tui.session.identify import DriveIdentity
-from tui.session.line_key import line_key
-from tui.session.processes import Processes
-from tui.session.start_record import StartRecord
-from tui.session.starts import StartNotRecorded, StartOvertaken, Starts
+from tui.session.connect.identify import DriveIdentity
+from tui.session.connect.line_key import line_key
+from tui.session.starts.processes import Processes
+from tui.session.starts.record import StartRecord
+from tui.session.starts.starts import StartNotRecorded, StartOvertaken, Starts
 
 LINE = "tcp:gateway"
 IDENTITY = DriveIdentity(2, "V", "R", "0201", "MACHINE 4", "atv71", ("atv71",))
@@ -36,8 +36,8 @@ LIVING, ENDED = 900_001, 900_002
 PROGRAM = """
 import sys
 from pathlib import Path
-from tui.session.identify import DriveIdentity
-from tui.session.starts import Starts
+from tui.session.connect.identify import DriveIdentity
+from tui.session.starts.starts import Starts
 starts = Starts(Path(sys.argv[1]))
 for line in sys.stdin:
     word, device = line.split()

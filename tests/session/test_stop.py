@@ -12,10 +12,10 @@ from tui.bus.line import Line, Priority
 from tui.bus.link import SerialLink
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
 from tui.drive.profile import library
+from tui.session.command.stop import Phase, Stopper, StopReport
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
-from tui.session.reader import Reader
-from tui.session.stop import Phase, Stopper, StopReport
+from tui.session.read.reader import Reader
 from tui.simulator import DriveSpec, Simulation
 
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]

@@ -10,14 +10,14 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Priority, Reply
 from tui.drive.orders import OrderRefused, stop_in_any
 from tui.drive.profile import library
+from tui.session.command.stop import Phase, Stopper
+from tui.session.connect.limits import limits_of
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
-from tui.session.limits import limits_of
-from tui.session.monitor import Monitor
-from tui.session.reader import Reader
-from tui.session.stop import Phase, Stopper
+from tui.session.monitor.monitor import Monitor
+from tui.session.read.reader import Reader
+from tui.session.settings.write import Writer
 from tui.session.work import Stopped
-from tui.session.writing import Writer
 from tui.simulator import DriveSpec
 
 from .test_stop import Start, ended, journal, start, wait_for, writes

@@ -9,7 +9,7 @@ from tui.bus.errors import LineError
 from tui.drive.profile import library
 from tui.drive.settings.parameter_set import dumps
 from tui.drive.settings.set_reading import loads
-from tui.session.upload import Upload, readable_codes, setting_codes
+from tui.session.read.upload import Upload, readable_codes, setting_codes
 from tui.simulator import FaultRates
 
 

@@ -13,9 +13,9 @@ from tui.bus.line import LineState, LineStatus, Priority
 from tui.session.arming import NotArmed
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
-from tui.session.reader import Reader
+from tui.session.read.reader import Reader
+from tui.session.settings.write import NotTaken, Writer
 from tui.session.work import Permit, Stopped
-from tui.session.writing import NotTaken, Writer
 
 from .fakes import FakeLine, parameter, profile_of
 

@@ -44,7 +44,7 @@ class Measured:
 def panel() -> None:
     """The panel on one simulated, running drive; it opens Monitor by itself."""
     from tui.app import DrivePanelApp
-    from tui.session.lines import demo_line
+    from tui.session.connect.open_line import demo_line
 
     DrivePanelApp(open_line=lambda *_, **__: demo_line({"atv71": 50.0}), start="", device=1).run()
 

@@ -16,16 +16,16 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.arming import Arming
+from tui.session.connect.identify import DriveIdentity
+from tui.session.connect.open_line import OpenLine
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.fleet import Fleet, FoundDrive
-from tui.session.identify import DriveIdentity
 from tui.session.journal import Journal
-from tui.session.keeper import Keeper, Look, Watch
-from tui.session.lines import OpenLine
-from tui.session.monitor import Monitor, Snapshot, TrendPoint
-from tui.session.readings import Quality, Reading
+from tui.session.monitor.line_watch import Keeper, Look, Watch
+from tui.session.monitor.monitor import Monitor, Snapshot, TrendPoint
+from tui.session.reading import Quality, Reading
 from tui.widgets.clock import Clock
 
 NOW = 1000.0

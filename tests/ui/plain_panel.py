@@ -15,9 +15,9 @@ from textual.widgets import DataTable, Digits, Footer, Sparkline
 
 from tui.drive.profile import library
 from tui.screens.monitor import REFRESH
+from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession
-from tui.session.lines import OpenLine, demo_line
-from tui.session.monitor import Monitor
+from tui.session.monitor.monitor import Monitor
 
 LARGE = ("RFR", "LCR", "RFRD", "OTR")
 

@@ -18,7 +18,7 @@ from tui.screens.faults import FaultsScreen
 from tui.screens.frames import FramesScreen
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
-from tui.session.mapping_desk import MappingDesk
+from tui.session.blocks.editor import MappingDesk
 
 from .fakes import press
 from .test_command_flows import Bench, bench
@@ -28,7 +28,7 @@ from .test_parameter_flows import open_file
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 async def to_blocks(made: Bench, sees: str = "ETA") -> None:

@@ -25,8 +25,8 @@ from tui.screens.frames import FramesScreen
 from tui.screens.help import HelpScreen
 from tui.screens.messages import MessagesScreen
 from tui.screens.monitor import MonitorScreen
-from tui.session.lines import OpenLine, open_line
-from tui.session.stop import Phase
+from tui.session.command.stop import Phase
+from tui.session.connect.open_line import OpenLine, open_line
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 from tui.widgets.fields import NumberInput
@@ -156,7 +156,7 @@ async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 @pytest.mark.parametrize("family", FAMILIES)

@@ -10,10 +10,10 @@ from textual.pilot import Pilot
 
 from tui.drive.profile import library
 from tui.screens.monitor import MonitorScreen
-from tui.session.fault_record import FaultRecord, Moment, Recorder
+from tui.session.command.stop import Phase, Stopper, StopReport, StopSummary
 from tui.session.fleet import FoundDrive
 from tui.session.journal import Entry
-from tui.session.stop import Phase, Stopper, StopReport, StopSummary
+from tui.session.monitor.fault_record import FaultRecord, Moment, Recorder
 from tui.session.work import Kind, Outcome
 
 from . import fakes

@@ -14,7 +14,7 @@ from textual.pilot import Pilot
 from tui.app import DrivePanelApp
 from tui.bus.errors import PortBusy
 from tui.screens.dialogs.confirm import Confirm
-from tui.session.lines import OpenLine, demo_line
+from tui.session.connect.open_line import OpenLine, demo_line
 from tui.widgets.lines import Lines
 
 from . import fakes
@@ -52,7 +52,7 @@ def message(app: DrivePanelApp) -> str:
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 async def test_an_unforeseen_error_is_one_line_and_the_panel_goes_on() -> None:
@@ -77,7 +77,7 @@ async def test_enter_tries_the_line_again_that_could_not_be_opened(
         raise PortBusy("The port is in use by another program.")
 
     ports = [("/dev/ttyUSB0", "")]
-    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: list(ports))
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", lambda: list(ports))
     app = DrivePanelApp(open_line=busy, start="tcp:elsewhere")
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: "in use" in message(app))
@@ -102,7 +102,9 @@ async def test_enter_on_a_port_tries_that_port_again(monkeypatch: pytest.MonkeyP
         tried.append(text)
         raise PortBusy("The port is in use by another program.")
 
-    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: [("/dev/ttyUSB0", "")])
+    monkeypatch.setattr(
+        "tui.session.connect.open_line.serial_ports", lambda: [("/dev/ttyUSB0", "")]
+    )
     app = DrivePanelApp(open_line=busy)
     async with app.run_test(size=(80, 24)) as pilot:
         for count in (1, 2, 3):

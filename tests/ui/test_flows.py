@@ -24,8 +24,8 @@ from tui.screens.help import HelpScreen
 from tui.screens.messages import MessagesScreen
 from tui.screens.monitor import MonitorScreen
 from tui.screens.parameters import ParametersScreen
-from tui.session.keeper import Keeper
-from tui.session.lines import OpenLine, demo_line
+from tui.session.connect.open_line import OpenLine, demo_line
+from tui.session.monitor.line_watch import Keeper
 from tui.widgets.lines import Lines
 
 from .fakes import press
@@ -39,7 +39,7 @@ def demo(*_: object, **__: object) -> OpenLine:
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 async def until(pilot: Pilot[None], holds: Callable[[], bool], seconds: float = 20.0) -> None:

@@ -10,8 +10,8 @@ from hypothesis import strategies as st
 
 from tui.screens.drive_list import DriveList
 from tui.screens.found import about_drive, drive_line, next_step
+from tui.session.connect.identify import DriveIdentity
 from tui.session.fleet import FoundDrive
-from tui.session.identify import DriveIdentity
 
 from . import fakes
 from .test_flows import shown

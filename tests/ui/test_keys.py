@@ -53,7 +53,7 @@ LETTERS = [*"wW", *(key for key in string.ascii_letters if key not in "kewWuU"),
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 def meanings() -> dict[str, set[str]]:

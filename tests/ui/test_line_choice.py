@@ -19,8 +19,8 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.drive_list import DriveList
 from tui.screens.found import State
 from tui.screens.monitor import MonitorScreen
+from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.fleet import FoundDrive
-from tui.session.lines import OpenLine, open_line
 from tui.simulator import DriveSpec, Simulation
 
 from . import fakes
@@ -32,7 +32,7 @@ PORTS = [("/dev/ttyUSB0", "another adapter"), ("/dev/ttyUSB1", "")]
 
 @pytest.fixture(autouse=True)
 def ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: list(PORTS))
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", lambda: list(PORTS))
 
 
 @dataclass

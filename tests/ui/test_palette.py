@@ -38,7 +38,7 @@ WORDS = sorted({word for action in ACTIONS for word in action.help.casefold().sp
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 def test_every_word_that_was_typed_is_in_what_is_found() -> None:

@@ -22,7 +22,7 @@ from .test_flows import shown, until
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 async def to_parameters(made: Bench) -> ParametersScreen:

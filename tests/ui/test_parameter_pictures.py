@@ -13,11 +13,11 @@ from textual.pilot import Pilot
 
 from tui.drive.profile import library
 from tui.screens.parameters import ParametersScreen
-from tui.session.applying import Outcome, Result
 from tui.session.console import DriveConsole
-from tui.session.editor import Editor
-from tui.session.favourites import Marks
 from tui.session.image import Raw
+from tui.session.settings.apply import Outcome, Result
+from tui.session.settings.editor import Editor
+from tui.session.settings.favourites import Marks
 from tui.session.work import Kind
 from tui.session.work import Outcome as WorkOutcome
 from tui.widgets.parameter_view import news_lines

@@ -15,11 +15,11 @@ from tui.bus.line import LineState
 from tui.drive.profile import library
 from tui.screens.connection import ConnectionScreen
 from tui.screens.monitor import MonitorScreen
+from tui.session.connect.identify import DriveIdentity
 from tui.session.console import DriveConsole
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
-from tui.session.identify import DriveIdentity
-from tui.session.keeper import Watch
+from tui.session.monitor.line_watch import Watch
 
 from . import fakes
 
@@ -43,7 +43,7 @@ STATES: dict[str, tuple[Any, LineState]] = {
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     """The same serial ports on every machine."""
     found = [("/dev/ttyUSB0", "USB-RS485 adapter"), ("/dev/ttyS0", "")]
-    monkeypatch.setattr("tui.session.lines.serial_ports", lambda: found)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", lambda: found)
     monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
 
 

@@ -13,8 +13,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.actions import CONNECTION, EVERYWHERE, MONITOR, line_of, of_screen
 from tui.screens.frames import frame_line
-from tui.session.monitor import TrendPoint
-from tui.session.readings import Quality
+from tui.session.monitor.monitor import TrendPoint
+from tui.session.reading import Quality
 from tui.widgets.drawing import aligned, bar, key_line, trend
 from tui.widgets.monitor_motor import motor_lines
 from tui.widgets.monitor_orders import order_keys

@@ -20,8 +20,8 @@ from tui.screens.dialogs.options import OptionsScreen
 from tui.screens.dialogs.question import Question, void_questions
 from tui.screens.help import HelpScreen
 from tui.screens.parameters import ParametersScreen
-from tui.session.keeper import Look
-from tui.session.monitor import Snapshot
+from tui.session.monitor.line_watch import Look
+from tui.session.monitor.monitor import Snapshot
 from tui.widgets.motor_now import motor_now
 
 from . import fakes
@@ -46,7 +46,7 @@ class HandClock(fakes.StillClock):
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 IS_EARLY = Question._is_early

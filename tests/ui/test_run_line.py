@@ -26,7 +26,7 @@ CLOSING = ["escape", "q", "n", "y", "x", "r", "v", "f", "a", "3 a", "tab", "left
 
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
 def edited(line: RunLine, keys: str) -> str:

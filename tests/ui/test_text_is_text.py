@@ -48,7 +48,7 @@ Way = Callable[[Bench], Awaitable[None]]
 
 @pytest.fixture(autouse=True)
 def alone(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    monkeypatch.setattr("tui.session.lines.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
     monkeypatch.chdir(tmp_path)
 
 
@@ -241,7 +241,7 @@ def test_a_cell_never_holds_a_command() -> None:
 
 def panel() -> None:
     """The panel on a drive with a name that no drive should have."""
-    from tui.session.lines import OpenLine, open_line
+    from tui.session.connect.open_line import OpenLine, open_line
     from tui.simulator import DriveSpec, Simulation
 
     simulation = Simulation([DriveSpec("atv71", 1, identity={0: NAME, 6: NAME})])

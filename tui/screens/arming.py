@@ -6,7 +6,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.drive.orders import OrderRefused
-from tui.session.command import Commander
+from tui.session.command.commander import Commander
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.work import Outcome

@@ -9,7 +9,7 @@ from pathlib import Path
 from tui.drive.blocks.assignment import no_blocks
 from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, word_named
 from tui.drive.errors import DriveError
-from tui.session.mapping_desk import MappingDesk
+from tui.session.blocks.editor import MappingDesk
 
 from .arming import Arming
 from .dialogs.files import fault_of_new
@@ -106,7 +106,7 @@ class BlockKeys(Arming):
 
     def action_load_file(self) -> None:
         """Choose a file, and propose what it holds."""
-        from tui.session.state import state_folder
+        from tui.session.paths import state_folder
 
         from .dialogs.pick_file import PickFile
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from rich.text import Text
 
 from tui.bus.errors import LinkSyntaxError
-from tui.session.lines import check_line
+from tui.session.connect.open_line import check_line
 from tui.widgets.drawing import cut
 from tui.widgets.palette import FAINT, PLAIN
 
@@ -67,7 +67,7 @@ def same_line(one: str, other: str) -> bool:
     if one == other:
         return True
     from tui.bus.link import SerialLink, parse_link
-    from tui.session.line_key import line_key
+    from tui.session.connect.line_key import line_key
 
     if line_key(one) != line_key(other):
         return False

@@ -27,7 +27,7 @@ from .line_list import LineList
 
 if TYPE_CHECKING:
     from tui.session.fleet import FoundDrive
-    from tui.session.keeper import Look
+    from tui.session.monitor.line_watch import Look
 
 log = logging.getLogger(__name__)
 

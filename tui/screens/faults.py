@@ -12,9 +12,9 @@ from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
 from tui.session.console import DriveConsole
-from tui.session.fault_record import FaultRecord, Recorder, record_name, record_text
-from tui.session.readings import Reading
-from tui.session.state import state_folder
+from tui.session.monitor.fault_record import FaultRecord, Recorder, record_name, record_text
+from tui.session.paths import state_folder
+from tui.session.reading import Reading
 from tui.widgets.drawing import armed_text, rule
 from tui.widgets.fault_view import fault_lines, history_line, record_lines, stored_lines
 from tui.widgets.lines import Lines

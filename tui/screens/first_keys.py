@@ -6,7 +6,7 @@ import json
 import os
 from pathlib import Path
 
-from tui.session.state import state_folder
+from tui.session.paths import state_folder
 
 OFFER = "First start on this terminal: press F12, a stop key, to see whether it arrives."
 ARRIVED = "F12 arrived: it stops motors from this terminal, as Space and F9 do."

@@ -14,7 +14,7 @@ from .panel import Panel
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.keeper import Watch
+    from tui.session.monitor.line_watch import Watch
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
@@ -51,7 +51,7 @@ class Leaving(Panel):
 
     def _left_running(self, sessions: list[DriveSession]) -> str:
         """Which motors run, and what each drive does when nobody asks it any more."""
-        from tui.session.keeper import left_alone_text
+        from tui.session.monitor.line_watch import left_alone_text
 
         assert self.fleet is not None
         keeper = self.fleet.keeper
@@ -61,7 +61,7 @@ class Leaving(Panel):
         """Which drives act on their communication time-out once they are left, and when."""
         if self.fleet is None:
             return []
-        from tui.session.keeper import left_alone_text, names_of
+        from tui.session.monitor.line_watch import left_alone_text, names_of
 
         told = {session.device for session in but}
         keeper = self.fleet.keeper
@@ -87,7 +87,7 @@ class Leaving(Panel):
 
     async def _leave_running(self) -> None:
         """Leave motors running, on record for whoever comes next."""
-        from tui.session.starts import StartNotRecorded
+        from tui.session.starts.starts import StartNotRecorded
 
         self.settled = True
         for session in self._motors():

@@ -6,7 +6,7 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Input
 
-from tui.session.addresses import parse_addresses
+from tui.session.connect.addresses import parse_addresses
 from tui.widgets.fields import NumberInput
 from tui.widgets.plain import Plain
 

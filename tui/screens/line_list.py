@@ -6,7 +6,7 @@ from rich.text import Text
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
-from tui.session.state import recent_lines
+from tui.session.paths import recent_lines
 from tui.widgets.palette import FAINT
 from tui.widgets.plain import entry
 
@@ -26,7 +26,7 @@ class LineList(OptionList):
 
     def look_for_lines(self) -> None:
         """Find the serial ports there are now, and the lines used lately."""
-        from tui.session.lines import serial_ports
+        from tui.session.connect.open_line import serial_ports
 
         lately = recent_lines()
         named = [self._named] if self._named and self._named not in lately else []

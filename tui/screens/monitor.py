@@ -13,9 +13,9 @@ from textual.events import Resize
 from textual.timer import Timer
 
 from tui.drive.profile.schema import Parameter
+from tui.session.command.stop import Phase, StopReport
 from tui.session.console import DriveConsole
-from tui.session.readings import Rating
-from tui.session.stop import Phase, StopReport
+from tui.session.reading import Rating
 from tui.widgets.lines import Lines
 from tui.widgets.monitor_motor import motor_lines
 from tui.widgets.monitor_orders import order_keys

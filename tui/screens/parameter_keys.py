@@ -5,7 +5,7 @@ from __future__ import annotations
 from textual.widgets import Input
 
 from tui.session.console import DriveConsole
-from tui.session.editor import Editor
+from tui.session.settings.editor import Editor
 
 from .arming import Arming
 from .parameter_list import ParameterList

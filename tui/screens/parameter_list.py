@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from tui.drive.settings.selection import FILTERS, Facts, FilterId, rows
-from tui.session.editor import Editor
+from tui.session.settings.editor import Editor
 from tui.widgets.parameter_view import Item, items_of
 
 USUAL: FilterId = "settings"

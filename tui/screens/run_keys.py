@@ -10,8 +10,8 @@ from textual.events import Key
 
 from tui.bus.errors import LineError
 from tui.drive.shown import number_of
-from tui.session.readings import Reading
-from tui.session.reference import reference_codes
+from tui.session.command.reference import reference_codes
+from tui.session.reading import Reading
 from tui.terminal.stroke import stroke_of
 
 from .monitor_actions import COMMAND_ACTIONS

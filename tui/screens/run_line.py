@@ -13,8 +13,8 @@ from rich.text import Text
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
-from tui.session.readings import Reading
-from tui.session.reference import LIMITS, parse_reference
+from tui.session.command.reference import LIMITS, parse_reference
+from tui.session.reading import Reading
 from tui.widgets.drawing import short
 from tui.widgets.palette import ALARM, FAINT, KEY, PLAIN, STOP_KEY, STRONG
 

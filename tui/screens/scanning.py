@@ -14,7 +14,7 @@ from tui.drive.errors import DriveError
 from .connection_view import ALARM_KIND, ConnectionView
 
 if TYPE_CHECKING:
-    from tui.session.identify import DriveIdentity, ScanResult
+    from tui.session.connect.identify import DriveIdentity, ScanResult
 
 
 class Scanning(ConnectionView):
@@ -40,7 +40,7 @@ class Scanning(ConnectionView):
     @work(exclusive=True, group="scan", exit_on_error=False)
     async def scan(self, devices: Sequence[int]) -> None:
         """Ask each address; drives appear as they answer."""
-        from tui.session.identify import scan
+        from tui.session.connect.identify import scan
 
         opened = self.app.opened
         if opened is None:

@@ -64,7 +64,7 @@ class SetKeys(ParameterKeys):
 
     async def _read_to_file(self, path: Path, text: Callable[[ParameterSet], str]) -> None:
         from tui.drive.settings.set_file import write_file
-        from tui.session.upload import Upload
+        from tui.session.read.upload import Upload
 
         def progress(done: int, count: int) -> None:
             self.note(f"Reading for {path.name}: {done} of {count}")
@@ -86,7 +86,7 @@ class SetKeys(ParameterKeys):
 
     def action_load_file(self) -> None:
         """Choose what to compare with: a file, another drive of the line, the factory settings."""
-        from tui.session.state import state_folder
+        from tui.session.paths import state_folder
 
         from .dialogs.pick_file import PickFile
 
@@ -131,7 +131,7 @@ class SetKeys(ParameterKeys):
         self.editor.other_label = path.name
 
     async def _compare_drive(self, device: int) -> None:
-        from tui.session.upload import Upload, setting_codes
+        from tui.session.read.upload import Upload, setting_codes
 
         found = self.app.fleet.console(device) if self.app.fleet else None
         if found is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tui.drive.settings.edits import Edit, Edits, consequences, cuts_line, ordered, problems
-from tui.session.editor import Editor
+from tui.session.settings.editor import Editor
 
 SHOWN = 9
 """Edits that are named; the others are counted."""

@@ -8,19 +8,19 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING
 
-from .command import Commander
+from .command.commander import Commander
+from .connect.identify import DriveIdentity
 from .drive import DriveSession
 from .drive_state import DriveState
-from .fault_record import Recorder
-from .identify import DriveIdentity
 from .journal import Journal
-from .monitor import Monitor, Snapshot
-from .reader import Reader
-from .readings import Reading
+from .monitor.fault_record import Recorder
+from .monitor.monitor import Monitor, Snapshot
+from .read.reader import Reader
+from .reading import Reading
 
 if TYPE_CHECKING:
-    from .editor import Editor
-    from .mapping_desk import MappingDesk
+    from .blocks.editor import MappingDesk
+    from .settings.editor import Editor
 
 
 @dataclass(eq=False)
@@ -53,14 +53,14 @@ class DriveConsole:
     @cached_property
     def editor(self) -> Editor:
         """What is staged and written of its parameters."""
-        from .editor import Editor  # what Monitor does not need is imported later
+        from .settings.editor import Editor  # what Monitor does not need is imported later
 
         return Editor(self.session, self.journal, self._state)
 
     @cached_property
     def blocks(self) -> MappingDesk:
         """What is proposed and written of its blocks."""
-        from .mapping_desk import MappingDesk
+        from .blocks.editor import MappingDesk
 
         return MappingDesk(self.session, self.monitor, self.journal)
 

@@ -11,11 +11,11 @@ from tui.drive.chart import UNKNOWN, ChartState, read_chart
 from tui.drive.profile.profile import Profile
 
 from .arming import Arming
-from .identify import DriveIdentity
+from .connect.identify import DriveIdentity
+from .connect.limits import limits_of
 from .image import RegisterImage
-from .limits import limits_of
-from .readings import Rating
-from .recording import StartKeeper
+from .reading import Rating
+from .starts.keeper import StartKeeper
 from .work import WorkQueue
 
 

@@ -10,7 +10,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Bit, FaultCode, Parameter, StateKind
 from tui.drive.values import set_bits
 
-from .readings import Quality, Reading
+from .reading import Quality, Reading
 
 
 @dataclass(frozen=True, slots=True)

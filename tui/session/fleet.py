@@ -14,14 +14,14 @@ from types import MappingProxyType
 from tui.bus.line import Line
 from tui.drive.profile.schema import OrderId
 
+from .command.stop import Stopper
+from .connect.identify import DriveIdentity
 from .console import DriveConsole
 from .drive import DriveSession
 from .events import EventLog
-from .identify import DriveIdentity
 from .journal import Journal
-from .keeper import Keeper
-from .recording import StartKeeper
-from .stop import Stopper
+from .monitor.line_watch import Keeper
+from .starts.keeper import StartKeeper
 from .work import Kind, Outcome
 
 Stamp = Mapping[int, int]

@@ -16,7 +16,7 @@ from datetime import datetime
 from pathlib import Path
 
 from .journal_file import JournalFile
-from .state import state_folder
+from .paths import state_folder
 
 SHOWN = 500
 """Entries kept at hand."""

@@ -6,7 +6,7 @@ import os
 from itertools import pairwise
 from pathlib import Path
 
-from .start_files import sync_folder
+from .starts.files import sync_folder
 
 NAME = "journal.jsonl"
 LARGEST = 1_000_000

@@ -13,9 +13,9 @@ from tui.drive.blocks.wire_cost import Saving, Stretch, frame, microseconds, tog
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.mapping import BlockView, Force, Slot, wire_timing
-from tui.session.mapping_desk import MappingDesk
-from tui.session.verdict import Verdict
+from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.mapping import BlockView, Force, Slot, wire_timing
+from tui.session.blocks.verdict import Verdict
 from tui.wire.frames import hex_text
 
 from .drawing import cut, rule, wrapped

@@ -10,9 +10,9 @@ from rich.text import Text
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.fault_record import FaultRecord, Moment
 from tui.session.journal import Entry
-from tui.session.readings import Reading
+from tui.session.monitor.fault_record import FaultRecord, Moment
+from tui.session.reading import Reading
 
 from .drawing import cut, rule, wrapped
 from .palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG

@@ -7,7 +7,7 @@ from rich.text import Text
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
-from tui.session.readings import Quality, Reading
+from tui.session.reading import Quality, Reading
 
 from .drawing import aligned, bar, cut, rule
 from .monitor_view import View, age_text, end_of

@@ -8,10 +8,10 @@ from rich.text import Text
 from tui.bus.line import LineStatus
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
+from tui.session.command.stop import Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
-from tui.session.keeper import TOLD_AFTER
-from tui.session.readings import Quality
-from tui.session.stop import Phase, StopReport
+from tui.session.monitor.line_watch import TOLD_AFTER
+from tui.session.reading import Quality
 
 from .drawing import armed_text, cut, pair, rule
 from .monitor_orders import outcome_lines

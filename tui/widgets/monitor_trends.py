@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.session.monitor import STALE_CYCLES
+from tui.session.monitor.monitor import STALE_CYCLES
 
 from .drawing import cut, rule, trend
 from .monitor_view import USUAL_SPAN, View, end_of

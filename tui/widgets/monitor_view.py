@@ -7,11 +7,11 @@ from dataclasses import dataclass
 from tui.bus.line import Counters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import MonitoringValue
-from tui.session.identify import DriveIdentity
-from tui.session.keeper import Watch
-from tui.session.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
-from tui.session.readings import Reading
-from tui.session.stop import StopReport
+from tui.session.command.stop import StopReport
+from tui.session.connect.identify import DriveIdentity
+from tui.session.monitor.line_watch import Watch
+from tui.session.monitor.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
+from tui.session.reading import Reading
 from tui.session.work import Outcome
 
 USUAL_SPAN = 60.0

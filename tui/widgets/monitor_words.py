@@ -10,7 +10,7 @@ from rich.text import Text
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Bit, Parameter
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.readings import Quality
+from tui.session.reading import Quality
 
 from .drawing import cut, rule
 from .monitor_view import View

@@ -7,9 +7,9 @@ from rich.text import Text
 from tui.bus.line import LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
-from tui.session.keeper import GLANCE, Look
-from tui.session.monitor import STALE_CYCLES, Snapshot
-from tui.session.readings import Quality
+from tui.session.monitor.line_watch import GLANCE, Look
+from tui.session.monitor.monitor import STALE_CYCLES, Snapshot
+from tui.session.reading import Quality
 
 from .monitor_state import STATE_SIGNS, STATE_STYLES
 from .monitor_view import age_text

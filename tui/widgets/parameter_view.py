@@ -15,7 +15,7 @@ from tui.drive.settings.selection import not_factory
 from tui.drive.settings.writable import marks, waits_for_reset
 from tui.drive.shown import limits_text, shown
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
-from tui.session.editor import Editor
+from tui.session.settings.editor import Editor
 
 from .drawing import armed_text, cut, short
 from .palette import (

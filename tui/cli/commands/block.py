@@ -25,9 +25,9 @@ from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.blocks.assignment import Assignment
+    from tui.session.blocks.mapping import BlockView
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.lines import OpenLine
-    from tui.session.mapping import BlockView
 
 DIFFERENT = 1
 """Exit status of `verify` where a slot does not bring what it stands for."""
@@ -122,7 +122,7 @@ async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> i
 
 async def _measure_answer(session: DriveSession) -> None:
     """One read, after which it is known how long this drive takes to answer."""
-    from tui.session.reader import Reader
+    from tui.session.read.reader import Reader
 
     status = session.profile.quantity("status_word")
     if status is not None:
@@ -130,7 +130,7 @@ async def _measure_answer(session: DriveSession) -> None:
 
 
 async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
-    from tui.session.mapping import Mapper
+    from tui.session.blocks.mapping import Mapper
 
     mapper = Mapper(session)
     look = mapper.verify if verify else mapper.look
@@ -139,7 +139,7 @@ async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
 
 def _status(views: list[BlockView]) -> int:
     """0 where every slot in use that can be compared brings what it stands for."""
-    from tui.session.verdict import Verdict
+    from tui.session.blocks.verdict import Verdict
 
     wrong = (Verdict.DIFFERS, Verdict.CHANGED, Verdict.NONE)
     for view in views:
@@ -169,9 +169,9 @@ def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.bus.errors import DeviceException
     from tui.drive.blocks.assignment import changes, describe, problems, refusing
+    from tui.session.blocks.write import AssignmentRefused, write_assignment
     from tui.session.journal import Journal
-    from tui.session.mapping_write import AssignmentRefused, write_assignment
-    from tui.session.writing import NotTaken
+    from tui.session.settings.write import NotTaken
 
     held, plans = await _plans(session, wanted)
     refused: list[str] = []
@@ -212,7 +212,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
 async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int], list[Assignment]]:
     """What the slots hold, and the assignments that are wanted in their place."""
     from tui.drive.blocks.assignment import MappingError, assignment, factory, pick, place_of
-    from tui.session.mapping import Mapper
+    from tui.session.blocks.mapping import Mapper
 
     profile = session.profile
     named = [_pair(text) for text in wanted.words] if wanted.action == "set" else []

@@ -13,8 +13,8 @@ from ..shared.options import device_option, json_option, line_argument, on_line,
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.session.identify import DriveIdentity
-    from tui.session.lines import OpenLine
+    from tui.session.connect.identify import DriveIdentity
+    from tui.session.connect.open_line import OpenLine
 
 
 @click.command()
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @told
 def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> None:
     """Ask a drive who it is (function 43)."""
-    from tui.session.identify import identify as ask
+    from tui.session.connect.identify import identify as ask
 
     from ..shared.output import print_json
 

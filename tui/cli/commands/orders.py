@@ -25,15 +25,15 @@ from ..shared.options import (
 from ..shared.say import say
 
 if TYPE_CHECKING:
-    from tui.session.command import Commander
+    from tui.session.command.commander import Commander
+    from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.keeper import Watch
-    from tui.session.lines import OpenLine
-    from tui.session.monitor import Snapshot
-    from tui.session.recording import StartKeeper
+    from tui.session.monitor.line_watch import Watch
+    from tui.session.monitor.monitor import Snapshot
+    from tui.session.starts.keeper import StartKeeper
     from tui.session.work import Permit
 
 LOOK = 0.02
@@ -152,7 +152,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
 
 def _way_on(error: Exception | None) -> str:
     """What lets a command through that was refused, where something does."""
-    from tui.session.starts import StartNotRecorded, StartOvertaken
+    from tui.session.starts.starts import StartNotRecorded, StartOvertaken
 
     refused = isinstance(error, StartNotRecorded) and not isinstance(error, StartOvertaken)
     return " --unrecorded runs it all the same." if refused else ""

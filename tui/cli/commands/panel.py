@@ -14,7 +14,7 @@ from ..shared.options import SLAVE_ADDRESS, read_only_option
 from ..shared.signals import ending_by_signal
 
 if TYPE_CHECKING:
-    from tui.session.lines import OpenLine
+    from tui.session.connect.open_line import OpenLine
 
 DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 """Profiles of the demo and the frequency in Hz at which each motor runs."""
@@ -44,7 +44,7 @@ def run_panel(
     gc.disable()  # until the first picture: what is imported and built for it stays
     os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
     from tui.app import DrivePanelApp
-    from tui.session.lines import open_line
+    from tui.session.connect.open_line import open_line
 
     app = DrivePanelApp(
         open_line=_open_with_demo if start == DEMO_LINE else open_line,
@@ -64,7 +64,7 @@ def run_panel(
 
 def _open_with_demo(text: str, *, read_only: bool = False, wait: float | None = None) -> OpenLine:
     """The demo's line, or any other that is chosen in the panel afterwards."""
-    from tui.session.lines import demo_line, open_line
+    from tui.session.connect.open_line import demo_line, open_line
 
     if text == DEMO_LINE:
         return demo_line(DEMO)

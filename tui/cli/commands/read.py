@@ -19,9 +19,9 @@ from ..shared.options import (
 from ..shared.say import say
 
 if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.lines import OpenLine
-    from tui.session.readings import Reading
+    from tui.session.reading import Reading
 
 
 @click.command()
@@ -42,7 +42,7 @@ def read(
     A CODE is the drive's own (ACC, 1.05, F875), the manual's number (W9001, 16#FD00) or a wire
     address (9001), in any case.
     """
-    from tui.session.reader import Reader
+    from tui.session.read.reader import Reader
 
     from ..shared.output import print_json, print_readings, readings_json
 

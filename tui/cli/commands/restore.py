@@ -36,8 +36,8 @@ from .orders import arm_option, close_journal, need_arming, permit_of
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
     from tui.drive.settings.restore_plan import Options, RestorePlan
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.lines import OpenLine
 
 NAMED = 12
 """How many codes are named for one reason; --dry-run names all."""
@@ -127,7 +127,7 @@ async def _in_turn(
 
 async def _tell(session: DriveSession, values: ParameterSet, options: Options) -> int:
     from tui.drive.profile import library
-    from tui.session.restoring import plan_for
+    from tui.session.settings.restore import plan_for
 
     source = library.load(values.head.profile)
     plan = await plan_for(session, values, source, options, counter("Read"))
@@ -164,9 +164,9 @@ async def _restore(
 ) -> int:
     from tui.drive.profile import library
     from tui.session.journal import Journal
-    from tui.session.memory import save_to_eeprom
-    from tui.session.restoring import Mark
-    from tui.session.restoring import restore as bring_back
+    from tui.session.settings.eeprom import save_to_eeprom
+    from tui.session.settings.restore import Mark
+    from tui.session.settings.restore import restore as bring_back
 
     source = library.load(values.head.profile)
     if told_before := Mark.of(session).interrupted:

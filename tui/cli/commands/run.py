@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tui.bus.errors import LineError
-from tui.session.keeper import left_alone_text
-from tui.session.recording import StartKeeper
+from tui.session.monitor.line_watch import left_alone_text
+from tui.session.starts.keeper import StartKeeper
 
 from ..shared.errors import DRIVE_REFUSED, REFUSED_HERE, Failure, told
 from ..shared.options import (
@@ -46,11 +46,11 @@ from .status import fault_text, shown_values, values_json
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
+    from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
-    from tui.session.keeper import Watch
-    from tui.session.lines import OpenLine
-    from tui.session.monitor import Snapshot
+    from tui.session.monitor.line_watch import Watch
+    from tui.session.monitor.monitor import Snapshot
 
 TOLD_EVERY = 1.0
 """Seconds between two lines about the motor."""
@@ -322,7 +322,7 @@ class Run:
 
         Raises Failure where the drive answers and does not stop.
         """
-        from tui.session.stop import Phase
+        from tui.session.command.stop import Phase
 
         from .stop import ended
 

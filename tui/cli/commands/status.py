@@ -25,11 +25,11 @@ from ..shared.say import say
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
     from tui.drive.profile.schema import Quantity
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
-    from tui.session.keeper import Watch
-    from tui.session.lines import OpenLine
-    from tui.session.readings import Reading
+    from tui.session.monitor.line_watch import Watch
+    from tui.session.reading import Reading
 
 SHOWN: dict[Quantity, str] = {
     "output_frequency": "Output frequency",

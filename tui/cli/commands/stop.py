@@ -25,10 +25,10 @@ from .orders import close_journal, complain
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
+    from tui.session.command.stop import Stopper, StopReport
+    from tui.session.connect.identify import DriveIdentity
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.identify import DriveIdentity
-    from tui.session.lines import OpenLine
-    from tui.session.stop import Stopper, StopReport
 
 USUAL_ADDRESSES = "1-10"
 LOOK = 0.05
@@ -77,7 +77,7 @@ def stop(
 
 
 def _devices(text: str | None) -> list[int]:
-    from tui.session.addresses import parse_addresses
+    from tui.session.connect.addresses import parse_addresses
 
     return parse_addresses(text) if text is not None else []
 
@@ -90,7 +90,7 @@ def has_order(session: DriveSession, order: OrderId) -> bool:
 
 async def ended(stopper: Stopper, device: int) -> StopReport:
     """The report of a stop that was ordered, once nothing more is awaited."""
-    from tui.session.stop import Phase
+    from tui.session.command.stop import Phase
 
     while True:
         report = stopper.reports[device]
@@ -110,7 +110,7 @@ class Found:
 async def _wanted(opened: OpenLine, target: Target) -> Found:
     """The wanted drive; raises UsageError where it is not known what stops it."""
     from tui.drive.profile import library
-    from tui.session.identify import identify
+    from tui.session.connect.identify import identify
 
     if target.profile_id is None:
         identity = await identify(opened.line, target.device)
@@ -123,8 +123,8 @@ async def _wanted(opened: OpenLine, target: Target) -> Found:
 
 
 async def _stop_one(opened: OpenLine, found: Found, order: OrderId) -> int:
+    from tui.session.command.stop import Stopper
     from tui.session.journal import Journal
-    from tui.session.stop import Stopper
 
     if not has_order(found.session, order):
         raise Failure(
@@ -141,7 +141,7 @@ async def _stop_one(opened: OpenLine, found: Found, order: OrderId) -> int:
 
 async def _seen_through(stopper: Stopper, found: Found, order: OrderId) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
-    from tui.session.stop import Phase
+    from tui.session.command.stop import Phase
 
     session = found.session
     stopper.stop([session], order, by="drivepanel stop")
@@ -159,7 +159,7 @@ async def _why(session: DriveSession) -> int:
     """The status of a stop that failed: whether the drive answers at all."""
     from tui.bus.errors import DeviceException, LineError
     from tui.drive.chart import watched_codes
-    from tui.session.reader import Reader
+    from tui.session.read.reader import Reader
 
     try:
         await Reader(session).read(watched_codes(session.profile)[:1])
@@ -178,8 +178,8 @@ async def _stop_all(
     Every address is asked once in haste before any is asked with patience: a silent one takes
     seconds to rule out, and meanwhile motors turn.
     """
+    from tui.session.command.stop import Stopper
     from tui.session.journal import Journal
-    from tui.session.stop import Stopper
 
     journal = Journal()
     stopper = Stopper(opened.line, journal)
@@ -220,7 +220,7 @@ async def _found(
     """
     from tui.bus.errors import LineError, NoAnswer
     from tui.bus.line import Priority
-    from tui.session.identify import identify
+    from tui.session.connect.identify import identify
 
     priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
     try:

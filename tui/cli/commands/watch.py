@@ -25,9 +25,9 @@ from ..shared.options import (
 from ..shared.watch_outputs import JsonOutput, Output, csv_output, text_output
 
 if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.lines import OpenLine
-    from tui.session.monitor import Snapshot
+    from tui.session.monitor.monitor import Snapshot
 
 WAITING_LONGEST = 64
 """Snapshots kept for an output that is slower than the line; older ones are dropped."""
@@ -71,7 +71,7 @@ def watch(
     """
 
     async def work(opened: OpenLine) -> None:
-        from tui.session.monitor import monitoring_codes
+        from tui.session.monitor.monitor import monitoring_codes
 
         session = await connect(opened, target)
         wanted = [session.profile.find(code).code for code in codes] or None
@@ -102,7 +102,7 @@ async def _follow(
 
     Raises Failure where `count` cycles passed and the drive never answered.
     """
-    from tui.session.monitor import Monitor
+    from tui.session.monitor.monitor import Monitor
 
     loop = asyncio.get_running_loop()
     cycles: asyncio.Queue[Snapshot] = asyncio.Queue(WAITING_LONGEST)
@@ -136,7 +136,7 @@ async def _follow(
 
 def _complete(session: DriveSession, snapshot: Snapshot, shown: list[str]) -> Snapshot:
     """The cycle with all codes in their order; what was never read is bad, and says why."""
-    from tui.session.readings import Reading
+    from tui.session.reading import Reading
 
     readings = {
         code: snapshot.readings.get(code)

@@ -29,8 +29,8 @@ from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edits
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.lines import OpenLine
 
 
 @click.command()
@@ -90,7 +90,7 @@ async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
     from tui.drive.errors import ValueRefused
     from tui.drive.settings.edits import Edits, consequences
     from tui.drive.shown import scale_sources
-    from tui.session.asking import Asker
+    from tui.session.read.retrying_reader import Asker
 
     profile = session.profile
     pairs = [(profile.find(code).code, value) for code, value in typed]
@@ -115,9 +115,9 @@ async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
 async def _write(
     session: DriveSession, edits: Edits, confirmed: tuple[str, ...], *, save: bool
 ) -> int:
-    from tui.session.applying import apply_edits
     from tui.session.journal import Journal
-    from tui.session.memory import save_to_eeprom
+    from tui.session.settings.apply import apply_edits
+    from tui.session.settings.eeprom import save_to_eeprom
 
     if not len(edits):
         say("The drive holds these values already.")

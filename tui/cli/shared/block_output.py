@@ -11,8 +11,8 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tui.drive.blocks.wire_cost import Stretch
+    from tui.session.blocks.mapping import BlockView, Slot
     from tui.session.drive import DriveSession
-    from tui.session.mapping import BlockView, Slot
 
 HEADINGS = ("Slot", "Stands for", "Name", "Number", "Wire address", "Brings", "Direct", "", "")
 AFTER_RESET = (
@@ -59,8 +59,8 @@ def _head(session: DriveSession, line_text: str) -> dict[str, Any]:
 def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
     """Microseconds of a fast cycle of the monitoring set, directly and with these slots."""
     from tui.drive.blocks.wire_cost import saving
-    from tui.session.mapping import wire_timing
-    from tui.session.monitor import rates_of
+    from tui.session.blocks.mapping import wire_timing
+    from tui.session.monitor.monitor import rates_of
 
     raws = {slot: raw for view in views for slot, raw in view.raws.items()}
     fast = rates_of(session.profile).fast
@@ -158,8 +158,8 @@ def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> 
     """Print that there is no block, and which neighbours are worth reading in one request."""
     from tui.drive.blocks.assignment import no_blocks
     from tui.drive.blocks.wire_cost import stretches
-    from tui.session.mapping import wire_timing
-    from tui.session.monitor import monitoring_codes
+    from tui.session.blocks.mapping import wire_timing
+    from tui.session.monitor.monitor import monitoring_codes
 
     from .output import print_json
 

@@ -52,7 +52,7 @@ def status_of(error: Exception) -> int | None:
     """The exit status of a known error, or None for one that nobody foresaw."""
     from tui.bus.errors import DeviceException, LineError, LinkSyntaxError, RequestRefused
     from tui.drive.errors import DriveError, ProfileError, UnknownParameter, UnknownProfile
-    from tui.session.writing import NotTaken
+    from tui.session.settings.write import NotTaken
     from tui.simulator.errors import SimulatorError
 
     table: tuple[tuple[type[Exception], int], ...] = (

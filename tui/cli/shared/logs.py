@@ -10,7 +10,7 @@ from pathlib import Path
 from queue import Full, Queue
 from threading import Thread
 
-from tui.session.state import state_folder
+from tui.session.paths import state_folder
 
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
+    from tui.session.connect.identify import DriveIdentity
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.identify import DriveIdentity
-    from tui.session.lines import OpenLine
 
 T = TypeVar("T")
 Command = Callable[..., Any]
@@ -108,7 +108,7 @@ def on_line(
     read_only: bool = False,
 ) -> T:
     """Open a line, do the work, close the line whatever happens."""
-    from tui.session.lines import open_line
+    from tui.session.connect.open_line import open_line
 
     opened = open_line(line_text, read_only=read_only, wait=CONNECT_WITHIN)
     try:
@@ -123,8 +123,8 @@ async def connect(opened: OpenLine, target: Target) -> DriveSession:
     Raises UnidentifiedDrive with what to type where the drive does not say who it is.
     """
     from tui.drive.profile import library
+    from tui.session.connect.identify import identify
     from tui.session.drive import DriveSession
-    from tui.session.identify import identify
 
     identity: DriveIdentity | None = None
     profile_id = target.profile_id
@@ -144,7 +144,7 @@ def _rate(session: DriveSession, rated_current: float | None) -> None:
         return
     from decimal import Decimal
 
-    from tui.session.readings import Rating
+    from tui.session.reading import Rating
 
     session.ratings[current.code] = Rating(Decimal(str(rated_current)), "A")
 

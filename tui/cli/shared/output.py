@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.table import Table
 
     from tui.session.drive import DriveSession
-    from tui.session.readings import Reading
+    from tui.session.reading import Reading
 
 COLUMNS = {
     "Code": False,

@@ -17,10 +17,10 @@ from .say import say, say_over
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
-    from tui.session.applying import Result
+    from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.lines import OpenLine
-    from tui.session.upload import Upload
+    from tui.session.read.upload import Upload
+    from tui.session.settings.apply import Result
 
 OUTAGE = 20.0
 """Seconds for which a read-out waits for a lost line to come back."""
@@ -89,8 +89,8 @@ def set_of_drive(target: Target) -> tuple[DriveSession, ParameterSet]:
 async def take_set(session: DriveSession) -> ParameterSet:
     """Every readable parameter of a drive, with who it is, as far as it says so."""
     from tui.bus.errors import ExchangeError
-    from tui.session.identify import identify
-    from tui.session.upload import Upload
+    from tui.session.connect.identify import identify
+    from tui.session.read.upload import Upload
 
     if session.identity is None and session.profile.function(43) is not None:
         try:
@@ -141,7 +141,7 @@ def say_result(done: int, of: int, result: Result) -> None:
 
 def status_of_results(results: Iterable[Result]) -> int:
     """The exit status of a number of writes: the worst that has happened."""
-    from tui.session.applying import Outcome
+    from tui.session.settings.apply import Outcome
 
     table = {
         Outcome.DRIVE_REFUSED: DRIVE_REFUSED,

@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from rich.live import Live
 
     from tui.session.drive import DriveSession
-    from tui.session.monitor import Snapshot
-    from tui.session.readings import Reading
+    from tui.session.monitor.monitor import Snapshot
+    from tui.session.reading import Reading
 
 
 class Output(Protocol):

@@ -15,7 +15,7 @@ from textual.widgets import Input, OptionList
 from tui.drive.errors import DriveError
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import encode
-from tui.session.editor import Editor
+from tui.session.settings.editor import Editor
 from tui.widgets.fields import NumberInput
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.parameter_view import factory_text, range_text, value_text

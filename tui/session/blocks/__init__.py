@@ -1,0 +1,1 @@
+"""Setting up indirect blocks and scanners, and exchanging through them."""

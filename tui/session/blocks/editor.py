@@ -1,0 +1,384 @@
+"""The blocks of one drive at a desk: watched, an assignment proposed, written, compared.
+
+The values come in through a worker of the line's loop, as long as somebody looks. What is
+proposed belongs to the thread of the screen and is kept until it is written or dropped.
+"""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Any
+
+from tui.bus.errors import LineError
+from tui.bus.line import Worker
+from tui.drive.blocks.assignment import (
+    Assignment,
+    Change,
+    MappingError,
+    Problem,
+    assignment,
+    changes,
+    factory,
+    pick,
+    problems,
+    slots_of,
+)
+from tui.drive.blocks.user_words import UserWords
+from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
+from tui.drive.errors import DriveError
+from tui.drive.orders import OrderRefused
+from tui.drive.profile.schema import Block
+from tui.drive.settings.writable import AT_REST
+
+from ..drive import DriveSession
+from ..journal import Journal
+from ..monitor.monitor import Monitor, Snapshot, monitoring_codes, rates_of
+from ..work import Kind, Outcome, Permit, Task
+from .exchange import exchange
+from .mapping import BlockView, Force, Mapper, wire_timing
+from .outputs import Meant, example, meant, refuse_pending, values_text
+from .user_words import load_words, read_words, save_words
+from .verdict import Verdict
+from .write import at_rest_only, write_assignment
+
+AGAIN = 1.0
+"""Seconds between two looks at the blocks."""
+AFTER_ERROR = 1.0
+
+
+@dataclass(slots=True)
+class MappingDesk:
+    """What is known of a drive's blocks, what is proposed, and the work on them."""
+
+    session: DriveSession
+    monitor: Monitor
+    journal: Journal
+    views: dict[str, BlockView] = field(default_factory=dict)
+    """What was seen of each block when it was last compared, by its id; replaced as a whole."""
+    plans: dict[str, Assignment] = field(default_factory=dict)
+    """What is proposed, by the id of the block, where that is not today's assignment."""
+    words: UserWords = field(default_factory=tuple)
+    word_raws: list[int | None] = field(default_factory=list)
+    trouble: str = ""
+    """Why nothing can be read now; empty while that works."""
+    mapper: Mapper = field(init=False)
+    _seen: dict[str, dict[str, int]] = field(default_factory=dict)
+    """The slots as the person saw them when a proposal was begun, by the id of the block."""
+    _reader: Worker | None = None
+    _verify: bool = False
+    _costs: dict[object, Saving] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.mapper = Mapper(self.session, lambda: self.monitor.reader.in_force)
+        self.words = load_words(self.session)
+        self.word_raws = [None] * len(self.words)
+
+    @property
+    def blocks(self) -> list[Block]:
+        """The blocks of the family, what is read first."""
+        return sorted(self.session.profile.data.blocks, key=lambda b: b.direction != "read")
+
+    @property
+    def busy(self) -> bool:
+        """Whether something is being written."""
+        return self.session.work.busy_for(self)
+
+    @property
+    def said(self) -> Outcome | None:
+        """What the last work on the drive has come to."""
+        return self.session.work.outcome
+
+    # Reading
+
+    def start(self) -> None:
+        """Begin to look."""
+        self.stop()
+        self._reader = self.session.line.spawn(self._watch, f"blocks {self.session.device}")
+
+    def stop(self) -> None:
+        """Look no more; what is being written goes on."""
+        if self._reader is not None:
+            self._reader.cancel()
+            self._reader = None
+
+    def verify(self) -> None:
+        """Compare every slot several times at the next look, and tell what came of it."""
+        self._verify = True
+        self._say("Comparing each slot with direct reads", Kind.WORKING)
+
+    async def _watch(self) -> None:
+        while True:
+            try:
+                await self._look()
+            except (LineError, DriveError) as error:
+                self.trouble = str(error)
+                await asyncio.sleep(AFTER_ERROR)
+            else:
+                self.trouble = ""
+                await asyncio.sleep(0.0 if self._verify else AGAIN)
+
+    async def _look(self) -> None:
+        verify, self._verify = self._verify, False
+        for block in self.blocks:
+            look = self.mapper.verify if verify else self.mapper.look
+            view = await look(block)
+            self.views = {**self.views, block.id: view}
+        self.word_raws = await read_words(self.session, self.words)
+        if verify:
+            text, good = _verdict(list(self.views.values()))
+            self._say(text, Kind.DONE if good else Kind.REFUSED)
+
+    def _wait_for_a_reset(self) -> None:
+        """Note when the drive was silent or starts anew: what waits for a reset may count then."""
+
+        def seen(snapshot: Snapshot) -> None:
+            if snapshot.error or snapshot.state.kind == "starting":
+                self.mapper.note_reset()
+                leave()
+
+        leave = self.monitor.listen(seen)
+
+    # Proposing
+
+    def today(self, block: Block) -> Assignment | None:
+        """What the drive holds; None while that is not known."""
+        raws = self.session.image.raws
+        return assignment(block, {slot: raws[slot] for slot in block.slots if slot in raws})
+
+    def proposed(self, block: Block) -> Assignment | None:
+        """What is proposed, else today's assignment."""
+        return self.plans.get(block.id) or self.today(block)
+
+    def propose(self, plan: Assignment) -> None:
+        """Propose an assignment; one that equals today's is no proposal. Raises MappingError."""
+        today = self.today(plan.block)
+        if today is None:
+            raise MappingError(f"{plan.block.name} could not be read yet.")
+        if self.busy:
+            raise MappingError("Something is being written; wait until that is done.")
+        if plan.raws == today.raws:
+            self.plans.pop(plan.block.id, None)
+            return
+        if plan.block.id not in self.plans:
+            self._seen[plan.block.id] = today.slots
+        self.plans[plan.block.id] = plan
+
+    def pick(self, block: Block, place: int, text: str) -> None:
+        """Propose what a person names for a slot. Raises MappingError, UnknownParameter."""
+        self.propose(pick(self.session.profile, self._base(block), place, text))
+
+    def move(self, block: Block, place: int, step: int) -> None:
+        """Propose a slot's content one place up or down. Raises MappingError."""
+        self.propose(self._base(block).moved(place, step))
+
+    def clear(self, block: Block, place: int) -> None:
+        """Propose an unused slot. Raises MappingError."""
+        self.propose(self._base(block).cleared(place))
+
+    def factory(self, block: Block) -> None:
+        """Propose what the drive left the factory with. Raises MappingError."""
+        self.propose(factory(self.session.profile, block))
+
+    def drop(self) -> None:
+        """Propose nothing any more."""
+        self.plans.clear()
+        self._seen.clear()
+
+    def _base(self, block: Block) -> Assignment:
+        plan = self.proposed(block)
+        if plan is None:
+            raise MappingError(f"{block.name} could not be read yet.")
+        return plan
+
+    def changes(self, block: Block) -> list[Change]:
+        """What writing the proposal would change now."""
+        plan, today = self.plans.get(block.id), self.today(block)
+        return changes(today.slots, plan) if plan and today else []
+
+    def problems(self, block: Block) -> list[Problem]:
+        """What is wrong with the proposal, or with today's assignment where there is none."""
+        plan = self.proposed(block)
+        return problems(self.session.profile, plan, self.mapper.lacking) if plan else []
+
+    # What it costs
+
+    def saving(self) -> Saving | None:
+        """The time of a fast monitoring cycle under today's slots and under the proposed ones."""
+        today = [plan for block in self.blocks if (plan := self.today(block))]
+        after = [plan for block in self.blocks if (plan := self.proposed(block))]
+        if not today:
+            return None
+        timing = wire_timing(self.session)
+        before_raws, after_raws = slots_of(today), slots_of(after)
+        key = (tuple(before_raws.items()), tuple(after_raws.items()), timing)
+        if key not in self._costs:
+            codes = rates_of(self.session.profile).fast
+            self._costs = {
+                key: saving(self.session.profile, codes, timing, before_raws, after_raws)
+            }
+        return self._costs[key]
+
+    def stretches(self) -> list[Stretch]:
+        """For families without blocks: which neighbours to read in one request."""
+        codes = monitoring_codes(self.session.profile)
+        return stretches(self.session.profile, codes, wire_timing(self.session))
+
+    # User words
+
+    def assign_words(self, words: UserWords) -> None:
+        """Watch other words from now on, and keep them for this drive."""
+        self.words, self.word_raws = words, [None] * len(words)
+        if wrong := save_words(self.session, words):
+            self._say(wrong, Kind.REFUSED)
+
+    # Writing
+
+    def not_now(self, block: Block) -> str:
+        """Why the slots of a block cannot be written in the state of now, as Monitor knows it."""
+        latest = self.monitor.latest
+        if latest is None or latest.error or latest.state.kind in AT_REST:
+            return ""
+        return at_rest_only(block, latest.state.headline or latest.state.kind)
+
+    def write(self, stamp: int | None = None) -> None:
+        """Write what is proposed; returns at once."""
+        plans = [self.plans[b.id] for b in self.blocks if b.id in self.plans]
+
+        async def work(permit: Permit) -> str:
+            texts = []
+            for plan in plans:
+                if plan.block.effective == "after-reset":
+                    # whatever becomes of the writing: what was written by then waits
+                    self.mapper.written |= {c.slot: c.new for c in self.changes(plan.block)}
+                    self._wait_for_a_reset()
+                done = await write_assignment(
+                    self.session,
+                    self.journal,
+                    plan,
+                    permit=permit,
+                    expected=self._seen.get(plan.block.id),
+                )
+                self.views = {
+                    **self.views,
+                    plan.block.id: await self.mapper.look(plan.block),
+                }
+                self.plans.pop(plan.block.id, None)
+                texts.append(done.text)
+            return " ".join(dict.fromkeys(texts))
+
+        self._run(work, "Writing, each slot read back", stamp)
+
+    def example(self) -> str:
+        """What may be typed to write through the outputs. Raises MappingError."""
+        return example(self.session.profile, self._outputs(), self.session.image.raws)
+
+    def meant(self, text: str) -> Meant:
+        """What `LFRD=1500 ACC=5.0` would write through the outputs of now, and what follows.
+
+        Raises ValueRefused, UnknownParameter and MappingError with what is wrong.
+        """
+        session, outputs = self.session, self._outputs()
+        refuse_pending(outputs, self.mapper.written)
+        read = next((b for b in self.blocks if b.direction == "read"), None)
+        inputs = self.today(read) if read else None
+        raws = session.image.raws
+        return meant(session.profile, session.device, outputs, inputs, raws, text)
+
+    def exchange(self, agreed: Meant, stamp: int | None = None) -> None:
+        """Write through the outputs what a person has agreed to; returns at once."""
+        session = self.session
+
+        async def work(permit: Permit) -> str:
+            done = await exchange(
+                session,
+                self.journal,
+                agreed.outputs,
+                agreed.wanted,
+                agreed.inputs,
+                permit=permit,
+                in_force=True,
+            )
+            raws = session.image.raws
+            sent = values_text(session.profile, agreed.wanted, raws)
+            back = values_text(session.profile, done.inputs, raws)
+            return f"Written: {sent}." + (f" Came back: {back}." if back else "")
+
+        self._run(work, "Writing through the outputs", stamp)
+
+    def _outputs(self) -> Assignment:
+        block = next((b for b in self.blocks if b.direction == "write"), None)
+        plan = self.today(block) if block else None
+        if plan is None or not plan.length:
+            raise MappingError("No output slot is in use.")
+        return plan
+
+    def _run(
+        self, work: Callable[[Permit], Coroutine[Any, Any, str]], doing: str, stamp: int | None
+    ) -> None:
+        """Do it as work on the drive: nothing before it, ended by a stop."""
+        queue = self.session.work
+        if queue.busy:
+            self._say("Another command is still being carried out.", Kind.REFUSED)
+            return
+        cut_short = False
+
+        async def carry_out(permit: Permit) -> str:
+            nonlocal cut_short
+            try:
+                return await work(permit)
+            except asyncio.CancelledError:
+                cut_short = True
+                raise
+
+        def given_up() -> str | None:
+            self._look_again()
+            return "What was written stays." if cut_short else None
+
+        try:
+            queue.put(Task(carry_out, owner=self, working=doing, given_up=given_up), stamp)
+        except OrderRefused as refused:
+            self._say(str(refused), Kind.REFUSED)
+
+    def _look_again(self) -> None:
+        """What was not done to its end: the person looks at what the drive holds now."""
+        with suppress(LineError):
+            self.session.line.spawn(self._see_again, f"blocks {self.session.device} again")
+
+    async def _see_again(self) -> None:
+        """After a refusal the person looks at what the drive holds now, and may write again."""
+        with suppress(LineError, DriveError):
+            for id, plan in list(self.plans.items()):
+                view = await self.mapper.look(plan.block)
+                self.views = {**self.views, id: view}
+                self._seen[id] = view.raws
+
+    def refuse(self, text: str) -> None:
+        """Tell why something was not done."""
+        self._say(text, Kind.REFUSED)
+
+    def _say(self, text: str, kind: Kind) -> None:
+        self.session.work.tell(kind, text)
+
+
+def _verdict(views: list[BlockView]) -> tuple[str, bool]:
+    """What a comparison of all blocks has come to, and whether all is well."""
+    wrong: list[str] = []
+    counted = 0
+    for view in views:
+        if view.block.direction != "read":
+            continue
+        if view.trouble:
+            wrong.append(view.trouble)
+        for slot in view.slots:
+            counted += slot.verdict in (Verdict.SAME, Verdict.MOVING)
+            if slot.verdict in (Verdict.DIFFERS, Verdict.CHANGED, Verdict.NONE):
+                brings = f", brings {slot.brings}" if slot.brings else ""
+                waits = " until the next reset" if slot.force is Force.PENDING else ""
+                wrong.append(f"{slot.code} {slot.verdict}{brings}{waits}")
+    text = f"{counted} slots bring the same as direct reads."
+    if wrong:
+        return f"{'; '.join(wrong)}. {text}", False
+    return text, True

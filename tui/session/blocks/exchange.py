@@ -1,0 +1,324 @@
+"""Writing words through the outputs of a block or scanner, with the inputs in the same exchange.
+
+Only the places from the first to the last parameter that a person names are written. Their
+slots are read before and after, and each parameter is read back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from tui.bus.errors import LineError, RequestRefused
+from tui.bus.line import Priority
+from tui.drive.blocks.assignment import UNUSED, Assignment, describe, problems, refusing, target
+from tui.drive.blocks.wire_cost import reach, span
+from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
+from tui.drive.profile.schema import Parameter
+from tui.drive.settings.writable import AT_REST, is_order
+from tui.drive.shown import depends_on
+from tui.drive.values import check_raw, from_words, to_words
+
+from ..drive import DriveSession
+from ..journal import Entry, Journal, now_text
+from ..read.retrying_reader import Asker
+from ..settings.write import NotTaken, Writer
+from ..starts.keeper import record_start
+from ..work import Permit
+from .write import AssignmentRefused
+
+
+@dataclass(frozen=True, slots=True)
+class Exchanged:
+    """What one exchange has written through the outputs, and the inputs that came back."""
+
+    outputs: dict[str, int]
+    """Raw values by code of the parameter, as they were written."""
+    inputs: dict[str, int]
+    """Raw values by code, of the inputs whose slots still stand for the same afterwards."""
+
+
+async def exchange(
+    session: DriveSession,
+    journal: Journal,
+    outputs: Assignment,
+    wanted: Mapping[str, int],
+    inputs: Assignment | None = None,
+    *,
+    permit: Permit,
+    in_force: bool = False,
+) -> Exchanged:
+    """Write through the output slots, and read the inputs in the same exchange by function 23.
+
+    `wanted` are raw values by code; a slot between two named ones gets what its parameter holds
+    now. Commands pass through the same interlocks as a run order. `in_force` is a person's word
+    that the slots of an indirect block were set before the drive's last reset, which cannot be
+    read; without it nothing is written through such a block. Raises AssignmentRefused,
+    ValueRefused, RequestRefused, NotTaken, and the line's errors.
+    """
+    if session.line.read_only:
+        raise RequestRefused("The line is read-only: nothing is written.")
+    if why := permit.refusal():
+        raise AssignmentRefused(f"{why} Nothing was written.")
+    if outputs.block.effective == "after-reset" and not in_force:
+        raise AssignmentRefused(
+            f"What {outputs.block.name.lower()} stands for since the last reset cannot be read,"
+            " and nobody has confirmed it: nothing is written."
+        )
+    work = _Exchange(
+        session, Writer(session, journal, permit), Asker(session), outputs, inputs, wanted
+    )
+    work.check_named()
+    return await work.carry_out(permit)
+
+
+@dataclass(slots=True)
+class _Exchange:
+    session: DriveSession
+    writer: Writer
+    asker: Asker
+    outputs: Assignment
+    inputs: Assignment | None
+    wanted: Mapping[str, int]
+    places: range = field(init=False)
+    targets: list[Parameter] = field(init=False)
+    """What the places of the write stand for, in their order."""
+
+    def __post_init__(self) -> None:
+        profile, block = self.session.profile, self.outputs.block
+        self.places = reach(profile, self.outputs, self.wanted)
+        found = [target(profile, block, self.outputs.raws[place]) for place in self.places]
+        self.targets = [parameter for parameter in found if parameter is not None]
+
+    def check_named(self) -> None:
+        """Raise AssignmentRefused for a stranger, a hole, or a slot that must not be used."""
+        profile, block = self.session.profile, self.outputs.block
+        known = {p.code for p in self.targets}
+        if foreign := [code for code in self.wanted if code not in known]:
+            raise AssignmentRefused(f"No output slot stands for {', '.join(foreign)}.")
+        if not self.wanted:
+            raise AssignmentRefused("No output was named; nothing was written.")
+        for place in self.places:
+            if target(profile, block, self.outputs.raws[place]) is None:
+                stands = describe(profile, block, self.outputs.raws[place])
+                raise AssignmentRefused(
+                    f"{block.slots[place]} is {stands}: nothing is written through it."
+                )
+        if wrong := refusing(problems(profile, self.outputs)):
+            raise AssignmentRefused(" ".join(problem.text for problem in wrong))
+
+    async def carry_out(self, permit: Permit) -> Exchanged:
+        await self._check_slots("before")
+        await self._interlocks()
+        await self._read_scales()
+        held = await self._held()
+        raws = {p.code: self.wanted.get(p.code, held.get(p.code)) for p in self.targets}
+        if unknown := [code for code, raw in raws.items() if raw is None]:
+            raise AssignmentRefused(
+                f"What {', '.join(unknown)} holds now is not known; give it a value as well."
+            )
+        known = {code: raw for code, raw in raws.items() if raw is not None}
+        for parameter in self.targets:
+            if parameter.code in self.wanted:
+                self._check(parameter, known[parameter.code])
+        permit.check()
+        await self._record_start(permit)
+        reply, back = await self._send(known, held)
+        await self._check_slots("after")
+        self._see_taken(known, held, back)
+        return Exchanged(known, self._read(reply))
+
+    async def _record_start(self, permit: Permit) -> None:
+        """A command word that goes out with them may start the motor."""
+        commands = {chart.command for chart in self.session.profile.data.charts}
+        if commands.isdisjoint(parameter.code for parameter in self.targets):
+            return
+        await record_start(self.session, "forward", permit)
+        if self.session.starts is not None:
+            self.session.starts.sent(self.session)
+
+    async def _read_scales(self) -> None:
+        """What scales and units depend on: errors and the journal tell engineering values."""
+        sources = [code for parameter in self.targets for code in depends_on(parameter)]
+        await self.asker.ask_raws(dict.fromkeys(sources))
+
+    async def _held(self) -> dict[str, int]:
+        """What the outputs hold now, with all that an indirect block could stand for."""
+        codes = [p.code for p in self.targets]
+        if self.outputs.block.effective == "after-reset":
+            codes += [choice.parameter for choice in self.outputs.block.choices]
+        profile = self.session.profile
+        return await self.asker.ask_raws(
+            code for code in dict.fromkeys(codes) if profile[code].access != "w"
+        )
+
+    async def _interlocks(self) -> None:
+        """The interlocks of a run order where an output is an order; rest where one needs it."""
+        profile = self.session.profile
+        state = await self.asker.ask_state()
+        stopped = [p.code for p in self.targets if p.access == "rw-stopped"]
+        if stopped and state not in AT_REST:
+            raise AssignmentRefused(
+                f"{', '.join(stopped)} are written with the motor stopped only; the drive is"
+                f" {self.asker.headline}."
+            )
+        if not any(is_order(profile, parameter) for parameter in self.targets):
+            return
+        codes = deciding_codes(profile)
+        for chart in profile.data.charts:
+            codes += interlock_codes(chart)
+        await self.asker.ask_raws(codes)
+        raws = self.session.image.raws
+        found = chart_in_force(profile, raws)
+        if found is None or not found.orders:
+            raise AssignmentRefused("This drive is not commanded from here.")
+        if refused := interlock(found, "forward", raws):
+            raise AssignmentRefused(refused)
+
+    def _check(self, parameter: Parameter, raw: int) -> None:
+        profile = self.session.profile
+        scale = profile.scale(parameter, self.asker.raws, self.asker.lacking)
+        check_raw(parameter, raw, profile.names(parameter), scale)
+
+    async def _send(
+        self, raws: Mapping[str, int], held: Mapping[str, int]
+    ) -> tuple[tuple[int, ...], dict[str, int]]:
+        """The words that came back, and what the drive holds then; all into the journal."""
+        words = [to_words(parameter, raws[parameter.code])[0] for parameter in self.targets]
+        answer, back = "ok", dict[str, int]()
+        image = self.session.image
+        before = {p.code: image.get(p.code) for p in self.targets}
+        for code in before:
+            image.doubt(code)
+        try:
+            reply = await self._transmit(words)
+            back = await self._held()
+        except RequestRefused as error:
+            answer = str(error)
+            for code, held_before in before.items():
+                image.believe(code, held_before)
+            raise
+        except LineError as error:
+            answer = str(error)
+            raise
+        finally:
+            self.session.note_command()
+            for parameter in self.targets:
+                self._record(parameter, held, raws, answer, back)
+        return reply, back
+
+    async def _transmit(self, words: list[int]) -> tuple[int, ...]:
+        session, block = self.session, self.outputs.block
+        address = block.address + self.places.start
+        read = span(self.inputs) if self.inputs is not None else None
+        if read is None or session.profile.function(23) is None:
+            await session.line.write(
+                session.device, address, words, multiple=True, forbidden=self._forbidden
+            )
+            return ()
+        both = await session.line.read_write(
+            session.device,
+            *read,
+            address,
+            words,
+            priority=Priority.OPERATOR_WRITE,
+            forbidden=self._forbidden,
+        )
+        return both.words
+
+    def _see_taken(
+        self, raws: Mapping[str, int], held: Mapping[str, int], back: Mapping[str, int]
+    ) -> None:
+        """Raise NotTaken where the drive holds something else than was written, or elsewhere."""
+        profile = self.session.profile
+        moved = [c for c in back if c not in raws and c in held and back[c] != held[c]]
+        if moved:
+            texts = [f"{c} went to {self._text(profile[c], back[c])}" for c in moved]
+            raise NotTaken(
+                f"{self.outputs.block.name} stands for something else than its slots say:"
+                f" {', '.join(texts)}. Look at the drive, and reset it before the next try."
+            )
+        if wrong := self._not_held(raws, back):
+            texts = [
+                f"{c}: written {self._text(profile[c], raws[c])}, the drive holds"
+                f" {self._text(profile[c], back[c])}"
+                for c in wrong
+            ]
+            raise NotTaken(f"{'; '.join(texts)}.")
+
+    def _not_held(self, raws: Mapping[str, int], back: Mapping[str, int]) -> list[str]:
+        """Codes of what was named and is not held; the state tells what a command word did."""
+        commands = {chart.command for chart in self.session.profile.data.charts}
+        named = [code for code in self.wanted if code in back and code not in commands]
+        return [code for code in named if back[code] != raws[code]]
+
+    def _record(
+        self,
+        parameter: Parameter,
+        held: Mapping[str, int],
+        raws: Mapping[str, int],
+        answer: str,
+        back: Mapping[str, int],
+    ) -> None:
+        session, code = self.session, parameter.code
+        old, new = held.get(code), raws[code]
+        if code in self._not_held(raws, back):
+            answer = "holds another value"
+        entry = Entry(
+            time=now_text(),
+            line=session.line_text,
+            device=session.device,
+            profile=session.profile.id,
+            code=code,
+            address=parameter.address,
+            old_raw=old,
+            old=self._text(parameter, old),
+            new_raw=new,
+            new=self._text(parameter, new),
+            answer=answer,
+            read_back=back.get(code),
+            why=f"through {self.outputs.block.name.lower()}",
+        )
+        self.writer.journal.add(entry)
+
+    def _text(self, parameter: Parameter, raw: int | None) -> str:
+        return self.writer.text(parameter, raw)
+
+    def _forbidden(self) -> str:
+        """Why the frame must no longer go out, or nothing."""
+        return self.writer.permit.refusal() if self.writer.permit is not None else ""
+
+    def _read(self, reply: tuple[int, ...]) -> dict[str, int]:
+        found = {}
+        unknown = self.session.profile.data.reading.unknown_word
+        for raw, word in zip(self.inputs.raws if self.inputs else (), reply, strict=False):
+            assert self.inputs is not None
+            parameter = target(self.session.profile, self.inputs.block, raw)
+            if raw != UNUSED and parameter is not None and word != unknown:
+                found[parameter.code] = from_words(parameter, [word])
+        return found
+
+    async def _check_slots(self, when: str) -> None:
+        """Raise unless the slots stand for what the person saw; afterwards it may be too late."""
+        for plan in (self.outputs, self.inputs):
+            if plan is None:
+                continue
+            block = plan.block
+            held = await self.asker.ask_raws(block.slots)
+            changed = [slot for slot, raw in plan.slots.items() if held.get(slot) != raw]
+            if not changed:
+                continue
+            text = f"{', '.join(changed)} of {block.name.lower()} were changed by somebody else"
+            if when == "before":
+                raise AssignmentRefused(f"{text}: nothing was written. Look at them first.")
+            if plan is self.inputs:
+                raise AssignmentRefused(
+                    f"{text}: the outputs were written, of what came back nothing is taken."
+                )
+            raise AssignmentRefused(
+                f"{text} while words were written through them: look at {self._names(held)}."
+            )
+
+    def _names(self, held: Mapping[str, int]) -> str:
+        profile, block = self.session.profile, self.outputs.block
+        return ", ".join(describe(profile, block, raw) for raw in held.values() if raw)

@@ -1,0 +1,268 @@
+"""What the slots of a drive's blocks stand for now, what they bring, and whether that is right.
+
+What a slot brings is compared with direct reads before and after. The slots of a scanner are
+read again after each use: a word counts only when its slot still stands for the same. What an
+indirect block really brings until the drive's next reset cannot be read; it is told by the same
+comparison, with every parameter that could stand in it. What the words prove, `proof` concludes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from tui.bus.errors import DeviceException
+from tui.bus.line import Priority
+from tui.bus.link import TcpLink, character_time, silence
+from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, target
+from tui.drive.blocks.wire_cost import span
+from tui.drive.profile.schema import Block, Parameter
+from tui.drive.read_plan import WireTiming
+from tui.drive.shown import shown
+from tui.drive.values import NOT_AVAILABLE, from_words, word_count
+
+from ..drive import DriveSession
+from ..read.proof import SURE, Proof
+from ..read.retrying_reader import Asker
+from ..reading import Reading
+from .verdict import Verdict
+
+MOST = 2 * SURE
+"""Comparisons after which what is not proved stays so: values that are alike cannot be told."""
+USUAL_TURNAROUND = 0.005
+
+
+class Force(StrEnum):
+    """Whether a slot already brings what was chosen for it."""
+
+    ACTIVE = "active"
+    PENDING = "pending"
+    UNPROVED = "not proved"
+    NOTHING = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Slot:
+    """One slot with all that was seen of it at one time."""
+
+    code: str
+    raw: int | None
+    """What the slot holds in the drive; None where it could not be read."""
+    parameter: Parameter | None = None
+    """What it stands for; None where it is unused or holds an address nobody knows."""
+    word: int | None = None
+    """The raw value that came through the block."""
+    text: str = NOT_AVAILABLE
+    """The same as a person reads it, with its unit."""
+    direct: Reading | None = None
+    verdict: Verdict = Verdict.UNREAD
+    force: Force = Force.NOTHING
+    brings: str = ""
+    """Code of what it brings in place of what was chosen, where that is sure."""
+
+    @property
+    def direct_text(self) -> str:
+        """The parameter read directly, with its unit."""
+        reading = self.direct
+        return f"{reading.text} {reading.unit}".strip() if reading else NOT_AVAILABLE
+
+
+@dataclass(frozen=True, slots=True)
+class BlockView:
+    """All slots of one block at one time."""
+
+    block: Block
+    slots: tuple[Slot, ...]
+    trouble: str = ""
+    """Why the block brought nothing, or nothing sure; else empty."""
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a slot does not seem to bring what it stands for."""
+        read = self.slots if self.block.direction == "read" else ()
+        return any(
+            slot.verdict is Verdict.DIFFERS
+            or (slot.verdict is Verdict.NONE and slot.force is Force.UNPROVED)
+            for slot in read
+        )
+
+    @property
+    def is_unproved(self) -> bool:
+        """Whether it is not sure of a slot's word yet what it is."""
+        return any(s.word is not None and s.force is Force.UNPROVED for s in self.slots)
+
+    @property
+    def raws(self) -> dict[str, int]:
+        """Raw values by slot, of those that could be read."""
+        return {slot.code: slot.raw for slot in self.slots if slot.raw is not None}
+
+    @property
+    def plan(self) -> Assignment | None:
+        """The assignment that the drive holds; None where a slot could not be read."""
+        return assignment(self.block, self.raws)
+
+
+def wire_timing(session: DriveSession) -> WireTiming:
+    """What the session's line takes for an exchange, by its settings and what was measured."""
+    link = session.line.link
+    turnaround = session.line.device_state(session.device).usual_turnaround or USUAL_TURNAROUND
+    if isinstance(link, TcpLink):
+        return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
+    return WireTiming(character_time(link), silence(link), turnaround)
+
+
+@dataclass(slots=True)
+class Mapper:
+    """Looks at the blocks of one drive; raises the line's errors."""
+
+    session: DriveSession
+    in_force: Callable[[], Mapping[str, int]] = dict
+    """Raw values by slot of what a monitor has proved to stand in each place."""
+    priority: Priority = Priority.OPERATOR_READ
+    written: dict[str, int] = field(default_factory=dict)
+    """Slots written from here that count after a reset, which was not seen yet."""
+    _asker: Asker = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._asker = Asker(self.session, self.priority)
+
+    @property
+    def lacking(self) -> frozenset[str]:
+        """Parameters that the drive said it does not have."""
+        return self.session.image.lacking
+
+    def note_reset(self) -> None:
+        """The drive may have been reset or switched off: what was written before may count now."""
+        self.written = {}
+
+    async def slots(self, block: Block) -> dict[str, int]:
+        """Raw values of a block's slots as the drive holds them now."""
+        return await self._asker.ask_raws(block.slots)
+
+    async def look(self, block: Block, *, rounds: int = 1) -> BlockView:
+        """The slots of a block, what each brings, the same read directly, and the verdict.
+
+        More rounds make surer: a slot differs only if every round says so, and is the same only
+        if every one says that. Where a slot seems to differ, it is looked at again anyway; where
+        all rounds were asked for, so is one that is not proved yet.
+        """
+        proof, view = Proof(self.session.profile, block), BlockView(block, ())
+        for number in range(1, MOST + 1):
+            view = await self._round(proof, view)
+            doubtful = view.is_doubtful if number < SURE else rounds >= SURE and view.is_unproved
+            if number >= rounds and not doubtful:
+                break
+        return view
+
+    async def verify(self, block: Block) -> BlockView:
+        """The same, compared several times."""
+        return await self.look(block, rounds=SURE)
+
+    async def _round(self, proof: Proof, earlier: BlockView) -> BlockView:
+        """One comparison: direct, block, direct, and the slots again."""
+        block, profile = proof.block, self.session.profile
+        held = await self.slots(block)
+        if held != earlier.raws:
+            # what was compared before says nothing of these slots
+            proof.begin()
+        chosen = {
+            slot: target(profile, block, held[slot]) if slot in held else None
+            for slot in block.slots
+        }
+        codes = self._to_ask(block, chosen.values())
+        before = await self._direct(codes)
+        words, trouble = await self._words(block, held)
+        after = await self._direct(codes) if words else before
+        still = held
+        if words and block.effective == "at-once":
+            still = await self.slots(block)
+        if still != held:
+            # one slot was seen to change: others may have, there and back again
+            proof.begin()
+            changed = tuple(
+                Slot(slot, still.get(slot), verdict=Verdict.CHANGED) for slot in block.slots
+            )
+            return BlockView(block, changed, "The slots were changed while they were looked at.")
+        proof.note(words, before, after)
+        found = []
+        for place, slot in enumerate(block.slots):
+            was = earlier.slots[place] if earlier.slots else None
+            word = words[place] if place < len(words) else None
+            now = Slot(slot, held.get(slot), chosen[slot], word)
+            found.append(self._slot(proof, now, was, after))
+        return BlockView(block, tuple(found), trouble)
+
+    def _to_ask(self, block: Block, chosen: Iterable[Parameter | None]) -> list[str]:
+        """What is read directly: the chosen ones; for an indirect block all that could be."""
+        wanted = [p.code for p in chosen if p is not None]
+        if block.effective == "after-reset" and block.direction == "read" and wanted:
+            wanted += [choice.parameter for choice in block.choices]
+        profile = self.session.profile
+        for parameter in map(profile.__getitem__, tuple(wanted)):
+            sources = (parameter.scale_by, parameter.unit_by)
+            wanted += [source.parameter for source in sources if source is not None]
+        return [code for code in dict.fromkeys(wanted) if profile[code].access != "w"]
+
+    async def _direct(self, codes: Sequence[str]) -> dict[str, Reading]:
+        return await self._asker.ask(codes) if codes else {}
+
+    async def _words(self, block: Block, held: Mapping[str, int]) -> tuple[tuple[int, ...], str]:
+        """The words that the block brings, up to its last slot in use; else why there are none."""
+        plan = assignment(block, held)
+        if plan is None:
+            missing = ", ".join(slot for slot in block.slots if slot not in held)
+            return (), f"{missing} cannot be read."
+        stretch = span(plan)
+        if stretch is None:
+            return (), ""
+        if block.direction == "write" and not block.values:
+            return (), f"{block.name} can only be written: what it would take cannot be read."
+        try:
+            reply = await self.session.line.read(
+                self.session.device, *stretch, priority=self.priority
+            )
+        except DeviceException as refusal:
+            return (), f"The drive refuses the {block.name.lower()}: {refusal}"
+        return reply.words, ""
+
+    def _slot(
+        self, proof: Proof, now: Slot, was: Slot | None, direct: Mapping[str, Reading]
+    ) -> Slot:
+        """A slot with its code, raw value, parameter and word, and what the words have told."""
+        slot, raw, parameter, word = now.code, now.raw, now.parameter, now.word
+        if was is not None and was.raw != raw:
+            return Slot(slot, raw, parameter, verdict=Verdict.CHANGED)
+        if raw == UNUSED:
+            return Slot(slot, raw, verdict=Verdict.UNUSED)
+        if raw is None or parameter is None:
+            return Slot(slot, raw, word=word, verdict=Verdict.NONE)
+        force, brings = self._force(proof, slot, raw)
+        told = replace(now, direct=direct.get(parameter.code), force=force, brings=brings)
+        if word is None or word_count(parameter) != 1:
+            return replace(told, word=None)
+        if word == self.session.profile.data.reading.unknown_word:
+            return replace(told, verdict=Verdict.NONE)
+        verdict, through = proof.verdict(slot, parameter.code), from_words(parameter, [word])
+        if verdict is Verdict.MOVING and was is not None and not proof.fitted(slot, parameter.code):
+            # its value of the round in which it fitted
+            return replace(was, verdict=verdict, force=force, brings=brings)
+        text = self._text(parameter, through)
+        if verdict is Verdict.DIFFERS and proof.block.direction == "read":
+            # it is not this parameter's value: it gets neither its scale nor its unit
+            text = f"raw {word}"
+        return replace(told, word=through, text=text, verdict=verdict)
+
+    def _text(self, parameter: Parameter, raw: int) -> str:
+        profile, asker = self.session.profile, self._asker
+        return shown(profile, parameter, raw, asker.raws, asker.lacking).display
+
+    def _force(self, proof: Proof, slot: str, raw: int) -> tuple[Force, str]:
+        """Whether the slot is in force, and what it brings where that is something else."""
+        # the monitor compares all the time, and may have proved it
+        known = proof.block.effective == "at-once" or self.in_force().get(slot) == raw
+        if known or proof.holds(slot, raw):
+            return Force.ACTIVE, ""
+        if proof.excludes(slot, raw):
+            return Force.PENDING, proof.brings(slot)
+        return (Force.PENDING if self.written.get(slot) == raw else Force.UNPROVED), ""

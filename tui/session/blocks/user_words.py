@@ -1,0 +1,83 @@
+"""The four words that a person watches on one drive: read one by one, kept in the state folder."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from tui.bus.errors import DeviceException
+from tui.bus.line import Priority
+from tui.drive.blocks.assignment import MappingError
+from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, is_no_value
+
+from ..drive import DriveSession
+from ..paths import state_folder
+
+
+async def read_words(session: DriveSession, words: UserWords) -> list[int | None]:
+    """The raw words; None where none is assigned, or the drive has it not or protects it.
+
+    Raises the line's errors but a refusal. A family that meets unknown addresses with silence
+    is asked for known ones only.
+    """
+    found: list[int | None] = []
+    function = session.profile.function(3)
+    silent = function is not None and function.past_limit == "silence"
+    for word in words:
+        known = session.profile.at(word.address) is not None
+        if not word.address or (silent and not known):
+            found.append(None)
+            continue
+        try:
+            reply = await session.line.read(
+                session.device, word.address, 1, priority=Priority.OPERATOR_READ
+            )
+        except DeviceException:
+            found.append(None)
+        else:
+            none = not known and is_no_value(session.profile, reply.words)
+            found.append(None if none else reply.words[0])
+    return found
+
+
+def load_words(session: DriveSession) -> UserWords:
+    """What was kept for this drive on this line; four unassigned words where nothing was."""
+    kept = _kept().get(_key(session), [])
+    words: list[UserWord] = []
+    for one in kept[:COUNT] if isinstance(kept, list) else []:
+        try:
+            words.append(UserWord(int(one["address"]) & 0xFFFF, format_named(one["format"])))
+        except (KeyError, TypeError, ValueError, AttributeError, MappingError):
+            words.append(UserWord())
+    return (*words, *(UserWord(),) * (COUNT - len(words)))
+
+
+def save_words(session: DriveSession, words: UserWords) -> str:
+    """Keep them for this drive; returns why that failed, or nothing."""
+    kept = _kept()
+    kept[_key(session)] = [{"address": w.address, "format": w.format} for w in words]
+    file = _file()
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        part = file.with_suffix(".part")
+        part.write_text(json.dumps(kept, indent=1), encoding="utf-8")
+        part.replace(file)
+    except OSError as error:
+        return f"The user words cannot be kept: {error.strerror or error}."
+    return ""
+
+
+def _kept() -> dict[str, object]:
+    try:
+        told = json.loads(_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return told if isinstance(told, dict) else {}
+
+
+def _key(session: DriveSession) -> str:
+    return f"{session.line_text} {session.device} {session.profile.id}"
+
+
+def _file() -> Path:
+    return state_folder() / "user-words.json"

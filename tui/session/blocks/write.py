@@ -1,0 +1,159 @@
+"""Writing an assignment into a drive, slot by slot, each read back.
+
+Everything is looked at anew before each write. What somebody else changed meanwhile is not
+overwritten.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tui.bus.errors import DeviceException, RequestRefused
+from tui.drive.blocks.assignment import (
+    Assignment,
+    Change,
+    MappingError,
+    describe,
+    problems,
+    refusing,
+    steps,
+)
+from tui.drive.profile.schema import Block
+from tui.drive.settings.writable import AT_REST
+
+from ..drive import DriveSession
+from ..journal import Journal
+from ..read.retrying_reader import Asker
+from ..settings.refusals import device_refusal
+from ..settings.write import NotTaken, Writer
+from ..work import Permit
+
+
+class AssignmentRefused(MappingError):
+    """An assignment or an exchange that is not written, or only in part; the text says which."""
+
+
+@dataclass(frozen=True, slots=True)
+class Written:
+    """What was written, in order."""
+
+    changes: tuple[Change, ...]
+    after_reset: bool
+    """True where it counts only once the drive was reset."""
+    unsaved: bool
+    """True where it is lost at power-off until the drive is told to save."""
+
+    @property
+    def text(self) -> str:
+        """What was done, and what is to be done yet, for a person."""
+        if not self.changes:
+            return "Nothing was to be changed."
+        codes = ", ".join(dict.fromkeys(change.slot for change in self.changes))
+        text = f"Written and read back: {codes}."
+        if self.after_reset:
+            text += " In force after the drive's next reset."
+        if self.unsaved:
+            text += " Lost at power-off until saved."
+        return text
+
+
+async def write_assignment(
+    session: DriveSession,
+    journal: Journal,
+    plan: Assignment,
+    *,
+    permit: Permit,
+    expected: Mapping[str, int] | None = None,
+) -> Written:
+    """Make the drive hold an assignment, with the motor at rest.
+
+    `expected` are the raw values by slot that the person saw. Raises AssignmentRefused where
+    something speaks against it or the drive does not do it, RequestRefused on a read-only line,
+    and the line's other errors.
+    """
+    if session.line.read_only:
+        raise RequestRefused("The line is read-only: nothing is written.")
+    if wrong := refusing(problems(session.profile, plan)):
+        raise AssignmentRefused(" ".join(problem.text for problem in wrong))
+    work = _Writing(session, Writer(session, journal, permit), Asker(session), plan)
+    return await work.carry_out(expected)
+
+
+def at_rest_only(block: Block, headline: str) -> str:
+    """Why slots are not written while the drive is in a state of that name."""
+    return (
+        f"{block.name}: slots are changed with the motor stopped only; the drive is {headline}."
+        " Stop it first."
+    )
+
+
+@dataclass(slots=True)
+class _Writing:
+    session: DriveSession
+    writer: Writer
+    asker: Asker
+    plan: Assignment
+    done: tuple[Change, ...] = ()
+
+    async def carry_out(self, expected: Mapping[str, int] | None) -> Written:
+        block = self.plan.block
+        held = await self._held()
+        for slot, raw in (expected or {}).items():
+            if held.get(slot, raw) != raw:
+                raise self._changed(slot, raw, held[slot])
+        for step in steps(held, self.plan):
+            await self._may()
+            now = (await self._held())[step.slot]
+            if now != step.old:
+                raise self._changed(step.slot, step.old, now)
+            await self._write(step)
+            self.done = (*self.done, step)
+        held = await self._held()
+        for slot, raw in self.plan.slots.items():
+            if held[slot] != raw:
+                raise self._changed(slot, raw, held[slot])
+        unsaved = any(
+            self.session.profile[slot].storage == "ram-until-saved" for slot in block.slots
+        )
+        return Written(self.done, block.effective == "after-reset", unsaved)
+
+    async def _held(self) -> dict[str, int]:
+        held = await self.asker.ask_raws(self.plan.block.slots)
+        missing = [slot for slot in self.plan.block.slots if slot not in held]
+        if missing:
+            said = self.asker.why_absent(missing[0])
+            raise AssignmentRefused(self._so_far(f"{missing[0]} cannot be read: {said}"))
+        return held
+
+    async def _may(self) -> None:
+        """Raise unless the motor is surely at rest, and the task may still write."""
+        permit = self.writer.permit
+        if permit is not None and (why := permit.refusal()):
+            raise AssignmentRefused(self._so_far(why))
+        if await self.asker.ask_state() not in AT_REST:
+            text = at_rest_only(self.plan.block, self.asker.headline)
+            raise AssignmentRefused(self._so_far(text))
+
+    async def _write(self, step: Change) -> None:
+        profile = self.session.profile
+        parameter = profile[step.slot]
+        try:
+            await self.writer.write(parameter, step.new, why=self.plan.block.name.lower())
+        except DeviceException as error:
+            text = device_refusal(profile, parameter, error, self.asker.headline)
+            raise AssignmentRefused(self._so_far(text)) from error
+        except NotTaken as error:
+            raise AssignmentRefused(self._so_far(str(error))) from error
+
+    def _changed(self, slot: str, old: int | None, now: int) -> AssignmentRefused:
+        profile, block = self.session.profile, self.plan.block
+        was, is_now = describe(profile, block, old), describe(profile, block, now)
+        text = f"{slot} was changed meanwhile by somebody else: {was} is now {is_now}."
+        return AssignmentRefused(self._so_far(f"{text} Look at it, then write again."))
+
+    def _so_far(self, text: str) -> str:
+        if not self.done:
+            return f"{text} Nothing was written."
+        codes = ", ".join(dict.fromkeys(change.slot for change in self.done))
+        return f"{text} Written before: {codes}."

@@ -1,0 +1,1 @@
+"""Moving a motor: commands, references, stops, who commands."""

@@ -1,0 +1,63 @@
+"""Setting up who commands a drive and who gives its reference, word by word, read back."""
+
+from __future__ import annotations
+
+from tui.bus.line import Priority
+from tui.drive.control_source import changes, source_codes
+from tui.drive.orders import OrderRefused
+from tui.drive.profile.schema import ControlSource
+from tui.drive.values import check_raw
+
+from ..drive import DriveSession
+from ..drive_state import drive_state
+from ..monitor.monitor import monitoring_codes
+from ..read.reader import Reader
+from ..settings.write import Writer
+
+
+async def configure(session: DriveSession, writer: Writer, source: ControlSource) -> str:
+    """Write what differs from a configuration; returns what was done, for a person.
+
+    Everything is read anew before. A word may change others behind it (the access level does),
+    so each is looked at when its turn comes. Raises OrderRefused while the motor is not surely
+    at rest, the line's errors, ValueRefused and NotTaken.
+    """
+    profile = session.profile
+    written: list[str] = []
+    for setting in source.settings:
+        parameter = profile[setting.parameter]
+        await _at_rest(session)
+        raws = await _raws(session)
+        todo = {change.parameter.code for change in changes(profile, source, raws)}
+        if parameter.code not in todo:
+            continue
+        scale = profile.scale(parameter, raws)
+        check_raw(parameter, setting.value, profile.names(parameter), scale)
+        await writer.write(parameter, setting.value, why=f"control source: {source.name}")
+        written.append(parameter.code)
+    left = changes(profile, source, await _raws(session))
+    if left:
+        codes = ", ".join(change.parameter.code for change in left)
+        raise OrderRefused(f"{source.name}: {codes} went back to another value.")
+    done = f"written: {', '.join(written)}" if written else "nothing was to be changed"
+    return f"Control source {source.name}: {done}"
+
+
+async def _raws(session: DriveSession) -> dict[str, int]:
+    codes = source_codes(session.profile)
+    readings = await Reader(session).read(codes, priority=Priority.OPERATOR_READ)
+    unread = [code for code, reading in readings.items() if reading.raw is None]
+    if unread:
+        raise OrderRefused(f"{', '.join(unread)} cannot be read: nothing is changed.")
+    return {code: reading.raw for code, reading in readings.items() if reading.raw is not None}
+
+
+async def _at_rest(session: DriveSession) -> None:
+    readings = await Reader(session).read(
+        monitoring_codes(session.profile), priority=Priority.OPERATOR_READ
+    )
+    state = drive_state(session.profile, readings)
+    if state.kind in ("running", "stopping", "starting", "unknown"):
+        raise OrderRefused(
+            f"The control source is changed with the motor stopped only; now: {state.headline}."
+        )

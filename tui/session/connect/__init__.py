@@ -1,0 +1,1 @@
+"""Opening a line and finding out who is on it."""

@@ -1,0 +1,162 @@
+"""The last seconds before a trip: the values as they were seen, and what was written from here.
+
+Frozen when the drive goes into a fault, and kept until the next trip.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from datetime import datetime
+
+from tui.drive.profile.schema import FaultCode
+from tui.drive.values import NOT_AVAILABLE
+
+from ..drive import DriveSession
+from ..journal import Entry, Journal
+from ..reading import Quality, Reading
+from .monitor import Snapshot
+
+KEPT = 30.0
+"""Seconds before a trip that are kept."""
+
+
+@dataclass(frozen=True, slots=True)
+class Moment:
+    """The values of one cycle; `wall` is time.time()."""
+
+    time: float
+    wall: float
+    state: str
+    texts: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class FaultRecord:
+    """A trip and the seconds before it."""
+
+    time: float
+    """When it was seen, time.monotonic()."""
+    wall: float
+    fault: FaultCode | None
+    codes: tuple[str, ...]
+    """What `moments` tell, in their order."""
+    headings: tuple[str, ...]
+    moments: tuple[Moment, ...]
+    writes: tuple[Entry, ...]
+    """What was written to the drive in these seconds, oldest first."""
+
+
+@dataclass(slots=True)
+class Recorder:
+    """Listens to the monitor of one drive; `take` is called in the line's thread."""
+
+    session: DriveSession
+    journal: Journal
+    latest: FaultRecord | None = None
+    """The last trip that was seen happen."""
+    seen: bool = True
+    """Whether a person has looked at it."""
+    _moments: deque[tuple[Snapshot, float]] = field(default_factory=deque)
+    _kind: str = "unknown"
+
+    def take(self, snapshot: Snapshot) -> None:
+        """Keep a snapshot; freeze the record where it is the first one of a fault."""
+        if snapshot.error or snapshot.state.kind == "unknown":
+            return
+        self._moments.append((snapshot, snapshot.time))
+        while self._moments[0][1] < snapshot.time - KEPT:
+            self._moments.popleft()
+        before, self._kind = self._kind, snapshot.state.kind
+        if self._kind == "fault" and before not in ("fault", "unknown"):
+            self.latest = self._freeze(snapshot)
+            self.seen = False
+
+    def _freeze(self, now: Snapshot) -> FaultRecord:
+        codes = record_codes(self.session)
+        profile = self.session.profile
+        headings = tuple(f"{c} {profile[c].unit}".rstrip() for c in codes)
+        begin = datetime.fromtimestamp(now.wall - KEPT).astimezone()
+        writes = tuple(
+            entry
+            for entry in self.journal.recent
+            if entry.device == self.session.device
+            and entry.line == self.session.line_text
+            and datetime.fromisoformat(entry.time) >= begin
+        )
+        moments = tuple(
+            Moment(s.time, s.wall, s.state.headline, tuple(_text(s.readings.get(c)) for c in codes))
+            for s, _ in self._moments
+        )
+        return FaultRecord(now.time, now.wall, now.state.fault, codes, headings, moments, writes)
+
+    def acknowledge(self) -> None:
+        """A person has seen it."""
+        self.seen = True
+
+
+def record_codes(session: DriveSession) -> tuple[str, ...]:
+    """What a record tells: every value of the monitoring set that is read in each cycle."""
+    values = session.profile.data.monitoring.values
+    return tuple(value.parameter for value in values if value.rate == "fast")
+
+
+def _text(reading: Reading | None) -> str:
+    if reading is None or reading.value is None or reading.quality is not Quality.GOOD:
+        return NOT_AVAILABLE
+    return reading.value.text
+
+
+def record_text(
+    session: DriveSession, record: FaultRecord, stored: Sequence[tuple[str, str, str]]
+) -> str:
+    """A record as Markdown: the fault, what the drive stored, the values, the writes.
+
+    `stored` is code, name and value of what the drive itself keeps of its last fault.
+    """
+    fault = record.fault
+    name = (
+        f"{fault.code} ({fault.raw}) {fault.name}" if fault else "a fault whose code was not read"
+    )
+    identity = session.identity
+    who = " ".join(x for x in (identity.reference, identity.name) if x) if identity else ""
+    lines = [
+        f"# Trip of device {session.device}: {name}",
+        "",
+        f"- Time: {_clock(record.wall)}, {datetime.fromtimestamp(record.wall):%Y-%m-%d}",
+        f"- Drive: {session.profile.name} {who}".rstrip(),
+        f"- Line: {session.line_text}",
+    ]
+    lines += [f"- Cause: {fault.cause}"] if fault and fault.cause else []
+    lines += [f"- Remedy: {fault.remedy}"] if fault and fault.remedy else []
+    if stored:
+        lines += ["", "## Stored by the drive", "", "| code | name | value |", "|---|---|---|"]
+        lines += [f"| {code} | {name} | {value} |" for code, name, value in stored]
+    lines += ["", f"## Values of the last {KEPT:g} s", ""]
+    lines.append("| time | state | " + " | ".join(record.headings) + " |")
+    lines.append("|---|---|" + "---:|" * len(record.headings))
+    lines += [
+        f"| {_clock(m.wall)} | {m.state} | " + " | ".join(m.texts) + " |" for m in record.moments
+    ]
+    lines += ["", f"## Written from here in the last {KEPT:g} s", ""]
+    if record.writes:
+        lines += ["| time | code | old | new | answer | why |", "|---|---|---|---|---|---|"]
+    lines += [
+        f"| {e.time[11:23]} | {e.code} | {e.old} | {e.new} | {e.answer} | {e.why} |"
+        for e in record.writes
+    ] or ["Nothing."]
+    return "\n".join(lines) + "\n"
+
+
+def _clock(wall: float) -> str:
+    return f"{datetime.fromtimestamp(wall):%H:%M:%S.%f}"[:12]
+
+
+def record_name(session: DriveSession, record: FaultRecord) -> str:
+    """A file name for a record."""
+    when = time.strftime("%Y%m%d-%H%M%S", time.localtime(record.wall))
+    fault = record.fault.code if record.fault else "fault"
+    safe = "".join(c for c in fault if c.isalnum())
+    return f"trip-{session.profile.id}-{session.device}-{when}-{safe}.md"

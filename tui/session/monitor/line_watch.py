@@ -1,0 +1,313 @@
+"""Looking after every drive found on a line, watched or not.
+
+Some drives watch the line and trip when it falls silent (communication time-out): they are
+asked on as long as the line is open, at least three times in each time-out, before polls and
+before an operator's own requests. Other requests tell the state of the drives in a list.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+from tui.bus.errors import LineError
+from tui.bus.line import Line, Priority, Worker
+from tui.drive.chart import watched_codes
+from tui.drive.orders import deciding_codes
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Reaction
+
+from ..drive import DriveSession
+from ..drive_state import DriveState, drive_state
+from ..read.reader import Reader
+from ..reading import Reading
+from .monitor import Monitor, monitoring_codes
+
+log = logging.getLogger(__name__)
+
+MAY_TURN = frozenset({"running", "unknown"})
+"""Kinds of state in which a motor that was commanded from here is not left alone unasked."""
+GLANCE = 3.0
+"""Seconds between two looks at a drive that no monitor watches."""
+ASKED_PER_TIMEOUT = 4.0
+TOLD_AFTER = 0.5
+"""Share of its time-out after which a drive that was not heard is told of."""
+LEARN_AGAIN = 20.0
+"""Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
+SHORTEST = 0.02
+
+
+@dataclass(frozen=True, slots=True)
+class Watch:
+    """A drive's watch over the line: seconds to its time-out, and what it does then."""
+
+    timeout: float
+    reaction: Reaction | None
+    active: bool = True
+    """False where it begins only with a first command, and none was sent from here."""
+
+    @property
+    def trips(self) -> bool:
+        """Whether the drive may end in a fault; a reaction that is not known may be one."""
+        return self.reaction is None or self.reaction.trips
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What the last look at a drive brought."""
+
+    state: DriveState | None
+    error: str
+    time: float
+    timeout: float | None
+    """The drive's communication time-out in seconds, if it is one that runs already."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hunger:
+    """A drive that was not heard for a good part of its time-out; times in seconds."""
+
+    device: int
+    profile: Profile
+    silent: float
+    watch: Watch
+
+    @property
+    def left(self) -> float:
+        """Seconds until the drive acts; below zero it has."""
+        return self.watch.timeout - self.silent
+
+
+@dataclass(slots=True)
+class _Kept:
+    session: DriveSession
+    monitor: Monitor
+    reader: Reader
+    since: float = field(default_factory=time.monotonic)
+    watch: Watch | None = None
+    learned: float | None = None
+    workers: tuple[Worker, ...] = ()
+
+
+class Keeper:
+    """Asks each kept drive often enough, in workers of the line's loop."""
+
+    def __init__(self, line: Line) -> None:
+        self._line = line
+        self._kept: dict[int, _Kept] = {}
+        self._looks: dict[int, Look] = {}
+
+    @property
+    def looks(self) -> Mapping[int, Look]:
+        """The last look at each drive, by device."""
+        return dict(self._looks)
+
+    def watch(self, device: int) -> Watch | None:
+        """A drive's watch over the line, once it is known and not off."""
+        kept = self._kept.get(device)
+        return self._watch(kept) if kept else None
+
+    def _watch(self, kept: _Kept) -> Watch | None:
+        rules, watch = kept.session.profile.data.communication_fault, kept.watch
+        if watch is None or rules is None:
+            return None
+        begun = not rules.needs_write or kept.session.commanded or self._runs_by_the_line(kept)
+        return replace(watch, active=begun)
+
+    def _runs_by_the_line(self, kept: _Kept) -> bool:
+        """Whether the motor runs by somebody's command over the line, whoever gave it."""
+        state, _ = self._last_seen(kept)
+        return state is not None and state.kind == "running" and not state.local
+
+    def left_alone(self) -> dict[int, Watch]:
+        """Drives that act on their communication time-out once nobody asks them, at rest too."""
+        found = {device: self.watch(device) for device in self._kept}
+        return {
+            device: watch
+            for device, watch in found.items()
+            if watch is not None and watch.active and (watch.trips or self.runs(device))
+        }
+
+    def unread(self) -> list[DriveSession]:
+        """Drives whose time-out was not read yet: what they do left alone is not known."""
+        return [
+            kept.session
+            for kept in self._kept.values()
+            if kept.learned is None and kept.session.profile.data.communication_fault is not None
+        ]
+
+    def under_command(self) -> list[DriveSession]:
+        """Drives that were commanded from here and whose motors do not surely stand."""
+        return [
+            kept.session
+            for kept in self._kept.values()
+            if kept.session.commanded and self._may_turn(kept)
+        ]
+
+    def runs(self, device: int) -> bool:
+        """Whether a motor runs, as far as anybody saw it last."""
+        state, _ = self._last_seen(self._kept[device])
+        return state is not None and state.kind == "running"
+
+    def _may_turn(self, kept: _Kept) -> bool:
+        """Whether a motor runs, or may: not seen since the last order, or not understood."""
+        state, seen = self._last_seen(kept)
+        ordered = kept.session.commanded_at
+        if state is None or (ordered is not None and seen <= ordered):
+            return True
+        return state.kind in MAY_TURN
+
+    def _last_seen(self, kept: _Kept) -> tuple[DriveState | None, float]:
+        """The newest state of a drive, by its own monitor or by a look; and when that was."""
+        look, latest = self._looks.get(kept.session.device), kept.monitor.latest
+        state, seen = (look.state, look.time) if look else (None, 0.0)
+        if latest is not None and latest.time > seen and not latest.error:
+            return latest.state, latest.time
+        return state, seen
+
+    def hungry(self) -> list[Hunger]:
+        """Drives that are about to act on their time-out, or have, for want of an answer."""
+        now = time.monotonic()
+        found = []
+        for device, kept in self._kept.items():
+            watch = self._watch(kept)
+            if watch is None or not watch.active:
+                continue
+            silent = now - self._heard(kept)
+            if silent > TOLD_AFTER * watch.timeout:
+                found.append(Hunger(device, kept.session.profile, silent, watch))
+        return found
+
+    def _heard(self, kept: _Kept) -> float:
+        return self._line.device_state(kept.session.device).heard or kept.since
+
+    def keep(self, session: DriveSession, monitor: Monitor) -> None:
+        """Look after a drive from now on; its monitor, while it runs, spares the looks."""
+        device = session.device
+        kept = _Kept(session, monitor, Reader(session))
+        if device in self._kept:
+            self._let_go(self._kept[device])
+        self._kept = {**self._kept, device: kept}
+        kept.workers = (
+            self._line.spawn(lambda: self._again(kept, self._feed), f"feeder {device}"),
+            self._line.spawn(lambda: self._again(kept, self._glance), f"keeper {device}"),
+        )
+
+    def stop(self) -> None:
+        """Let every drive go."""
+        for kept in self._kept.values():
+            self._let_go(kept)
+        self._kept = {}
+        self._looks = {}
+
+    def _let_go(self, kept: _Kept) -> None:
+        for worker in kept.workers:
+            worker.cancel()
+
+    async def _again(self, kept: _Kept, step: Callable[[_Kept], Awaitable[float]]) -> None:
+        """Do a step for good; it says how many seconds later it is due again."""
+        while True:
+            try:
+                rest = await step(kept)
+            except LineError:
+                rest = self._after_failure(kept)
+            except Exception:
+                # what goes wrong with one drive must not leave the others alone
+                log.exception("looking after device %s failed", kept.session.device)
+                rest = GLANCE
+            await asyncio.sleep(max(SHORTEST, rest))
+
+    @staticmethod
+    def _after_failure(kept: _Kept) -> float:
+        timeout = kept.watch.timeout if kept.watch else 4 * ASKED_PER_TIMEOUT
+        return min(1.0, timeout / ASKED_PER_TIMEOUT / 2)
+
+    async def _feed(self, kept: _Kept) -> float:
+        """Ask a drive that watches the line, if nobody else does often enough."""
+        now = time.monotonic()
+        if kept.learned is None or now - kept.learned > LEARN_AGAIN:
+            await self._learn(kept)
+        if kept.watch is None:
+            return LEARN_AGAIN
+        period = kept.watch.timeout / ASKED_PER_TIMEOUT
+        silent = time.monotonic() - self._heard(kept)
+        if silent < period:
+            return period - silent
+        # past its time-out it has acted: it need no longer go before the others
+        priority = Priority.FEED if silent < kept.watch.timeout else Priority.POLL
+        await self._line.read(
+            kept.session.device, _any_word(kept.session.profile), 1, priority=priority
+        )
+        return period
+
+    async def _glance(self, kept: _Kept) -> float:
+        """Look at a drive's state, unless its monitor does."""
+        if kept.monitor.running:
+            return GLANCE / 10
+        profile, device = kept.session.profile, kept.session.device
+        state, error = None, ""
+        try:
+            readings = await kept.reader.read(_state_codes(profile), priority=Priority.POLL)
+            state = drive_state(profile, readings)
+        except LineError as fault:
+            error = str(fault)
+        watch = self._watch(kept)
+        timeout = watch.timeout if watch and watch.active else None
+        if self._kept.get(device) is kept:
+            self._looks = {**self._looks, device: Look(state, error, time.monotonic(), timeout)}
+        return GLANCE if kept.learned is not None else GLANCE / 10
+
+    async def _learn(self, kept: _Kept) -> None:
+        """Read the drive's time-out and its reaction."""
+        rules = kept.session.profile.data.communication_fault
+        if rules is None or not rules.timeout:
+            kept.learned, kept.watch = time.monotonic(), None
+            return
+        codes = [code for code in (rules.timeout, rules.reaction) if code]
+        codes += deciding_codes(kept.session.profile)
+        readings = await kept.reader.read(codes, priority=Priority.POLL)
+        timeout = _seconds(readings[rules.timeout], rules.off)
+        raw = readings[rules.reaction].raw if rules.reaction else None
+        reaction = next((one for one in rules.reactions if one.raw == raw), None)
+        kept.watch = None if timeout is None else Watch(timeout, reaction)
+        kept.learned = time.monotonic()
+
+
+def left_alone_text(*sessions: DriveSession, watch: Watch | None) -> str:
+    """What drives of one family do when nobody asks them any more, in a sentence."""
+    it = "it" if len(sessions) == 1 else "each"
+    if watch is None:
+        return f"{names_of(sessions)}: left alone {it} goes on: no communication time-out."
+    does = watch.reaction.does if watch.reaction else "its own reaction follows"
+    after = f"acts {watch.timeout:g} s after the last request"
+    return f"{names_of(sessions)}: left alone {it} {after}: {does.rstrip('.')}."
+
+
+def names_of(sessions: Sequence[DriveSession]) -> str:
+    """Drives of one family as a person calls them: by device, and the family."""
+    word = "Device" if len(sessions) == 1 else "Devices"
+    return f"{word} {', '.join(str(one.device) for one in sessions)}, {sessions[0].profile.name}"
+
+
+def _seconds(reading: Reading, off: int | None) -> float | None:
+    """The time-out in seconds; None where it is off or could not be read."""
+    number = reading.number
+    if reading.raw is None or reading.raw == off or not number:
+        return None
+    return number / 1000 if reading.unit == "ms" else number
+
+
+def _any_word(profile: Profile) -> int:
+    """A word that every drive of the family has: one that tells its state, if there is one."""
+    codes = _state_codes(profile) or monitoring_codes(profile)
+    return profile[codes[0]].address
+
+
+def _state_codes(profile: Profile) -> list[str]:
+    codes = watched_codes(profile)
+    if profile.data.faults.parameter:
+        codes.append(profile.data.faults.parameter)
+    return list(dict.fromkeys(codes))

@@ -1,0 +1,366 @@
+"""Watching one drive from the line's own loop, whatever the screen does.
+
+The monitor keeps the latest snapshot; a screen takes it when it likes. Nothing is queued for
+a screen, so a terminal that is not read costs the drive nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+
+from tui.bus.errors import LineClosed, LineError, LineLost
+from tui.bus.line import LineState, Priority, Worker
+from tui.drive.chart import watched_codes
+from tui.drive.errors import DriveError
+from tui.drive.orders import deciding_codes
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Quantity
+
+from ..drive import DriveSession
+from ..drive_state import DriveState, drive_state
+from ..read.reader import Reader
+from ..read.rotation import Due
+from ..reading import Reading
+
+log = logging.getLogger(__name__)
+
+STALE_CYCLES = 3
+"""Cycles after which a value is no longer taken for the present one."""
+STALE_LEAST = 1.5
+"""Seconds for which a snapshot counts however fast the cycles are."""
+SLOW_FACTOR = 10
+"""Cycles of the fast values to one of the slow ones."""
+TREND_SECONDS = 600.0
+TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
+SHORTEST_PERIOD = 0.05
+RESET_NEAR = frozenset({"fault", "starting", "unknown"})
+"""Kinds of state in or after which a drive is reset, maybe without falling silent."""
+FORGOTTEN_AFTER = 3
+"""Failed cycles in a row after which another drive may answer."""
+RESTART_AFTER = 1.0
+"""Seconds after which a monitor that failed by an error of its own begins anew."""
+RATE_OVER = 6
+"""Cycles over which the rate is measured."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All values of one cycle, or the last ones with the error of a cycle that failed."""
+
+    cycle: int
+    time: float
+    """When it was taken, time.monotonic()."""
+    wall: float
+    """The same as time.time()."""
+    readings: Mapping[str, Reading]
+    state: DriveState
+    rate: float
+    """Cycles a second as they were; 0 while nothing answers."""
+    error: str
+    """Why this cycle brought nothing, or empty."""
+    line: LineState
+    block: str = ""
+    """The block or scanner that brought some of the values."""
+    period: float = 0.5
+    """Seconds from one cycle to the next, as they were."""
+
+    def is_stale(self, now: float) -> bool:
+        """Whether no cycle has ended for so long that nothing here is the present any more."""
+        return now - self.time > max(STALE_CYCLES * self.period, STALE_LEAST)
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Codes by how often they are read."""
+
+    fast: tuple[str, ...]
+    changing: tuple[str, ...] = ()
+    """Details of the state: read when it changes, in every cycle of a fault or an alarm, and
+    with the slow ones."""
+    slow: tuple[str, ...] = ()
+    key: tuple[str, ...] = ()
+    """Those of the fast ones that tell the state."""
+
+    @property
+    def seldom(self) -> tuple[str, ...]:
+        """What is not read in every cycle."""
+        return (*self.changing, *self.slow)
+
+
+@dataclass(frozen=True, slots=True)
+class TrendPoint:
+    """Values of TREND_QUANTITIES at a time; None where there was none to be trusted."""
+
+    time: float
+    values: tuple[float | None, ...]
+
+
+Listener = Callable[[Snapshot], None]
+
+
+class Monitor:
+    """Polls the monitoring set of one drive in a worker of the line's loop."""
+
+    def __init__(self, session: DriveSession) -> None:
+        self.session = session
+        self.line = session.line
+        self.device = session.device
+        self.profile = session.profile
+        self.period = 0.5
+        """Wished time of a cycle in seconds; read anew at each."""
+        self.reader = Reader(session)
+        self.restarts = 0
+        """How often watching failed by an error of its own, and was begun anew."""
+        self._latest: Snapshot | None = None
+        self._using = ""
+        self._kind = "unknown"
+        """Kind of the state that was last read."""
+        self._all_due = True
+        self._stirs = 0
+        self._learn_due = True
+        self._trend: deque[TrendPoint] = deque()
+        self._listeners: tuple[Listener, ...] = ()
+        self._worker: Worker | None = None
+        trend = (session.profile.quantity(quantity) for quantity in TREND_QUANTITIES)
+        self._trend_codes = [parameter.code if parameter else None for parameter in trend]
+
+    @property
+    def latest(self) -> Snapshot | None:
+        """The last snapshot, or None before the first cycle ended."""
+        return self._latest
+
+    @property
+    def trend(self) -> tuple[TrendPoint, ...]:
+        """The trend of the last minutes, oldest first."""
+        return tuple(self._trend)
+
+    @property
+    def running(self) -> bool:
+        """Whether the worker is at work."""
+        return self._worker is not None and not self._worker.done()
+
+    def listen(self, listener: Listener) -> Callable[[], None]:
+        """Call a function with every snapshot, in the line's thread; returns the way out."""
+        self._listeners = (*self._listeners, listener)
+
+        def leave() -> None:
+            self._listeners = tuple(one for one in self._listeners if one is not listener)
+
+        return leave
+
+    def start(
+        self,
+        codes: Sequence[str] | None = None,
+        period: float = 0.5,
+        *,
+        extra: Sequence[str] = (),
+    ) -> None:
+        """Watch these codes, by default the profile's monitoring set.
+
+        `extra` are read as seldom as the slow values: histories, inputs, hours. `period` is the
+        wished time of a cycle in seconds.
+        """
+        self.stop()
+        self.period = period
+        rates = rates_of(self.profile) if codes is None else Rates(tuple(dict.fromkeys(codes)))
+        known = {*rates.fast, *rates.changing, *rates.slow}
+        more = tuple(code for code in dict.fromkeys(extra) if code not in known)
+        if codes is None:
+            more += tuple(c for c in deciding_codes(self.profile) if c not in {*known, *more})
+        rates = replace(rates, slow=rates.slow + more)
+        self._worker = self.line.spawn(
+            lambda: self._keep_watching(rates), f"monitor {self.profile.id} {self.device}"
+        )
+
+    def stop(self) -> None:
+        """Stop watching; an exchange in flight ends by itself."""
+        if self._worker is not None:
+            self._worker.cancel()
+            self._worker = None
+
+    async def _keep_watching(self, rates: Rates) -> None:
+        """Watch for good: an error that nobody foresaw is told, and watching begins anew."""
+        while True:
+            try:
+                await self._watch(rates)
+            except Exception as error:
+                log.exception("watching device %s failed", self.device)
+                self.restarts += 1
+                told = f"Watching failed ({type(error).__name__}: {error}) and is begun anew."
+                self._tell_failure(told)
+                await asyncio.sleep(RESTART_AFTER)
+
+    def _tell_failure(self, text: str) -> None:
+        """The values of before, as old as they are, with why there are no new ones."""
+        if (latest := self._latest) is None:
+            return
+        snapshot = replace(latest, time=time.monotonic(), wall=time.time(), rate=0.0, error=text)
+        self._latest = snapshot
+        self._hand_out(snapshot)
+
+    def _hand_out(self, snapshot: Snapshot) -> None:
+        """Give a snapshot to every listener; one that fails hurts no other."""
+        for listener in self._listeners:
+            try:
+                listener(snapshot)
+            except Exception:
+                log.exception("a listener to device %s failed", self.device)
+
+    async def _watch(self, rates: Rates) -> None:
+        readings: dict[str, Reading] = {}
+        begun: deque[float] = deque(maxlen=RATE_OVER)
+        due = Due(SLOW_FACTOR)
+        self._all_due = True
+        cycle = failures = 0
+        try:
+            while True:
+                started = time.monotonic()
+                cycle += 1
+                error = ""
+                period = self._period(rates)
+                if self._all_due or self._stirs != self.session.stirs:
+                    self._stirs = self.session.stirs
+                    self._all_due, self._learn_due = False, True
+                    due.add(rates.seldom)
+                try:
+                    seldom = (*rates.seldom, *self.session.followed)
+                    turn = due.turn(seldom, self.reader.groups)
+                    readings.update(await self._cycle(rates, readings, turn))
+                except (LineError, DriveError) as fault:
+                    error = str(fault)
+                    failures += 1
+                    begun.clear()
+                    due.failed(self.reader.groups)
+                    if self._may_be_another(fault, failures):
+                        self.reader.forget()
+                        self._all_due = True
+                else:
+                    failures = 0
+                    due.came()
+                    begun.append(started)
+                self._publish(cycle, readings, rates, _span(begun, period), error)
+                if not error:
+                    await self._learn(cycle)
+                rest = started + period - time.monotonic()
+                await asyncio.sleep(period if error else max(0.0, rest))
+        finally:
+            self.line.pace.release(self)
+
+    def _period(self, rates: Rates) -> float:
+        """The wished time of a cycle, longer where the line cannot keep it for all."""
+        cost = self.reader.seconds(rates.fast)
+        cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
+        return self.line.pace.claim(self, cost, max(self.period, SHORTEST_PERIOD))
+
+    def _may_be_another(self, fault: Exception, failures: int) -> bool:
+        """Whether after a failed cycle what was learned of the drive may be wrong."""
+        if failures >= FORGOTTEN_AFTER or isinstance(fault, LineLost | LineClosed):
+            return True
+        return self._kind in RESET_NEAR
+
+    async def _learn(self, cycle: int) -> None:
+        """See now and then what the drive's block brings; what fails is asked again next time."""
+        with suppress(LineError, DriveError):
+            if self._learn_due or cycle % SLOW_FACTOR == 0:
+                self._learn_due = True
+                await self.reader.learn_slots()
+                self._learn_due = False
+            else:
+                await self.reader.compare_slots()
+
+    async def _cycle(
+        self, rates: Rates, before: Mapping[str, Reading], turn: tuple[str, ...]
+    ) -> dict[str, Reading]:
+        """All readings of one cycle; the state's details as soon as it changes."""
+        found = await self.reader.read((*rates.fast, *turn), priority=Priority.POLL)
+        self._using = self.reader.using
+        if set(rates.changing) <= set(turn):
+            return found
+        now = drive_state(self.profile, found)
+        same = all(code in before and found[code].raw == before[code].raw for code in rates.key)
+        if not same or now.alarm or now.kind == "fault":
+            found |= await self.reader.read(rates.changing, priority=Priority.POLL)
+        return found
+
+    def _publish(
+        self,
+        cycle: int,
+        readings: Mapping[str, Reading],
+        rates: Rates,
+        span: float,
+        error: str,
+    ) -> None:
+        now = time.monotonic()
+        limit = STALE_CYCLES * span
+        aged = {
+            code: reading.aged(now, limit if code in rates.fast else limit * SLOW_FACTOR)
+            for code, reading in readings.items()
+        }
+        snapshot = Snapshot(
+            cycle=cycle,
+            time=now,
+            wall=time.time(),
+            readings=aged,
+            state=drive_state(self.profile, aged),
+            rate=0.0 if error else 1.0 / span,
+            error=error,
+            line=self.line.state,
+            block=self._using,
+            period=span,
+        )
+        if not error and snapshot.state.kind != self._kind:
+            self._kind = snapshot.state.kind
+            self.reader.compare_soon()
+        if snapshot.state.kind in RESET_NEAR:
+            self.reader.distrust()
+        self._latest = snapshot
+        self._add_to_trend(snapshot)
+        self._hand_out(snapshot)
+
+    def _add_to_trend(self, snapshot: Snapshot) -> None:
+        """A failed cycle leaves a gap in the trend, never a repeated value."""
+        readings = snapshot.readings
+        values = tuple(
+            readings[code].number if code and code in readings and not snapshot.error else None
+            for code in self._trend_codes
+        )
+        self._trend.append(TrendPoint(snapshot.time, values))
+        while self._trend[0].time < snapshot.time - TREND_SECONDS:
+            self._trend.popleft()
+
+
+def rates_of(profile: Profile) -> Rates:
+    """How often each value of a profile's monitoring set is read."""
+    rates = {value.parameter: value.rate for value in profile.data.monitoring.values}
+    when = {chart.when.parameter for chart in profile.data.charts if chart.when}
+    changing = {profile.data.faults.parameter, *when} - {""}
+    codes = monitoring_codes(profile)
+    told = {code: rates.get(code, "on-change" if code in changing else "fast") for code in codes}
+    fast, change, slow = (
+        tuple(code for code in codes if told[code] == rate)
+        for rate in ("fast", "on-change", "slow")
+    )
+    watched = set(watched_codes(profile))
+    return Rates(fast, change, slow, tuple(code for code in fast if code in watched))
+
+
+def _span(begun: Sequence[float], period: float) -> float:
+    """Seconds from one cycle to the next, as they were."""
+    if len(begun) < 2:
+        return period
+    return max(period, (begun[-1] - begun[0]) / (len(begun) - 1))
+
+
+def monitoring_codes(profile: Profile) -> list[str]:
+    """Codes of a profile's monitoring set with the words that tell its state and fault."""
+    codes = [value.parameter for value in profile.data.monitoring.values]
+    codes += watched_codes(profile)
+    if profile.data.faults.parameter:
+        codes.append(profile.data.faults.parameter)
+    return list(dict.fromkeys(codes))

@@ -1,0 +1,314 @@
+"""Reading parameters of one drive: plan, exchange, decode; a refused word hurts no other."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Hashable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+from tui.bus.errors import DeviceException, NoAnswer
+from tui.bus.line import Line, Priority, Reply
+from tui.bus.link import TcpLink, character_time, silence
+from tui.drive.chart import read_chart
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import Block, Parameter
+from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
+from tui.drive.shown import depends_on, shown
+from tui.drive.values import Value, from_words, percent_of, word_count
+
+from ..drive import DriveSession
+from ..image import Origin, Raw, RegisterImage
+from ..reading import Quality, Rating, Reading
+from .slots import Slots
+
+SOURCE_AGE = 5.0
+"""Seconds for which a poll trusts a word that others' values depend on; an operator's read
+never does."""
+USUAL_TURNAROUND = 0.005
+"""Seconds that a drive takes to answer, until it is measured."""
+TURNAROUND_STEP = 0.001
+PLANS_KEPT = 64
+"""Read plans that are remembered; sets of codes and turnarounds change without end."""
+ASK_AGAIN = 30.0
+"""Seconds after which a poll asks again for a parameter that the drive refused."""
+
+
+@dataclass(slots=True)
+class Reader:
+    """Reads parameters of one drive into its image.
+
+    Raises the line's errors for all but a drive's refusal, which makes only the refused
+    parameter bad.
+    """
+
+    session: DriveSession
+    using: str = ""
+    """Name of the block or scanner that the last poll read, if it read one."""
+    _met: set[str] = field(default_factory=set)
+    """Unconfirmed words that this drive has answered."""
+    _plans: dict[tuple[Hashable, ...], ReadPlan] = field(default_factory=dict)
+    _slots: Slots = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._slots = Slots(self.line, self.device, self.profile)
+
+    @property
+    def line(self) -> Line:
+        """The line of the drive."""
+        return self.session.line
+
+    @property
+    def device(self) -> int:
+        """The drive's slave address."""
+        return self.session.device
+
+    @property
+    def profile(self) -> Profile:
+        """What is known of the drive's family."""
+        return self.session.profile
+
+    async def read(
+        self, codes: Iterable[str], *, priority: Priority = Priority.OPERATOR_READ
+    ) -> dict[str, Reading]:
+        """Readings by code, in the order asked for."""
+        wanted = list(dict.fromkeys(codes))
+        await self._read_sources(wanted, priority)
+        raws = await self._raws(frozenset(wanted), priority)
+        self._note_state(wanted)
+        known = _Known(self.session.image)
+        return {code: self._reading(self.profile[code], raws[code], known) for code in wanted}
+
+    def _note_state(self, codes: Iterable[str]) -> None:
+        """Tell the session when the motor was seen at rest."""
+        status = {chart.status for chart in self.profile.data.charts}
+        image = self.session.image
+        for code in status.intersection(codes):
+            if (held := image.get(code)) is not None:
+                self.session.note_state(read_chart(self.profile, image.raws).kind, held.time)
+
+    def seconds(self, codes: Iterable[str]) -> float:
+        """What reading these costs on the wire by plan, without retries."""
+        sure, unsure = self._by_trust(frozenset(codes).difference(self.session.image.refused))
+        return self._plan(sure, self.in_force).seconds + self._plan(unsure).seconds
+
+    def groups(self, codes: Iterable[str]) -> list[tuple[str, ...]]:
+        """The codes that come in one request each."""
+        wanted = frozenset(codes).difference(self.session.image.refused)
+        trusts = self._by_trust(wanted)
+        requests = [request for trust in trusts for request in self._plan(trust).requests]
+        return [tuple(place.code for place in request.places) for request in requests]
+
+    def forget(self) -> None:
+        """Read scales and refused parameters anew: another drive may answer now."""
+        self.session.image.distrust()
+        self._plans.clear()
+        self._met.clear()
+        self._slots.forget()
+
+    def distrust(self) -> None:
+        """Read directly what a block brings only until the drive's next reset."""
+        self._slots.distrust()
+
+    @property
+    def in_force(self) -> dict[str, int]:
+        """Raw values by slot of what surely stands in each place of a block or scanner now."""
+        return self._slots.in_force()
+
+    async def learn_slots(self) -> None:
+        """Find out what the drive's block or scanner stands for; polls use it from then on.
+
+        To be called again now and then: others may change it. Raises the line's errors.
+        """
+        await self._slots.learn(self._poll)
+
+    async def compare_slots(self) -> None:
+        """Go on to prove what an indirect block brings, by a few requests. Raises line errors."""
+        await self._slots.compare(self._poll)
+
+    def compare_soon(self) -> None:
+        """The drive does something else now: what looked alike in its block may no longer."""
+        self._slots.compare_soon()
+
+    async def _poll(self, codes: Iterable[str]) -> Mapping[str, Reading]:
+        return await self.read(codes, priority=Priority.POLL)
+
+    async def _read_sources(self, codes: list[str], priority: Priority) -> None:
+        sources = {source for code in codes for source in _sources_of(self.profile[code])}
+        oldest = time.monotonic() - SOURCE_AGE if priority >= Priority.POLL else math.inf
+        due = frozenset(code for code in sources - set(codes) if not self._is_known(code, oldest))
+        if due:
+            await self._raws(due, priority)
+
+    def _is_known(self, code: str, oldest: float) -> bool:
+        """Whether a word that others' values depend on was read, or refused, since a time."""
+        image = self.session.image
+        held = image.get(code) if code in image.trusted else image.refused.get(code)
+        return held is not None and held.time >= oldest
+
+    async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
+        found = self._still_refused(codes) if priority >= Priority.POLL else {}
+        image = self.session.image
+        sure, unsure = self._by_trust(codes.difference(image.refused, found))
+        slots = self.in_force if priority >= Priority.POLL else {}
+        found.update(await self._follow(self._plan(sure, slots), priority))
+        for request in self._plan(unsure).requests:
+            found.update(await self._exchange_unsure(request, priority))
+        for code in codes.difference(found):
+            found[code] = await self._alone(self.profile[code], priority)
+        image.take(found, Origin.POLL if priority >= Priority.POLL else Origin.READ)
+        return found
+
+    async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Raw]:
+        """Values of a plan; those of a block whose slots have changed meanwhile are left out."""
+        found: dict[str, Raw] = {}
+        if priority >= Priority.POLL:
+            used = (self._block_of(request) for request in plan.requests)
+            self.using = next((block.name for block in used if block), "")
+        for request in plan.requests:
+            found.update(await self._exchange(request, priority))
+            self._slots.heard()
+        for check in plan.checks:
+            raws = await self._exchange(check.request, priority)
+            if {code: raw.raw for code, raw in raws.items()} != check.slots:
+                self._slots.forget()
+                for code in check.governs:
+                    found.pop(code, None)
+        return found
+
+    def _by_trust(self, codes: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
+        """Confirmed words apart from the others, where a wrong address meets silence."""
+        function = self.profile.function(3)
+        if function is None or function.past_limit != "silence":
+            return codes, frozenset()
+        sure = frozenset(c for c in codes if c in self._met or is_verified(self.profile[c]))
+        return sure, codes - sure
+
+    async def _exchange_unsure(self, request: ReadRequest, priority: Priority) -> dict[str, Raw]:
+        """A read of words that the drive may not have: its silence there is no dead drive."""
+        try:
+            found = await self._exchange(request, priority)
+            self._met.update(found)
+            return found
+        except NoAnswer:
+            status = self.profile.quantity("status_word")
+            if status is None:
+                raise
+            await self.line.read(self.device, status.address, 1, priority=Priority.OPERATOR_READ)
+            text = "no answer: perhaps this drive has no such word"
+            nothing = Raw(time.monotonic(), None, text, silent=True)
+            return {place.code: nothing for place in request.places}
+
+    def _still_refused(self, codes: frozenset[str]) -> dict[str, Raw]:
+        """Refusals young enough that a poll need not ask again."""
+        oldest = time.monotonic() - ASK_AGAIN
+        refused = self.session.image.refused
+        return {c: r for c, r in refused.items() if c in codes and (r.silent or r.time > oldest)}
+
+    def _plan(self, codes: frozenset[str], slots: Mapping[str, int] | None = None) -> ReadPlan:
+        refused, turnaround = frozenset(self.session.image.refused), self._turnaround()
+        key = (codes, refused, turnaround, tuple(sorted((slots or {}).items())))
+        if key not in self._plans:
+            timing = self._timing(turnaround)
+            while len(self._plans) >= PLANS_KEPT:
+                del self._plans[next(iter(self._plans))]
+            self._plans[key] = plan_reads(self.profile, sorted(codes), timing, slots, refused)
+        return self._plans[key]
+
+    def _turnaround(self) -> float:
+        """The drive's measured turnaround in steps, so that plans do not change for nothing."""
+        measured = self.line.device_state(self.device).usual_turnaround
+        if measured is None:
+            return USUAL_TURNAROUND
+        return round(measured / TURNAROUND_STEP) * TURNAROUND_STEP
+
+    def _timing(self, turnaround: float) -> WireTiming:
+        link = self.line.link
+        if isinstance(link, TcpLink):
+            return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
+        return WireTiming(character_time(link), silence(link), turnaround)
+
+    async def _exchange(self, request: ReadRequest, priority: Priority) -> dict[str, Raw]:
+        """The raw values of one planned request.
+
+        Where the drive refuses a longer read, or answers a word with the one that stands for
+        "no value", the parameter is asked for alone: only then is the answer certain.
+        """
+        block = self._block_of(request)
+        several = len(request.places) > 1 or block is not None
+        try:
+            reply = await self.line.read(
+                self.device, request.address, request.count, priority=priority
+            )
+        except DeviceException as refusal:
+            if several:
+                return {}
+            return {p.code: self._refusal(refusal) for p in request.places}
+        unknown = self.profile.data.reading.unknown_word
+        found: dict[str, Raw] = {}
+        for place in request.places:
+            parameter = self.profile[place.code]
+            words = reply.words[place.offset : place.offset + word_count(parameter)]
+            alone = request.count == word_count(parameter) and block is None
+            if alone or unknown not in words:
+                found[place.code] = Raw(reply.time, from_words(parameter, words))
+        return found
+
+    def _block_of(self, request: ReadRequest) -> Block | None:
+        """The block or scanner that a request reads; None where it asks parameters directly."""
+        first = request.places[0]
+        if self.profile[first.code].address == request.address + first.offset:
+            return None
+        blocks = self.profile.data.blocks
+        return next((b for b in blocks if 0 <= request.address - b.address < b.max_words), None)
+
+    async def _alone(self, parameter: Parameter, priority: Priority) -> Raw:
+        count = word_count(parameter)
+        try:
+            reply: Reply = await self.line.read(
+                self.device, parameter.address, count, priority=priority
+            )
+        except DeviceException as refusal:
+            return self._refusal(refusal)
+        return Raw(reply.time, from_words(parameter, reply.words))
+
+    def _refusal(self, refusal: DeviceException) -> Raw:
+        absent = refusal.code == self.profile.data.reading.unknown_exception
+        return Raw(time.monotonic(), None, str(refusal), absent)
+
+    def _reading(self, parameter: Parameter, raw: Raw, known: _Known) -> Reading:
+        if raw.raw is None:
+            return Reading.bad(parameter, raw.time, raw.error)
+        value = self._value(parameter, raw.raw, known)
+        physical = self._physical(parameter, value, known)
+        return Reading(parameter, raw.raw, value, Quality.GOOD, raw.time, physical=physical)
+
+    def _value(self, parameter: Parameter, raw: int, known: _Known) -> Value:
+        return shown(self.profile, parameter, raw, known.raws, known.lacking)
+
+    def _physical(self, parameter: Parameter, value: Value, known: _Known) -> Value | None:
+        """A percentage in the unit of its rating: the person's, else the drive's own."""
+        if parameter.unit != "%" or value.number is None:
+            return None
+        rating = self.session.ratings.get(parameter.code)
+        own_raw = known.raws.get(parameter.rating)
+        if rating is None and own_raw is not None:
+            own = self._value(self.profile[parameter.rating], own_raw, known)
+            rating = Rating(own.number, own.unit) if own.number is not None else None
+        if rating is None:
+            return None
+        number = percent_of(value.number, rating.number)
+        return Value(value.raw, number, rating.unit, f"{number:f}")
+
+
+class _Known:
+    """What scales and units follow, at one moment."""
+
+    def __init__(self, image: RegisterImage) -> None:
+        self.raws = image.trusted
+        self.lacking = image.lacking
+
+
+def _sources_of(parameter: Parameter) -> list[str]:
+    """Parameters without which this one's value, or the rating that it is a part of, is unknown."""
+    return [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]

@@ -1,0 +1,165 @@
+"""What stands in the places of a drive's indirect block or scanner, as far as it is sure.
+
+A scanner's slots count as soon as they are written: they are read, and read again after each
+use (the read plan sees to that). An indirect block's slots count from the drive's next reset
+on, so what they hold now may not be what the block brings: the block is compared, a few
+parameters at a time, with direct reads of everything that could stand in it.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Awaitable, Callable, Iterable, Mapping
+from dataclasses import dataclass, field
+
+from tui.bus.errors import DeviceException
+from tui.bus.line import Line, Priority
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Block
+
+from ..reading import Reading
+from .proof import SURE, Proof
+
+AT_ONCE = 2
+"""Parameters compared between two cycles, so that no cycle waits long."""
+ROUNDS = SURE + 1
+"""Comparisons of each parameter, until they rest."""
+TRY_AGAIN = 15.0
+"""Seconds after which a block that is not sure yet is compared again."""
+ASLEEP = 0.8
+"""Seconds without an answer in which a drive may have been switched off and on."""
+CALM = 1.0
+"""Seconds without doubt about a reset before anything is proved."""
+
+Ask = Callable[[Iterable[str]], Awaitable[Mapping[str, Reading]]]
+
+
+@dataclass(slots=True)
+class _Comparison:
+    """One indirect block: what is chosen for it, what is proved, what is to be compared yet."""
+
+    block: Block
+    proof: Proof
+    chosen: dict[str, int] = field(default_factory=dict)
+    """The slots that hold one of the block's choices, as last read."""
+    todo: deque[str] = field(default_factory=deque)
+    next_time: float = 0.0
+
+    def choose(self, slots: Mapping[str, int]) -> None:
+        """Take the slots as they were read, and begin to compare where that is due."""
+        known = {choice.raw for choice in self.block.choices}
+        chosen = {s: slots[s] for s in self.block.slots if slots.get(s) in known}
+        now = time.monotonic()
+        if chosen == self.chosen and (self.todo or now < self.next_time):
+            return
+        self.chosen, self.next_time = chosen, now + TRY_AGAIN
+        self.proof.begin()
+        self.todo = deque(self.proof.open_codes(chosen) * ROUNDS)
+
+    @property
+    def length(self) -> int:
+        """Words up to the last place that something was chosen for; 0 where that is too few."""
+        last = max((self.block.slots.index(slot) for slot in self.chosen), default=-1)
+        return last + 1 if last + 1 >= self.block.min_words else 0
+
+    def take(self) -> list[str]:
+        """The parameters to compare now."""
+        still_open = self.proof.open_codes(self.chosen)
+        codes: list[str] = []
+        while self.todo and len(codes) < AT_ONCE:
+            if (code := self.todo.popleft()) in still_open and code not in codes:
+                codes.append(code)
+        return codes
+
+    def in_force(self) -> dict[str, int]:
+        """Raw values by slot of the places that are sure."""
+        return {slot: raw for slot, raw in self.chosen.items() if self.proof.holds(slot, raw)}
+
+
+@dataclass(slots=True)
+class Slots:
+    """The slots of one drive's read blocks; `ask` reads parameters at the priority of polls."""
+
+    line: Line
+    device: int
+    profile: Profile
+    _known: dict[str, int] = field(default_factory=dict)
+    _comparisons: dict[str, _Comparison] = field(default_factory=dict)
+    """By the id of the block; forgotten whenever the drive may have been reset."""
+    _in_force: dict[str, int] = field(default_factory=dict)
+    """What the comparisons have proved."""
+    _heard: float = 0.0
+    _doubted: float = 0.0
+
+    def in_force(self) -> dict[str, int]:
+        """Raw values by slot of what surely stands in each place now."""
+        awake = time.monotonic() - self._heard <= ASLEEP
+        return self._known | self._in_force if awake else dict(self._known)
+
+    def heard(self) -> None:
+        """The drive has answered: it was not switched off since it did so before, or long ago."""
+        now = time.monotonic()
+        if now - self._heard > ASLEEP:
+            self._drop_proofs()
+        self._heard = now
+
+    def distrust(self) -> None:
+        """The drive may be reset now: what counts from then on is not what was proved."""
+        self._drop_proofs()
+        self._doubted = time.monotonic()
+
+    def forget(self) -> None:
+        """Nothing is sure any more: the drive was silent, or another one answers now."""
+        self._known.clear()
+        self._drop_proofs()
+
+    def compare_soon(self) -> None:
+        """What the block can bring differs from before: what was alike may be told apart now."""
+        for one in self._comparisons.values():
+            one.next_time = 0.0
+
+    async def learn(self, ask: Ask) -> None:
+        """Read the slots of every read block."""
+        for block in self.profile.data.blocks:
+            if block.direction != "read":
+                continue
+            readings = await ask(block.slots)
+            raws = {c: r.raw for c, r in readings.items() if r.raw is not None}
+            if block.effective == "at-once":
+                self._known.update(raws)
+            elif time.monotonic() - self._doubted > CALM:
+                fresh = _Comparison(block, Proof(self.profile, block))
+                self._comparisons.setdefault(block.id, fresh).choose(raws)
+        self._conclude()
+
+    async def compare(self, ask: Ask) -> None:
+        """Compare a few parameters with what the block brings, where that is not sure yet."""
+        for one in list(self._comparisons.values()):
+            codes = one.take() if one.length else []
+            if not codes:
+                continue
+            before = await ask(codes)
+            try:
+                reply = await self.line.read(
+                    self.device, one.block.address, one.length, priority=Priority.POLL
+                )
+            except DeviceException:
+                one.todo.clear()
+                continue
+            self.heard()
+            after = await ask(codes)
+            one.proof.note(reply.words, before, after)
+            one.proof.conclude(one.chosen)
+        self._conclude()
+
+    def _conclude(self) -> None:
+        found: dict[str, int] = {}
+        for one in self._comparisons.values():
+            found |= one.in_force()
+        self._in_force = found
+
+    def _drop_proofs(self) -> None:
+        # a comparison under way goes on with evidence that nobody looks at any more
+        self._comparisons.clear()
+        self._in_force = {}

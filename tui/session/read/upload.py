@@ -1,0 +1,127 @@
+"""Reading all parameters of a drive behind everything else on the line, for a parameter set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from datetime import datetime
+
+import tui
+from tui.bus.line import Priority
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.parameter_set import Head, ParameterSet
+from tui.drive.settings.restore_plan import rating_codes
+from tui.drive.settings.writable import is_setting
+from tui.drive.shown import scale_sources
+
+from ..drive import DriveSession
+from .retrying_reader import Asker, neighbours
+
+Progress = Callable[[int, int], None]
+"""Called with how many parameters were asked for, and how many there are."""
+
+
+def readable_codes(profile: Profile) -> list[str]:
+    """Codes of every parameter that can be read, in the profile's order."""
+    return [p.code for p in profile.parameters if p.access != "w"]
+
+
+def setting_codes(profile: Profile) -> list[str]:
+    """Codes of every setting, and of what scales and models follow, in the profile's order."""
+    wanted = set(scale_sources(profile)) | set(rating_codes(profile))
+    return [
+        p.code
+        for p in profile.parameters
+        if p.access != "w" and (is_setting(profile, p) or p.code in wanted)
+    ]
+
+
+@dataclass(slots=True)
+class Upload:
+    """Reads parameters once each; after an error of the line `run` goes on where it was."""
+
+    session: DriveSession
+    codes: list[str] = field(default_factory=list)
+    """What is to be read; every readable parameter where empty."""
+    progress: Progress | None = None
+    priority: Priority = Priority.BACKGROUND
+    raws: dict[str, int] = field(default_factory=dict)
+    """What was read so far."""
+    absent: dict[str, str] = field(default_factory=dict)
+    """What has no value, and what the drive or the line said instead."""
+    asker: Asker = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.codes = self.codes or readable_codes(self.session.profile)
+        self.asker = Asker(self.session, self.priority)
+
+    @property
+    def left(self) -> list[str]:
+        """Codes that were not asked for yet."""
+        return [c for c in self.codes if c not in self.raws and c not in self.absent]
+
+    @property
+    def done(self) -> bool:
+        """Whether every parameter was asked for."""
+        return not self.left
+
+    async def run(self) -> None:
+        """Read what is left, by the requests of the read plan, scale sources first.
+
+        Raises the line's errors; what was read stays, and another call reads the rest.
+        """
+        profile = self.session.profile
+        sources = scale_sources(profile)
+        first = [code for code in self.left if code in sources]
+        for codes in (first, *neighbours(profile, self.left)):
+            for group in self.asker.reader.groups(codes):
+                await self._ask(group)
+            # what the drive refuses is in no group
+            await self._ask(codes)
+
+    async def _ask(self, codes: Iterable[str]) -> None:
+        wanted = [code for code in codes if code not in self.raws and code not in self.absent]
+        if not wanted:
+            return
+        for code, reading in (await self.asker.ask(wanted)).items():
+            if reading.raw is None:
+                self.absent[code] = reading.error
+            else:
+                self.raws[code] = reading.raw
+        self._tell()
+
+    def _tell(self) -> None:
+        if self.progress is not None:
+            self.progress(len(self.codes) - len(self.left), len(self.codes))
+
+    def parameter_set(self) -> ParameterSet:
+        """What was read so far, with where it comes from."""
+        wanted = set(self.codes)
+        return ParameterSet(
+            head=head_of(self.session),
+            raws={code: raw for code, raw in self.raws.items() if code in wanted},
+            absent={code: why for code, why in self.absent.items() if code in wanted},
+        )
+
+
+def head_of(session: DriveSession) -> Head:
+    """Where a parameter set of this drive, read now, comes from."""
+    profile, identity = session.profile, session.identity
+    said = {}
+    if identity is not None:
+        said = {
+            "vendor": identity.vendor,
+            "reference": identity.reference,
+            "version": identity.version_text,
+            "name": identity.name,
+        }
+    return Head(
+        profile=profile.id,
+        profile_version=profile.data.profile.version,
+        family=profile.name,
+        time=datetime.now().astimezone().isoformat(timespec="seconds"),
+        line=session.line_text,
+        device=session.device,
+        panel=tui.__version__,
+        identity={key: text for key, text in said.items() if text},
+    )

@@ -1,0 +1,288 @@
+"""Applying staged edits to a drive: each looked at before, written once, read back, recorded.
+
+A value that somebody else changed meanwhile is not overwritten; what could not be written stays
+staged. Nothing is printed: a screen or a command tells what the results say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterable
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+
+from tui.bus.errors import (
+    ChecksumFault,
+    DeviceException,
+    LineError,
+    NoAnswer,
+    RequestRefused,
+    WrongReply,
+)
+from tui.drive.errors import DriveError
+from tui.drive.settings.edits import Edit, Edits, cuts_line, limit_pairs, ordered, problems
+from tui.drive.settings.writable import option_code, refusal, waits_for_reset
+from tui.drive.shown import shown
+
+from ..arming import NotArmed
+from ..drive import DriveSession
+from ..journal import Journal
+from ..read.retrying_reader import Asker
+from ..work import Permit, Stopped
+from .link_change import LinkChange, link_change
+from .refusals import device_refusal
+from .write import NotTaken, Writer
+
+LOST_ANSWERS = (NoAnswer, ChecksumFault, WrongReply)
+
+
+class Outcome(StrEnum):
+    """What became of one edit."""
+
+    DONE = "done"
+    SENT = "sent, line changed"
+    CHANGED = "changed meanwhile"
+    NOT_TAKEN = "not taken"
+    DRIVE_REFUSED = "the drive refused"
+    REFUSED = "not written"
+    UNKNOWN = "not known"
+    NOT_SENT = "not sent"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One edit with its outcome, a sentence for a person, and what the drive holds now."""
+
+    edit: Edit
+    outcome: Outcome
+    text: str
+    held: int | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether the drive has the new value, as far as that can be seen."""
+        return self.outcome in (Outcome.DONE, Outcome.SENT)
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """What became of all edits."""
+
+    results: tuple[Result, ...]
+    left: Edits
+    """What is still staged, against the values that the drive holds now."""
+    links: tuple[LinkChange, ...] = ()
+    """What changes on the line itself, now or after a reset."""
+    after_reset: tuple[str, ...] = ()
+    """Codes whose new value is in force only once the drive was reset."""
+    unsaved: tuple[str, ...] = ()
+    """Codes whose new value is lost at power-off until the drive is told to save."""
+    stopped: str = ""
+    """Why the rest was not tried; empty where all were."""
+
+    @property
+    def written(self) -> tuple[Result, ...]:
+        """The edits that the drive has now."""
+        return tuple(result for result in self.results if result.done)
+
+
+Progress = Callable[[int, int, Result], None]
+"""Called after each edit with how many are done, how many there are, and the result."""
+
+
+async def apply_edits(
+    session: DriveSession,
+    journal: Journal,
+    edits: Edits,
+    *,
+    permit: Permit,
+    confirmed: Collection[str] = (),
+    why: str = "setting",
+    progress: Progress | None = None,
+) -> Applied:
+    """Write staged edits one after another, in their order, as long as the permit holds.
+
+    `confirmed` are codes of unverified parameters that the user confirmed; `why` goes into the
+    journal. Raises RequestRefused on a read-only line, and the line's errors while nothing has
+    been written yet.
+    """
+    if session.line.read_only:
+        raise RequestRefused("The line is read-only: nothing is written.")
+    work = _Work(session, Writer(session, journal, permit), Asker(session), edits, confirmed, why)
+    await work.look_at_all()
+    told = problems(session.profile, edits, work.asker.raws)
+    order = ordered(session.profile, edits, work.asker.raws)
+    for number, edit in enumerate(order, start=1):
+        if work.stopped:
+            result = Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {work.stopped}")
+        elif edit.code in told:
+            result = Result(edit, Outcome.REFUSED, told[edit.code], edit.old)
+        else:
+            result = await work.apply(edit)
+        work.results.append(result)
+        if progress is not None:
+            progress(number, len(order), result)
+    return work.summary()
+
+
+@dataclass(slots=True)
+class _Work:
+    session: DriveSession
+    writer: Writer
+    asker: Asker
+    edits: Edits
+    confirmed: Collection[str]
+    why: str
+    stopped: str = ""
+    results: list[Result] = field(default_factory=list)
+    links: list[LinkChange] = field(default_factory=list)
+
+    async def look_at_all(self) -> None:
+        """Read every parameter that the edits and their limits are about."""
+        codes = {edit.code for edit in self.edits}
+        for low, high in limit_pairs(self.session.profile):
+            if {low, high} & codes:
+                codes |= {low, high}
+        await self.asker.ask_many(self._with_sources(codes))
+
+    def _with_sources(self, codes: Iterable[str]) -> list[str]:
+        found = list(codes)
+        for code in tuple(found):
+            follows = self.session.profile[code].scale_by
+            found += [follows.parameter] if follows else []
+        return list(dict.fromkeys(found))
+
+    async def apply(self, edit: Edit) -> Result:
+        """One edit, from the look before to the look after."""
+        try:
+            if (reason := await self._reason_against(edit)) is not None:
+                return reason
+        except LineError as error:
+            self.stopped = str(error)
+            return Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {error}")
+        try:
+            return await self._write(edit)
+        except (Stopped, NotArmed) as error:
+            self.stopped = str(error)
+            return Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {error}", edit.old)
+        except RequestRefused as error:
+            if self.writer.permit is not None and self.writer.permit.refusal():
+                self.stopped = str(error)
+            return Result(edit, Outcome.REFUSED, str(error), edit.old)
+        except LOST_ANSWERS as error:
+            return await self._after_a_lost_answer(edit, error)
+        except LineError as error:
+            self.stopped = str(error)
+            return Result(edit, Outcome.UNKNOWN, f"Whether {edit.code} was written: {error}")
+
+    async def _reason_against(self, edit: Edit) -> Result | None:
+        """Why the edit is not written now, with fresh values; None where it may be."""
+        profile, asker = self.session.profile, self.asker
+        parameter = profile[edit.code]
+        state = await asker.ask_state()
+        if (against := refusal(profile, parameter, state, self.confirmed)) is not None:
+            return Result(edit, Outcome.REFUSED, against.text, edit.old)
+        option = option_code(profile, parameter)
+        wanted = [edit.code, *([option.code] if option else [])]
+        raws = await asker.ask_raws(self._with_sources(wanted))
+        if option is not None and raws.get(option.code) != option.factory:
+            text = f"{edit.code} is not written: {option.code} does not read {option.factory}, so"
+            text += " another option is fitted, to which it means something else."
+            return Result(edit, Outcome.REFUSED, text, edit.old)
+        held = raws.get(edit.code)
+        if held is None:
+            said = asker.why_absent(edit.code)
+            return Result(
+                edit, Outcome.REFUSED, f"{edit.code} cannot be read, so it is not written: {said}"
+            )
+        if held == edit.new and self._means(edit):
+            return Result(edit, Outcome.DONE, f"{edit.code} holds {edit.text} already.", held)
+        if not self._means(edit) or (edit.old is not None and held != edit.old):
+            return Result(edit, Outcome.CHANGED, self._changed_text(edit, held), held)
+        return None
+
+    def _means(self, edit: Edit) -> bool:
+        """Whether the raw value still stands for what was staged: its scale may have changed."""
+        parameter = self.session.profile[edit.code]
+        if parameter.scale_by is None:
+            return True
+        asker = self.asker
+        now = shown(self.session.profile, parameter, edit.new, asker.raws, asker.lacking)
+        return now.display == edit.text
+
+    def _changed_text(self, edit: Edit, held: int) -> str:
+        parameter = self.session.profile[edit.code]
+        now = shown(self.session.profile, parameter, held, self.asker.raws, self.asker.lacking)
+        if parameter.scale_by is not None and not self._means(edit):
+            source = parameter.scale_by.parameter
+            return f"{edit.code} was not written: its scale {source} was changed meanwhile."
+        return (
+            f"{edit.code} was not written: it was {edit.old_text} and is now {now.display},"
+            " changed meanwhile. It stays staged; apply again to overwrite it."
+        )
+
+    async def _write(self, edit: Edit) -> Result:
+        profile, session = self.session.profile, self.session
+        parameter = profile[edit.code]
+        change = link_change(profile, session.line.link, session.device, edit)
+        cut = cuts_line(profile, parameter)
+        try:
+            await self.writer.write(parameter, edit.new, why=self.why, read_back=not cut)
+        except DeviceException as error:
+            text = device_refusal(profile, parameter, error, self.asker.headline)
+            return Result(edit, Outcome.DRIVE_REFUSED, text, edit.old)
+        except NotTaken as error:
+            held = (await self.asker.ask_raws([edit.code])).get(edit.code)
+            return Result(edit, Outcome.NOT_TAKEN, str(error), held)
+        except LOST_ANSWERS:
+            if not cut:
+                raise
+            # a drive that changes its settings at once may answer with the new ones already
+        if change is not None:
+            self.links.append(change)
+        if cut and change is not None:
+            self.stopped = change.text
+            return Result(edit, Outcome.SENT, f"{edit.code} was sent. {change.text}")
+        return Result(edit, Outcome.DONE, f"{edit.code}: {edit.old_text} -> {edit.text}", edit.new)
+
+    async def _after_a_lost_answer(self, edit: Edit, error: LineError) -> Result:
+        """A write is sent once; what became of it is found by reading."""
+        try:
+            held = (await self.asker.ask_raws([edit.code])).get(edit.code)
+        except LineError as later:
+            self.stopped = str(later)
+            return Result(edit, Outcome.UNKNOWN, f"Whether {edit.code} was written: {later}")
+        if held == edit.new:
+            text = f"{edit.code}: {edit.old_text} -> {edit.text} (its answer was lost)"
+            return Result(edit, Outcome.DONE, text, held)
+        silent = " This family refuses by silence." if not self._refuses_aloud else ""
+        text = f"{edit.code} was not taken: {error}{silent} The drive is {self.asker.headline}."
+        return Result(edit, Outcome.NOT_TAKEN, text, held)
+
+    @property
+    def _refuses_aloud(self) -> bool:
+        return bool(self.session.profile.data.exceptions)
+
+    def summary(self) -> Applied:
+        """All results, and what is left to be done."""
+        profile = self.session.profile
+        done = [result.edit.code for result in self.results if result.done]
+        parameters = [profile[code] for code in done]
+        return Applied(
+            results=tuple(self.results),
+            left=self._left(set(done)),
+            links=tuple(self.links),
+            after_reset=tuple(p.code for p in parameters if waits_for_reset(profile, p)),
+            unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
+            stopped=self.stopped,
+        )
+
+    def _left(self, done: set[str]) -> Edits:
+        """What is staged yet, against what the drive holds now."""
+        left = Edits(tuple(edit for edit in self.edits.asked if edit.code not in done))
+        held = {r.edit.code: r.held for r in self.results if r.held is not None}
+        raws = {**self.asker.raws, **held}
+        try:
+            return left.now(self.session.profile, raws, self.asker.lacking)
+        except DriveError:
+            # under the scales of now a value has no place: it stays as it was typed
+            return Edits(tuple(replace(e, old=raws.get(e.code, e.old)) for e in left.asked))

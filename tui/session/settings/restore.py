@@ -1,0 +1,196 @@
+"""Restoring a parameter set to a drive: planned against the drive, written, planned again.
+
+What is done is known by reading the drive, never from a file: an interrupted restoring is
+resumed by starting it again. A mark in the state folder only tells that one was interrupted.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from tui.bus.errors import LineError, RequestRefused
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.edits import Edits
+from tui.drive.settings.parameter_set import ParameterSet
+from tui.drive.settings.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
+from tui.drive.settings.writable import waits_for_reset
+
+from ..drive import DriveSession
+from ..journal import Journal, now_text
+from ..paths import state_folder
+from ..read.upload import Upload, setting_codes
+from ..work import Permit
+from .apply import Applied, Progress, Result, apply_edits
+from .link_change import LinkChange
+
+PASSES = 5
+"""How often is planned again at most: writing some settings changes others."""
+
+Reading = Callable[[int, int], None]
+"""Called while the drive is read, with how many parameters were read and how many there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Restored:
+    """What became of a restoring."""
+
+    plan: RestorePlan
+    """The plan at the beginning."""
+    results: tuple[Result, ...]
+    """The last result of each parameter, in the order of writing."""
+    left: Edits
+    """What the drive does not hold yet."""
+    links: tuple[LinkChange, ...]
+    after_reset: tuple[str, ...]
+    unsaved: tuple[str, ...]
+    stopped: str
+    """Why it ended early; empty where it came to its end."""
+
+    @property
+    def complete(self) -> bool:
+        """Whether the drive holds all that was planned."""
+        return not self.stopped and not len(self.left)
+
+
+async def held_by(session: DriveSession, reading: Reading | None = None) -> Held:
+    """The settings that the drive holds now; raises the line's errors."""
+    upload = Upload(session, setting_codes(session.profile), reading)
+    await upload.run()
+    reference = session.identity.reference if session.identity is not None else ""
+    return Held(upload.raws, upload.absent, session.image.lacking, reference)
+
+
+async def restore(
+    session: DriveSession,
+    journal: Journal,
+    source: ParameterSet,
+    source_profile: Profile,
+    options: Options = PLAIN,
+    *,
+    permit: Permit,
+    progress: Progress | None = None,
+    reading: Reading | None = None,
+) -> Restored:
+    """Write what differs, read it back, and look again until nothing more is to be done.
+
+    Raises the line's errors while nothing was written yet.
+    """
+    if session.line.read_only:
+        raise RequestRefused("The line is read-only: nothing is written.")
+    plan = await plan_for(session, source, source_profile, options, reading)
+    first, results = plan, dict[str, Result]()
+    links: list[LinkChange] = []
+    mark = Mark.of(session)
+    if len(plan.edits):
+        mark.begin(source, len(plan.edits))
+    stopped, left = "", plan.edits
+    for number in range(PASSES):
+        if not len(left):
+            break
+        try:
+            applied = await _one_pass(session, journal, plan, options, permit, progress)
+            results.update({result.edit.code: result for result in applied.results})
+            links += applied.links
+            stopped, left = applied.stopped, applied.left
+            if stopped or not applied.written:
+                break
+            plan = await plan_for(session, source, source_profile, options, reading)
+        except LineError as error:
+            if not number and not results:
+                raise
+            stopped = str(error)
+            break
+        left = plan.edits
+    if not stopped and not len(left):
+        mark.end()
+    done = [code for code, result in results.items() if result.done]
+    parameters = [session.profile[code] for code in done]
+    return Restored(
+        plan=first,
+        results=tuple(results.values()),
+        left=left,
+        links=tuple(links),
+        after_reset=tuple(p.code for p in parameters if waits_for_reset(session.profile, p)),
+        unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
+        stopped=stopped,
+    )
+
+
+async def plan_for(
+    session: DriveSession,
+    source: ParameterSet,
+    source_profile: Profile,
+    options: Options = PLAIN,
+    reading: Reading | None = None,
+) -> RestorePlan:
+    """What restoring would do to this drive now; reads it, writes nothing."""
+    held = await held_by(session, reading)
+    return plan_restore(session.profile, held, source, source_profile, options)
+
+
+async def _one_pass(
+    session: DriveSession,
+    journal: Journal,
+    plan: RestorePlan,
+    options: Options,
+    permit: Permit,
+    progress: Progress | None,
+) -> Applied:
+    return await apply_edits(
+        session,
+        journal,
+        plan.edits,
+        confirmed=options.confirmed,
+        permit=permit,
+        why="restore",
+        progress=progress,
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A file in the state folder that is there while a drive's restoring is not complete."""
+
+    path: Path
+
+    @classmethod
+    def of(cls, session: DriveSession) -> Mark:
+        """The mark of this drive on this line."""
+        name = f"{session.line_text}-{session.device}-{session.profile.id}"
+        safe = re.sub(r"[^A-Za-z0-9]+", "-", name)
+        return cls(state_folder() / f"restore-{safe}.json")
+
+    @property
+    def interrupted(self) -> str:
+        """What is known of a restoring that did not come to its end; else empty."""
+        try:
+            told = json.loads(self.path.read_text(encoding="utf-8"))
+            begun, of, taken = told["begun"], told["parameters"], told["set"]
+        except (OSError, ValueError, KeyError, TypeError):
+            return ""
+        return (
+            f"A restoring of {of} settings (set of {taken}) began at {begun} and did not come to"
+            " its end. The drive is read and what is missing is written."
+        )
+
+    def begin(self, source: ParameterSet, count: int) -> None:
+        """Leave the mark; a folder that cannot be written stops no restoring."""
+        told = {"begun": now_text(), "parameters": count, "set": source.head.time or "no time"}
+        try:
+            self.path.parent.mkdir(parents=True, exist_ok=True)
+            part = self.path.with_suffix(".part")
+            part.write_text(json.dumps(told), encoding="utf-8")
+            part.replace(self.path)
+        except OSError:
+            return
+
+    def end(self) -> None:
+        """Take the mark away."""
+        try:
+            self.path.unlink(missing_ok=True)
+        except OSError:
+            return

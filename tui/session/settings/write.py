@@ -1,0 +1,141 @@
+"""Writing one parameter: sent once, read back, compared, and put into the journal."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from tui.bus.errors import DeviceException, LineError, RequestRefused, Superseded
+from tui.bus.line import Priority
+from tui.drive.errors import DriveError
+from tui.drive.profile.schema import Parameter
+from tui.drive.shown import depends_on, shown_text
+from tui.drive.values import from_words, to_words
+
+from ..drive import DriveSession
+from ..journal import Entry, Journal, now_text
+from ..read.reader import Reader
+from ..work import Permit
+
+
+class NotTaken(DriveError):
+    """A write that the drive answered well and did not take: it holds something else."""
+
+
+@dataclass(frozen=True, slots=True)
+class Writer:
+    """Writes the parameters of one drive, with the permit of a task; a stop needs none."""
+
+    session: DriveSession
+    journal: Journal
+    permit: Permit | None
+
+    async def write(
+        self,
+        parameter: Parameter,
+        raw: int,
+        *,
+        why: str,
+        check: int = 0xFFFFFFFF,
+        replaceable: bool = False,
+        read_back: bool = True,
+        priority: Priority = Priority.OPERATOR_WRITE,
+    ) -> None:
+        """Write a raw value and see that the drive holds it, in the bits of `check`.
+
+        A `replaceable` one gives way to a newer value of the same parameter while it waits.
+        What the drive holds is unknown from here on until it was read back.
+
+        Raises Stopped and NotArmed, the line's errors, and NotTaken where the drive holds
+        something else.
+        """
+        session, code = self.session, parameter.code
+        if self.permit is not None:
+            self.permit.check()
+            await self._read_scale(parameter)
+        before = session.image.get(code)
+        answer, back = "ok", None
+        session.image.doubt(code)
+        try:
+            await session.line.write(
+                session.device,
+                parameter.address,
+                to_words(parameter, raw),
+                priority=priority,
+                replaceable=replaceable,
+                forbidden=self.permit.refusal if self.permit is not None else None,
+            )
+            back = await self._read_back(parameter) if read_back else None
+            if back is not None and (back ^ raw) & check & 0xFFFFFFFF:
+                answer = "holds another value"
+                raise NotTaken(
+                    f"{code}: written {self.text(parameter, raw)}, the drive holds"
+                    f" {self.text(parameter, back)}."
+                )
+        except (RequestRefused, Superseded) as error:
+            answer = str(error)
+            # never sent: what was known before still holds
+            session.image.believe(code, before)
+            raise
+        except LineError as error:
+            answer = str(error)
+            raise
+        except asyncio.CancelledError:
+            answer = "a stop came: not known whether it was taken"
+            raise
+        finally:
+            old = before.raw if before is not None else None
+            self.journal.add(self._entry(parameter, old, raw, answer, back, why))
+
+    async def _read_scale(self, parameter: Parameter) -> None:
+        """See what the parameter's scale and unit follow, so that the journal tells units."""
+        image = self.session.image
+        known = {*image.trusted, *image.lacking}
+        if unknown := [code for code in depends_on(parameter) if code not in known]:
+            await Reader(self.session).read(unknown)
+
+    async def _read_back(self, parameter: Parameter) -> int | None:
+        """What the drive holds now; None where it does not tell."""
+        if parameter.access == "w":
+            return None
+        count = len(to_words(parameter, 0))
+        try:
+            reply = await self.session.line.read(
+                self.session.device, parameter.address, count, priority=Priority.OPERATOR_WRITE
+            )
+        except DeviceException:
+            return None
+        back = from_words(parameter, reply.words)
+        self.session.image.confirm(parameter.code, back, reply.time)
+        return back
+
+    def text(self, parameter: Parameter, raw: int | None) -> str:
+        """A raw value as a person reads it; nothing for None."""
+        image = self.session.image
+        return shown_text(self.session.profile, parameter, raw, image.raws, image.lacking)
+
+    def _entry(
+        self,
+        parameter: Parameter,
+        old: int | None,
+        raw: int,
+        answer: str,
+        back: int | None,
+        why: str,
+    ) -> Entry:
+        session = self.session
+        return Entry(
+            time=now_text(),
+            line=session.line_text,
+            device=session.device,
+            profile=session.profile.id,
+            code=parameter.code,
+            address=parameter.address,
+            old_raw=old,
+            old=self.text(parameter, old),
+            new_raw=raw,
+            new=self.text(parameter, raw),
+            answer=answer,
+            read_back=back,
+            why=why,
+        )

@@ -1,0 +1,1 @@
+"""Which motors were started, on record before the frame goes out."""

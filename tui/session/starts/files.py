@@ -1,0 +1,127 @@
+"""The files behind the starts on record: written whole or not at all, and set aside if damaged."""
+
+from __future__ import annotations
+
+import errno
+import hashlib
+import logging
+import os
+import re
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+
+from .record import StartRecord
+
+log = logging.getLogger(__name__)
+
+ENDING = ".json"
+NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
+"""What file systems say that cannot flush a folder; the file itself was flushed."""
+
+
+class StartFiles:
+    """One file for each start; a drive's starts by two programs never share a file.
+
+    So no program writes over, or takes away, what another has just put down.
+    """
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+
+    def write(self, record: StartRecord, wanted: Callable[[], bool]) -> None:
+        """Put a record on the disk, flushed; not if it is no longer `wanted` at the last moment.
+
+        Raises OSError; an older record of the same start then stays as it was.
+        """
+        import msgspec
+
+        self._make_folder()
+        path = self.folder / _name(record)
+        part = path.with_suffix(".part")
+        try:
+            with part.open("wb") as file:
+                file.write(msgspec.json.format(msgspec.json.encode(record), indent=1))
+                file.flush()
+                os.fsync(file.fileno())
+            if not wanted():
+                return
+            part.replace(path)
+            sync_folder(self.folder)
+        finally:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+
+    def remove(self, unwanted: Callable[[StartRecord], bool]) -> None:
+        """Take away records, flushed; what cannot be removed is logged."""
+        removed = False
+        for path, record in self._stored():
+            if not unwanted(record):
+                continue
+            try:
+                path.unlink(missing_ok=True)
+                removed = True
+            except OSError as error:
+                log.error("the record of a start, %s, cannot be removed: %s", path, error)
+        if removed:
+            with suppress(OSError):
+                sync_folder(self.folder)
+
+    def records(self) -> list[StartRecord]:
+        """All records; damaged files are set aside and logged."""
+        return [record for _, record in self._stored()]
+
+    def _stored(self) -> Iterator[tuple[Path, StartRecord]]:
+        try:
+            paths = [path for path in self.folder.iterdir() if path.suffix == ENDING]
+        except FileNotFoundError:
+            return
+        except OSError as error:
+            log.error("the records of starts in %s cannot be read: %s", self.folder, error)
+            return
+        for path in sorted(paths):
+            if (record := _read(path)) is not None:
+                yield path, record
+
+    def _make_folder(self) -> None:
+        if not self.folder.is_dir():
+            self.folder.mkdir(parents=True, exist_ok=True)
+            sync_folder(self.folder.parent)
+
+
+def _name(record: StartRecord) -> str:
+    """A name of its own for each program's starts of a drive, with something to read in it."""
+    origin = (record.line, record.device, record.boot_id, record.pid, record.started)
+    digest = hashlib.sha256(repr(origin).encode()).hexdigest()[:12]
+    readable = re.sub(r"[^A-Za-z0-9]+", "-", record.line).strip("-")[:40]
+    return f"{readable}-{record.device}-{digest}{ENDING}"
+
+
+def _read(path: Path) -> StartRecord | None:
+    import msgspec
+
+    try:
+        return msgspec.json.decode(path.read_bytes(), type=StartRecord)
+    except FileNotFoundError:
+        return None  # its program has just removed it
+    except OSError as error:
+        log.error("the record of a start, %s, cannot be read: %s", path, error)
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        log.error("the record of a start, %s, is damaged and set aside: %s", path, error)
+        with suppress(OSError):
+            path.replace(path.with_suffix(".damaged"))
+    return None
+
+
+def sync_folder(folder: Path) -> None:
+    """Flush the names in a folder, where the system can."""
+    if os.name != "posix":
+        return
+    opened = os.open(folder, os.O_RDONLY)
+    try:
+        os.fsync(opened)
+    except OSError as error:
+        if error.errno not in NOT_SYNCED:
+            raise
+    finally:
+        os.close(opened)

@@ -1,0 +1,145 @@
+"""The starts of one line on record: put there before the run frame, taken away at standstill."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import math
+import time
+from typing import TYPE_CHECKING, Literal
+
+from tui.drive.errors import DriveError
+from tui.drive.orders import OrderRefused
+
+from .record import StartRecord, offer
+from .starts import StartNotRecorded, StartOvertaken, Starts
+
+if TYPE_CHECKING:
+    from ..drive import DriveSession
+    from ..work import Permit
+
+log = logging.getLogger(__name__)
+
+
+class StartKeeper:
+    """Knows which motors this program has started, and which an earlier one left running.
+
+    None of its methods but `begin`, `found` and `take_over` waits for the disk.
+    """
+
+    def __init__(self, program: str, starts: Starts | None = None) -> None:
+        self.unrecorded = False
+        """Whether a start that cannot be put on record is let through; a person's word."""
+        self.left_running = False
+        """Whether what is started now is meant to go on when the program ends."""
+        self._program = program
+        self._starts = starts or Starts()
+        self._begun: dict[int, StartRecord] = {}
+        self._sent: dict[int, float] = {}
+        self._left: dict[int, StartRecord] = {}
+
+    def begin(self, session: DriveSession, order: Literal["forward", "reverse"]) -> None:
+        """Put a start on the disk. Raises StartNotRecorded."""
+        record = self._starts.record(
+            session.line_text,
+            session.known_identity,
+            session.profile.id,
+            order,
+            program=self._program,
+            left_running=self.left_running,
+        )
+        self._put(session, record)
+
+    def _put(self, session: DriveSession, record: StartRecord) -> None:
+        try:
+            self._starts.begin(record)
+        except StartOvertaken:
+            raise
+        except StartNotRecorded as error:
+            if not self.unrecorded:
+                raise
+            log.warning("%s", error)
+        self._sent = {**self._sent, session.device: math.inf}
+        self._begun = {**self._begun, session.device: record}
+
+    def sent(self, session: DriveSession) -> None:
+        """The run frame went out: a standstill seen from now on ends the record."""
+        self._sent = {**self._sent, session.device: time.monotonic()}
+        self._starts.sent(session.line_text, session.device)
+
+    def standing(self, session: DriveSession, seen: float) -> None:
+        """The motor was seen at rest at a time on the monotonic clock."""
+        device = session.device
+        if device in self._begun or device in self._left:
+            self._left = {d: one for d, one in self._left.items() if d != device}
+            if self._sent.get(device, math.inf) < seen:
+                self._begun = {d: one for d, one in self._begun.items() if d != device}
+            self._starts.end(session.line_text, device, seen)
+
+    def withdraw(self, session: DriveSession) -> None:
+        """A stop was given: what an earlier program started is no longer offered.
+
+        The record of a start goes with the standstill, not with the stop: that may be lost.
+        """
+        self._left = {d: one for d, one in self._left.items() if d != session.device}
+
+    def never_sent(self, session: DriveSession) -> None:
+        """The start was refused before its run frame went out."""
+        if session.device in self._begun:
+            self._begun = {d: one for d, one in self._begun.items() if d != session.device}
+            self._starts.note_stop(session.line_text, session.device)
+
+    # What an earlier program left
+
+    def look(self, session: DriveSession) -> None:
+        """Find what an earlier program has started of this drive; reads files."""
+        found = self._starts.found(session.line_text, session.device)
+        if found is not None:
+            self._left = {**self._left, session.device: found}
+
+    def offered(self, session: DriveSession, *, runs: bool) -> str:
+        """What to tell of a motor that an earlier program has started; empty where nothing."""
+        record = self._left.get(session.device)
+        if record is None or session.commanded:
+            return ""
+        return offer(record, session.identity, runs)
+
+    def take_over(self, session: DriveSession) -> None:
+        """Put an earlier program's start on record as this program's. Raises StartNotRecorded."""
+        record = self._left.get(session.device)
+        if record is None:
+            raise NothingToTakeOver("No start of an earlier program is known of this drive.")
+        self._put(session, self._starts.taken_over(record, session.line_text, self._program))
+        self.sent(session)
+        self._left = {d: one for d, one in self._left.items() if d != session.device}
+
+    def leave(self, session: DriveSession) -> None:
+        """Note that a motor is left running on purpose. Raises StartNotRecorded."""
+        if session.device in self._begun:
+            self.left_running = True
+            self.begin(session, self._begun[session.device].order)
+            self.sent(session)
+
+    def close(self) -> None:
+        """Wait a moment for what is still to be written."""
+        self._starts.close()
+
+
+class NothingToTakeOver(DriveError):
+    """There is no motor that an earlier program has started."""
+
+
+async def record_start(
+    session: DriveSession, order: Literal["forward", "reverse"], permit: Permit
+) -> None:
+    """Put a start on record before its frame goes out, where starts are recorded.
+
+    Raises StartNotRecorded, and Stopped where a stop came meanwhile.
+    """
+    if session.starts is not None:
+        await asyncio.to_thread(session.starts.begin, session, order)
+        try:
+            permit.check()
+        except OrderRefused:
+            session.starts.never_sent(session)
+            raise

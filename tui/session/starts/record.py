@@ -1,0 +1,84 @@
+"""A motor's start as it is kept, and what it lets a later program tell of the motor."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import TYPE_CHECKING, Literal
+
+if TYPE_CHECKING:
+    from ..connect.identify import DriveIdentity
+
+
+@dataclass(frozen=True, slots=True)
+class StartRecord:
+    """A motor's start: where, which drive, by which program, when."""
+
+    line: str
+    """As it was typed; `line_key` compares."""
+    device: int
+    profile: str
+    """The id of the profile under which it was started."""
+    vendor: str
+    reference: str
+    version: str
+    name: str
+    """What the drive said of itself; empty where it said nothing."""
+    order: Literal["forward", "reverse"]
+    boot_id: str
+    pid: int
+    started: str
+    """When the program itself was started, as `Processes.started` tells it."""
+    program: str
+    """`panel`, `run` and the like."""
+    left_running: bool
+    """Whether the motor is meant to go on when the program ends."""
+    wall: str
+    """When the start was ordered: ISO with zone, to the millisecond."""
+
+    @property
+    def begun(self) -> datetime | None:
+        """When the start was ordered, in the zone of here; None if the text is no time."""
+        try:
+            return datetime.fromisoformat(self.wall).astimezone()
+        except (ValueError, OverflowError):
+            return None
+
+
+def offer(
+    record: StartRecord,
+    identity: DriveIdentity | None,
+    runs: bool,
+    now: datetime | None = None,
+) -> str:
+    """What to tell a person of a motor that a program which ended has started; empty if nothing.
+
+    Nothing where the drive does not run, or is another than the one that was started; what
+    either of them left unsaid counts as the same.
+    """
+    if not runs or (identity is not None and not _same(record, identity)):
+        return ""
+    since = _since(record.begun, now or datetime.now().astimezone())
+    if record.left_running:
+        return f"runs{since}, left running on purpose by a program that ended"
+    return f"runs{since} by a command from here, that program ended"
+
+
+def _same(record: StartRecord, identity: DriveIdentity) -> bool:
+    said = (
+        (record.vendor, identity.vendor),
+        (record.reference, identity.reference),
+        (record.version, identity.version),
+        (record.name, identity.name),
+    )
+    if identity.device != record.device or any(a and b and a != b for a, b in said):
+        return False
+    fitting = {*identity.candidates, identity.profile} - {None}
+    return not fitting or not record.profile or record.profile in fitting
+
+
+def _since(then: datetime | None, now: datetime) -> str:
+    if then is None:
+        return ""
+    then = then.astimezone(now.tzinfo)
+    return f" since {then:%H:%M}" if then.date() == now.date() else f" since {then:%Y-%m-%d %H:%M}"

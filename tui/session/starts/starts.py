@@ -1,0 +1,287 @@
+"""Starts of motors on record, so that the next program knows what this one left running.
+
+begin() before the run frame, sent() once it went out, end() at standstill, note_stop() at a stop.
+Only begin() and the found ones wait for the disk.
+"""
+
+from __future__ import annotations
+
+import logging
+import math
+import os
+import threading
+import time
+from collections import deque
+from dataclasses import dataclass, field, replace
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from tui.drive.errors import DriveError
+
+from ..connect.line_key import line_key
+from ..paths import state_folder
+from .files import StartFiles
+from .processes import Processes
+from .record import StartRecord
+
+if TYPE_CHECKING:
+    from ..connect.identify import DriveIdentity
+
+log = logging.getLogger(__name__)
+
+PATIENCE = 5.0
+"""Seconds that begin() waits for the disk; a slow memory card flushes in two."""
+OVERTAKEN = "a stop came first"
+
+Drive = tuple[str, int]
+"""A line's text and a device: one program calls one line by one text."""
+
+
+class StartNotRecorded(DriveError):
+    """A start could not be put on record, so the motor is not to be started."""
+
+    def __init__(self, device: int, folder: Path, reason: str) -> None:
+        self.device, self.folder, self.reason = device, folder, reason
+        super().__init__(
+            f"The start of drive {device} was not recorded in {folder}: {reason}. Without a record "
+            "nobody knows after a crash that the motor was started from here. Make the folder "
+            "writable, or name another one in DRIVEPANEL_STATE."
+        )
+
+
+class StartOvertaken(StartNotRecorded):
+    """A stop came while the start was being recorded: the motor is not to be started at all."""
+
+    def __init__(self, device: int, folder: Path) -> None:
+        super().__init__(device, folder, OVERTAKEN)
+        self.args = (f"A stop of drive {device} came before its start, which is not sent.",)
+
+
+@dataclass(eq=False, slots=True)
+class _Task:
+    """Work for the disk: a record to write, or with None those of a drive to remove."""
+
+    drive: Drive
+    record: StartRecord | None
+    done: threading.Event = field(default_factory=threading.Event)
+    trouble: str = ""
+    void: bool = False
+    """Nobody waits for it any more, or a stop came first: it is not to be put in its place."""
+
+
+class Starts:
+    """The starts on record; one object for each program, used from any thread.
+
+    The disk work is done in order in a thread that lives while there is some. At most one removal
+    waits for each drive, so a disk that hangs piles nothing up.
+    """
+
+    def __init__(self, folder: Path | None = None, processes: Processes | None = None) -> None:
+        self._files = StartFiles((folder or state_folder()) / "starts")
+        self._processes = processes or Processes()
+        self._changed = threading.Condition()
+        """Guards all below; never held over disk work."""
+        self._waiting: deque[_Task] = deque()
+        self._current: _Task | None = None
+        self._thread: threading.Thread | None = None
+        self._sent: dict[Drive, float] = {}
+        """Since when a standstill says that the motor stopped; never while a start is under way."""
+
+    @property
+    def folder(self) -> Path:
+        """Where the records lie."""
+        return self._files.folder
+
+    def record(
+        self,
+        line: str,
+        identity: DriveIdentity,
+        profile: str,
+        order: Literal["forward", "reverse"],
+        *,
+        program: str,
+        left_running: bool = False,
+    ) -> StartRecord:
+        """A start by this program, now; begin() puts it on the disk."""
+        return StartRecord(
+            line=line,
+            device=identity.device,
+            profile=profile,
+            vendor=identity.vendor,
+            reference=identity.reference,
+            version=identity.version,
+            name=identity.name,
+            order=order,
+            boot_id=self._processes.boot_id(),
+            pid=os.getpid(),
+            started=self._processes.started(os.getpid()) or "",
+            program=program,
+            left_running=left_running,
+            wall=datetime.now().astimezone().isoformat(timespec="milliseconds"),
+        )
+
+    def taken_over(self, found: StartRecord, line: str, program: str) -> StartRecord:
+        """The start of a program that ended, as this program's; begin() puts it on the disk."""
+        pid = os.getpid()
+        started = self._processes.started(pid) or ""
+        boot_id = self._processes.boot_id()
+        return replace(found, line=line, boot_id=boot_id, pid=pid, started=started, program=program)
+
+    def begin(self, record: StartRecord, patience: float = PATIENCE) -> None:
+        """Put a start on the disk, flushed, before its run frame goes out.
+
+        Waits for the disk, at most `patience` seconds. Raises StartNotRecorded where the run is
+        to be refused, StartOvertaken where a stop came meanwhile.
+        """
+        task = _Task((record.line, record.device), record)
+        with self._changed:
+            before = self._sent.get(task.drive, -math.inf)
+            self._sent[task.drive] = math.inf
+            self._add(task)
+        in_time = task.done.wait(patience)
+        with self._changed:
+            if not in_time and not task.done.is_set():
+                task.void, task.trouble = True, f"the disk did not answer within {patience:g} s"
+                if task in self._waiting:
+                    self._waiting.remove(task)
+            if not task.trouble:
+                return
+            if task.trouble != OVERTAKEN:
+                self._sent[task.drive] = before
+        if task.trouble == OVERTAKEN:
+            raise StartOvertaken(record.device, self.folder)
+        raise StartNotRecorded(record.device, self.folder, task.trouble)
+
+    def sent(self, line: str, device: int) -> None:
+        """The run frame went out, answered or not: a standstill seen from now on counts."""
+        with self._changed:
+            if (line, device) in self._sent:
+                self._sent[line, device] = time.monotonic()
+
+    def end(self, line: str, device: int, seen: float | None = None) -> None:
+        """The motor stands: its record goes. Returns at once and never raises.
+
+        `seen` is the monotonic time at which standstill was read, now unless given. One that was
+        read before the run frame went out is the rest before the start, and changes nothing.
+        """
+        with self._changed:
+            if (time.monotonic() if seen is None else seen) > self._sent.get(
+                (line, device), -math.inf
+            ):
+                self._take_away((line, device))
+
+    def note_stop(self, line: str, device: int) -> None:
+        """A stop went out, or a start never did: its record goes. At once, and never raises.
+
+        A start that is just being recorded is refused.
+        """
+        drive = (line, device)
+        with self._changed:
+            mine = [self._current] if self._current else []
+            for task in [*mine, *self._waiting]:
+                if task.drive == drive and task.record is not None and not task.done.is_set():
+                    task.void, task.trouble = True, OVERTAKEN
+                    task.done.set()
+            self._take_away(drive)
+
+    def found(self, line: str, device: int) -> StartRecord | None:
+        """The last start of a drive if its program ended, however the line was typed.
+
+        None where a living program, this one too, has a start of this drive on record.
+        """
+        return next((one for one in self.all_found(line) if one.device == device), None)
+
+    def all_found(self, line: str) -> list[StartRecord]:
+        """The drives of a line that programs which ended have started, by device. Reads files."""
+        key = line_key(line)
+        with self._changed:
+            tasks = [*self._waiting, *([self._current] if self._current else [])]
+        going = {
+            task.drive[1]
+            for task in tasks
+            if task.record is None and line_key(task.drive[0]) == key
+        }
+        here = [one for one in self._files.records() if line_key(one.line) == key]
+        alive = {one.device for one in here if self._lives(one)}
+        here.sort(key=lambda one: one.begun.timestamp() if one.begun else 0.0)
+        newest = {one.device: one for one in here if one.device not in alive | going}
+        return [newest[device] for device in sorted(newest)]
+
+    def close(self, timeout: float = 1.0) -> bool:
+        """Wait for what is still to be written or removed, so many seconds; False if it was not."""
+        with self._changed:
+            return self._changed.wait_for(
+                lambda: not self._waiting and self._current is None, timeout
+            )
+
+    def _take_away(self, drive: Drive) -> None:
+        self._sent.pop(drive, None)
+        for task in [task for task in self._waiting if task.drive == drive]:
+            if task.record is None:
+                self._waiting.remove(task)  # the new one does its work
+        self._add(_Task(drive, None))
+
+    def _add(self, task: _Task) -> None:
+        self._waiting.append(task)
+        if self._thread is not None:
+            return
+        try:
+            thread = threading.Thread(target=self._work, name="starts", daemon=True)
+            thread.start()
+            self._thread = thread
+        except RuntimeError as error:
+            # no thread to be had: the next call tries again, a start is refused
+            log.error("starts cannot be recorded: %s", error)
+            if task.record is not None:
+                self._waiting.remove(task)
+                task.trouble = str(error)
+                task.done.set()
+
+    def _work(self) -> None:
+        while True:
+            with self._changed:
+                self._current = self._waiting.popleft() if self._waiting else None
+                if self._current is None:
+                    self._thread = None
+                    self._changed.notify_all()
+                    return
+                task = self._current
+            trouble = self._trouble_with(task)
+            with self._changed:
+                task.trouble = task.trouble or trouble
+                task.done.set()
+
+    def _trouble_with(self, task: _Task) -> str:
+        """Do a task; what went wrong, or nothing."""
+        try:
+            if task.record is None:
+                self._remove(*task.drive)
+            elif not task.void:
+                self._files.write(task.record, lambda: not task.void)
+        except OSError as error:
+            return error.strerror or str(error)
+        except Exception as error:
+            log.exception("the starts of drive %s", task.drive)
+            return str(error)
+        return ""
+
+    def _remove(self, line: str, device: int) -> None:
+        """Remove a drive's records, but for those of other programs that live.
+
+        Such a program sees the standstill itself; here it may be the rest before its run frame.
+        """
+        key = line_key(line)
+        self._files.remove(
+            lambda one: (
+                one.device == device
+                and line_key(one.line) == key
+                and (self._own(one) or not self._lives(one))
+            )
+        )
+
+    def _own(self, record: StartRecord) -> bool:
+        return record.pid == os.getpid() and self._lives(record)
+
+    def _lives(self, record: StartRecord) -> bool:
+        return self._processes.lives(record.boot_id, record.pid, record.started)
