@@ -52,7 +52,7 @@ async def _run(size: tuple[int, int]) -> None:
     from textual.pilot import Pilot
 
     from tui.app import DrivePanelApp
-    from tui.screens.monitor import MonitorScreen
+    from tui.screens.monitor.screen import MonitorScreen
     from tui.session.connect.open_line import demo_line
 
     app = DrivePanelApp(open_line=lambda *_, **__: demo_line(DRIVES), start="demo")

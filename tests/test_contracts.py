@@ -96,11 +96,11 @@ def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> No
     done = run(sys.executable, "-c", start)
     assert done.returncode == 0, done.stderr
     loaded = set(done.stdout.split())
-    assert "tui.screens.connection" in loaded
+    assert "tui.screens.connection.screen" in loaded
     assert not loaded & {"pymodbus", "msgspec", "tui.bus.line", "tui.simulator"}
     assert not loaded & {
         "tui.session.monitor.monitor",
-        "tui.screens.monitor",
+        "tui.screens.monitor.screen",
         "tui.session.journal",
     }
     assert "tui.drive.profile.profile" not in loaded
@@ -269,8 +269,8 @@ def test_a_test_that_hangs_fails_and_the_run_goes_on(
 
 
 def test_readme_tells_every_key_and_no_other() -> None:
-    from tui.screens.action import KEY_NAMES
-    from tui.screens.actions import ACTIONS
+    from tui.screens.keys.action import KEY_NAMES
+    from tui.screens.keys.table import ACTIONS
 
     rows = README.partition("## Keys")[2].partition("\n## ")[0]
     table = re.findall(r"^\| ([^|]+) \| [^|]+ \|$", rows, re.MULTILINE)

@@ -15,21 +15,21 @@ from textual.events import Event, Key, Paste
 
 from tui.bus.errors import LineClosed
 from tui.drive.plain import plain
+from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.keys.table import bindings
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.events import EventLog
 from tui.session.paths import remember_line, state_folder
 from tui.terminal.admission import Admission
 from tui.terminal.driver import with_own_keys
 from tui.terminal.fields import takes_space
+from tui.terminal.lean import LeanApp
 from tui.terminal.names import STOP_KEYS
 from tui.terminal.stroke import stroke_of
 from tui.terminal.type_ahead import TypeAhead
 from tui.widgets.clock import Clock
-from tui.widgets.lean import LeanApp
 from tui.widgets.palette import THEME
 
-from .screens.actions import bindings
-from .screens.connection import ConnectionScreen
 from .screens.leaving import Leaving
 from .screens.places import Places
 
@@ -139,13 +139,13 @@ class DrivePanelApp(LeanApp, Places, Leaving):
     def sequence_swallowed(self, data: bytes) -> None:
         """A key came that no known terminal sends; in the thread that reads the keys."""
         if self._trying_f12:
-            from .screens.first_keys import unknown_text
+            from tui.screens.keys.first_keys import unknown_text
 
             self._from_keys(self.connection.say, unknown_text(data), "", "alarm")
 
     def _try_f12(self) -> None:
         """On the first start on a terminal, while no line is open: does F12 arrive?"""
-        from .screens.first_keys import OFFER, was_tried
+        from tui.screens.keys.first_keys import OFFER, was_tried
 
         self._trying_f12 = not self.is_headless and self._start is None and not was_tried()
         if self._trying_f12:
@@ -153,7 +153,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
 
     def _f12_arrived(self) -> None:
         """F12 came while it was tried; in the thread that reads the keys."""
-        from .screens.first_keys import ARRIVED, remember
+        from tui.screens.keys.first_keys import ARRIVED, remember
 
         self._trying_f12 = False
         remember()
@@ -368,7 +368,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
         """Open a line in a thread; closed again where the panel was left meanwhile."""
         opened = self._open(text, read_only=self.read_only, wait=CONNECT_WITHIN)
         # here, where nobody waits for a key: what the loop asks for next
-        import tui.screens.monitor
+        import tui.screens.monitor.screen
         import tui.session.fleet  # noqa: F401
 
         if self._gone:
@@ -388,7 +388,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
 
     def action_help(self) -> None:
         """Every key of the screen on top."""
-        from .screens.help import HelpScreen
+        from tui.screens.keys.help import HelpScreen
 
         if not isinstance(self.screen, HelpScreen):
             self.push_screen(HelpScreen(self.place))

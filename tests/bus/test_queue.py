@@ -7,7 +7,7 @@ import pytest
 from tui.bus.errors import LineBusy, LineClosed, Superseded
 from tui.bus.line import Priority, Timing
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
-from tui.bus.rtu.frames import Piece
+from tui.bus.result import Piece
 from tui.bus.schedule.backoff import pause
 from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, Devices
 from tui.bus.schedule.queue import Job, JobQueue

@@ -7,8 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.bus.requests import Identify, Read, Request, WriteOne
-from tui.bus.rtu.exchange import Kind, RtuExchange
-from tui.bus.rtu.frames import Piece, find_reply, pieces
+from tui.bus.result import Kind, Piece
+from tui.bus.rtu.exchange import RtuExchange
+from tui.bus.rtu.frames import find_reply, pieces
 from tui.wire.frames import frame, is_whole
 
 from .peer import honest_pdu

@@ -21,11 +21,11 @@ from tui.drive.profile import library
 from tui.drive.profile.schema import Block
 from tui.session.blocks.mapping import Force, Mapper, wire_timing
 from tui.session.blocks.user_words import load_words, read_words, save_words
-from tui.session.blocks.verdict import Verdict
 from tui.session.blocks.write import AssignmentRefused, write_assignment
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.read.reader import Reader
+from tui.session.read.verdict import Verdict
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 NO_WORDS = (UserWord(),) * COUNT

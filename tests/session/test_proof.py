@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from tests.blocks import block_of
 from tui.drive.profile import library
 from tui.drive.values import decode, type_range
-from tui.session.blocks.verdict import Verdict
 from tui.session.read.proof import Proof
+from tui.session.read.verdict import Verdict
 from tui.session.reading import Quality, Reading
 
 PROFILE = library.load("atv21")

@@ -14,7 +14,7 @@ from textual.containers import Horizontal
 from textual.widgets import DataTable, Digits, Footer, Sparkline
 
 from tui.drive.profile import library
-from tui.screens.monitor import REFRESH
+from tui.screens.monitor.screen import REFRESH
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor

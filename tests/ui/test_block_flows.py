@@ -8,16 +8,16 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input
 
-from tui.screens.blocks import BlocksScreen
-from tui.screens.connection import ConnectionScreen
-from tui.screens.control_source import ControlSourceScreen
+from tui.screens.blocks.pick_parameter import PickParameter
+from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.dialogs.pick_parameter import PickParameter
-from tui.screens.faults import FaultsScreen
-from tui.screens.frames import FramesScreen
-from tui.screens.monitor import MonitorScreen
-from tui.screens.parameters import ParametersScreen
+from tui.screens.faults.screen import FaultsScreen
+from tui.screens.frames.screen import FramesScreen
+from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.parameters.screen import ParametersScreen
 from tui.session.blocks.editor import MappingDesk
 
 from .fakes import press

@@ -12,12 +12,12 @@ from tui.drive.blocks.assignment import target
 from tui.drive.blocks.user_words import UserWord
 from tui.drive.profile import library
 from tui.drive.profile.schema import Block
-from tui.screens.blocks import BlocksScreen
+from tui.screens.blocks.screen import BlocksScreen
 from tui.session.blocks.editor import MappingDesk
 from tui.session.blocks.mapping import BlockView, Force, Slot
-from tui.session.blocks.verdict import Verdict
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
+from tui.session.read.verdict import Verdict
 from tui.session.work import Kind, Outcome
 
 from . import fakes

@@ -20,7 +20,7 @@ from textual.screen import ModalScreen, Screen
 from textual.strip import Strip
 from textual.widgets import Label
 
-from tui.widgets.lean import Shown, lean
+from tui.terminal.lean import Shown, lean
 from tui.widgets.lines import Lines, cells, runs
 
 from .bytes_per_second import compare

@@ -14,17 +14,17 @@ from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
 from tui.app import DrivePanelApp
-from tui.screens.connection import ConnectionScreen
-from tui.screens.control_source import ControlSourceScreen
+from tui.screens.command.options import OptionsScreen
+from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.leave import Leave
-from tui.screens.dialogs.options import OptionsScreen
 from tui.screens.dialogs.question import Question
-from tui.screens.faults import FaultsScreen
-from tui.screens.frames import FramesScreen
-from tui.screens.help import HelpScreen
-from tui.screens.messages import MessagesScreen
-from tui.screens.monitor import MonitorScreen
+from tui.screens.faults.screen import FaultsScreen
+from tui.screens.frames.screen import FramesScreen
+from tui.screens.keys.help import HelpScreen
+from tui.screens.messages.screen import MessagesScreen
+from tui.screens.monitor.screen import MonitorScreen
 from tui.session.command.stop import Phase
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.simulator import DriveSpec, Simulation
@@ -219,7 +219,7 @@ async def test_reference_by_steps_and_its_limit() -> None:
 async def test_what_is_typed_ahead_reaches_the_line_but_commands_nothing(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("tui.screens.run_line.SETTLED", 60.0)
+    monkeypatch.setattr("tui.screens.monitor.run_line.SETTLED", 60.0)
     async with bench("atv71") as made:
         for key, character in [("a", "a"), ("f", "f"), ("3", "3"), ("0", "0"), ("enter", "\r")]:
             made.app.post_message(Key(key, character))
@@ -308,12 +308,12 @@ def test_numbers_references_and_addresses_take_no_space() -> None:
         "edit_value": {"NumberInput"},
         "line_form": {"NumberInput"},
         "palette": {"Field"},
-        "parameters": {"Field"},
+        "screen": {"Field"},
         "pick_parameter": {"Field"},
     }
     asked = {
         ast.unparse(call.args[0]): any(keyword.arg == "number" for keyword in call.keywords)
-        for path in SOURCES.glob("*.py")
+        for path in SOURCES.rglob("*.py")
         for call in ast.walk(ast.parse(path.read_text("utf-8")))
         if isinstance(call, ast.Call) and ast.unparse(call.func) == "Ask"
     }

@@ -9,7 +9,7 @@ import pytest
 from textual.pilot import Pilot
 
 from tui.drive.profile import library
-from tui.screens.monitor import MonitorScreen
+from tui.screens.monitor.screen import MonitorScreen
 from tui.session.command.stop import Phase, Stopper, StopReport, StopSummary
 from tui.session.fleet import FoundDrive
 from tui.session.journal import Entry
@@ -179,7 +179,7 @@ def test_screens_of_commanding(
     monkeypatch.setattr(monitor.console, "read", read)
     if screen == "leave-running":
         app.fleet.keeper.commanded = [monitor.session]
-    monkeypatch.setattr("tui.screens.faults.state_folder", lambda: fakes.FOLDER)
+    monkeypatch.setattr("tui.screens.faults.screen.state_folder", lambda: fakes.FOLDER)
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(monitor)

@@ -164,7 +164,7 @@ async def test_an_error_of_the_panel_itself_leaves_one_line_and_no_traceback(
 @pytest.mark.parametrize("size", [(20, 5), (40, 12), (79, 23), (200, 60)])
 async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int, int]) -> None:
     from tui.drive.profile import library
-    from tui.screens.monitor import MonitorScreen
+    from tui.screens.monitor.screen import MonitorScreen
 
     app = fakes.app_of()
     app.opened = fakes.opened()

@@ -12,18 +12,18 @@ from textual.screen import ModalScreen
 from textual.widgets import OptionList
 
 from tui.app import DrivePanelApp
-from tui.screens.actions import ACTIONS, EVERYWHERE
-from tui.screens.blocks import BlocksScreen
-from tui.screens.connection import ConnectionScreen
-from tui.screens.control_source import ControlSourceScreen
+from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.faults import FaultsScreen
-from tui.screens.frames import FramesScreen
-from tui.screens.help import HelpScreen
-from tui.screens.messages import MessagesScreen
-from tui.screens.monitor import MonitorScreen
-from tui.screens.parameters import ParametersScreen
+from tui.screens.faults.screen import FaultsScreen
+from tui.screens.frames.screen import FramesScreen
+from tui.screens.keys.help import HelpScreen
+from tui.screens.keys.table import ACTIONS, EVERYWHERE
+from tui.screens.messages.screen import MessagesScreen
+from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.parameters.screen import ParametersScreen
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.monitor.line_watch import Keeper
 from tui.widgets.lines import Lines
@@ -239,7 +239,7 @@ async def test_only_changed_lines_are_drawn() -> None:
 async def test_nothing_is_drawn_below_the_help_and_it_is_told_that_values_stand_still(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr("tui.screens.monitor.STILL_TOLD", 0.5)
+    monkeypatch.setattr("tui.screens.monitor.screen.STILL_TOLD", 0.5)
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(120, 40)) as pilot:
         screen = await to_monitor(app, pilot, 2)

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.screens.drive_list import DriveList
-from tui.screens.found import about_drive, drive_line, next_step
+from tui.screens.connection.drive_list import DriveList
+from tui.screens.connection.found import about_drive, drive_line, next_step
 from tui.session.connect.identify import DriveIdentity
 from tui.session.fleet import FoundDrive
 

@@ -12,10 +12,10 @@ from textual.screen import ModalScreen
 from textual.widgets import Input
 
 from tui.drive.profile import library
-from tui.screens.action import Action
-from tui.screens.actions import ACTIONS, CONNECTION, EVERYWHERE, PLACES, elsewhere, line_of
-from tui.widgets.monitor_orders import order_keys
-from tui.widgets.monitor_view import Control
+from tui.screens.command.control import Control
+from tui.screens.keys.action import Action
+from tui.screens.keys.table import ACTIONS, CONNECTION, EVERYWHERE, PLACES, elsewhere, line_of
+from tui.screens.monitor.commands import order_keys
 from tui.widgets.palette import ATTENTION
 
 from . import fakes

@@ -13,12 +13,12 @@ from textual.screen import Screen
 from textual.widgets import Input
 
 from tui.app import DrivePanelApp
-from tui.screens.choices import same_line
-from tui.screens.connection_view import QUIET
+from tui.screens.connection.choices import same_line
+from tui.screens.connection.drive_list import DriveList
+from tui.screens.connection.found import State
+from tui.screens.connection.state import QUIET
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.drive_list import DriveList
-from tui.screens.found import State
-from tui.screens.monitor import MonitorScreen
+from tui.screens.monitor.screen import MonitorScreen
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.fleet import FoundDrive
 from tui.simulator import DriveSpec, Simulation

@@ -7,18 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.widgets import OptionList
 
-from tui.screens.actions import ACTIONS, EVERYWHERE
-from tui.screens.blocks import BlocksScreen
-from tui.screens.connection import ConnectionScreen
-from tui.screens.control_source import ControlSourceScreen
+from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.palette import Palette
-from tui.screens.faults import FaultsScreen
-from tui.screens.finding import BY_NAME, NOT_FOUND, WAYS, find
-from tui.screens.frames import FramesScreen
-from tui.screens.monitor import MonitorScreen
-from tui.screens.parameters import ParametersScreen
+from tui.screens.faults.screen import FaultsScreen
+from tui.screens.frames.screen import FramesScreen
+from tui.screens.keys.finding import BY_NAME, NOT_FOUND, WAYS, find
+from tui.screens.keys.table import ACTIONS, EVERYWHERE
+from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.parameters.screen import ParametersScreen
 
 from .test_command_flows import Bench, bench, told
 from .test_flows import shown, until

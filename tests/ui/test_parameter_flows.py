@@ -10,10 +10,10 @@ from textual.widgets import Input, OptionList
 
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.dialogs.edit_value import EditBits, EditNumber, PickValue
 from tui.screens.dialogs.pick_file import PickFile
-from tui.screens.monitor import MonitorScreen
-from tui.screens.parameters import ParametersScreen
+from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
+from tui.screens.parameters.screen import ParametersScreen
 
 from .fakes import press
 from .test_command_flows import Bench, bench, writes

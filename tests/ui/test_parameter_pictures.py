@@ -12,7 +12,8 @@ from rich.text import Text
 from textual.pilot import Pilot
 
 from tui.drive.profile import library
-from tui.screens.parameters import ParametersScreen
+from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.parameters.view import news_lines
 from tui.session.console import DriveConsole
 from tui.session.image import Raw
 from tui.session.settings.apply import Outcome, Result
@@ -20,7 +21,6 @@ from tui.session.settings.editor import Editor
 from tui.session.settings.favourites import Marks
 from tui.session.work import Kind
 from tui.session.work import Outcome as WorkOutcome
-from tui.widgets.parameter_view import news_lines
 
 from . import fakes
 from .test_pictures import SIZES, Compare

@@ -13,8 +13,8 @@ from textual.widgets import OptionList
 from tui.bus.errors import PortBusy
 from tui.bus.line import LineState
 from tui.drive.profile import library
-from tui.screens.connection import ConnectionScreen
-from tui.screens.monitor import MonitorScreen
+from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.monitor.screen import MonitorScreen
 from tui.session.connect.identify import DriveIdentity
 from tui.session.console import DriveConsole
 from tui.session.events import EventLog

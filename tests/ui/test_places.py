@@ -11,14 +11,11 @@ from tui.bus.line import Frame
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
-from tui.screens.actions import CONNECTION, EVERYWHERE, MONITOR, line_of, of_screen
-from tui.screens.frames import frame_line
-from tui.session.monitor.monitor import TrendPoint
-from tui.session.reading import Quality
-from tui.widgets.drawing import aligned, bar, key_line, trend
-from tui.widgets.monitor_motor import motor_lines
-from tui.widgets.monitor_orders import order_keys
-from tui.widgets.monitor_state import (
+from tui.screens.frames.screen import frame_line
+from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, line_of, of_screen
+from tui.screens.monitor.commands import order_keys
+from tui.screens.monitor.motor import motor_lines
+from tui.screens.monitor.state import (
     header,
     history_lines,
     line_lines,
@@ -26,9 +23,12 @@ from tui.widgets.monitor_state import (
     state_lines,
     status_lines,
 )
-from tui.widgets.monitor_trends import stacked_trends, trend_lines
-from tui.widgets.monitor_view import View
-from tui.widgets.monitor_words import word_lines, word_pages
+from tui.screens.monitor.trends import stacked_trends, trend_lines
+from tui.screens.monitor.view import View
+from tui.screens.monitor.words import word_lines, word_pages
+from tui.session.monitor.monitor import TrendPoint
+from tui.session.reading import Quality
+from tui.widgets.drawing import aligned, bar, key_line, trend
 from tui.widgets.palette import STOP_KEY
 
 from . import fakes

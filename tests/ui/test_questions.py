@@ -10,16 +10,16 @@ import pytest
 from textual.screen import ModalScreen
 
 from tui.drive.profile import library
-from tui.screens.blocks import BlocksScreen
-from tui.screens.control_source import ControlSourceScreen
+from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.command.options import OptionsScreen
+from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorsNow
-from tui.screens.dialogs.options import OptionsScreen
 from tui.screens.dialogs.question import Question, void_questions
-from tui.screens.help import HelpScreen
-from tui.screens.parameters import ParametersScreen
+from tui.screens.keys.help import HelpScreen
+from tui.screens.parameters.screen import ParametersScreen
 from tui.session.monitor.line_watch import Look
 from tui.session.monitor.monitor import Snapshot
 from tui.widgets.motor_now import motor_now

@@ -9,8 +9,8 @@ from decimal import Decimal
 import pytest
 
 from tui.drive.profile import library
-from tui.screens import run_line
-from tui.screens.run_line import RunLine, proposed
+from tui.screens.monitor import run_line
+from tui.screens.monitor.run_line import RunLine, proposed
 
 from . import fakes
 from .test_command_flows import Bench, bench, writes

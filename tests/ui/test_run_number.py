@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.drive.profile import library
-from tui.screens.run_line import LONGEST, STEPS, RunLine, proposed, run_lines
+from tui.screens.monitor.run_line import LONGEST, STEPS, RunLine, proposed, run_lines
 
 from . import fakes
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from tui.screens.blocks import BlocksScreen
-from tui.screens.parameters import ParametersScreen
+from tui.screens.blocks.screen import BlocksScreen
+from tui.screens.parameters.screen import ParametersScreen
 from tui.session.console import DriveConsole
 from tui.session.work import Kind
 

@@ -136,7 +136,9 @@ async def test_a_stop_voids_a_key_that_is_on_its_way_through_the_screen(
 async def test_a_first_f12_stops_before_it_is_noted(monkeypatch: pytest.MonkeyPatch) -> None:
     app = app_of()
     stamps: list[object] = []
-    monkeypatch.setattr("tui.screens.first_keys.remember", lambda: stamps.append(app.stop_stamp()))
+    monkeypatch.setattr(
+        "tui.screens.keys.first_keys.remember", lambda: stamps.append(app.stop_stamp())
+    )
     async with app.run_test():
         app._trying_f12 = True
         before = app.stop_stamp()

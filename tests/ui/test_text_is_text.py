@@ -18,17 +18,17 @@ from textual.widgets import Input
 
 from tui.app import DrivePanelApp
 from tui.drive.settings.restore_plan import Item
-from tui.screens.blocks import BlocksScreen
+from tui.screens.blocks.pick_parameter import PickParameter
+from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
-from tui.screens.dialogs.edit_value import EditNumber
 from tui.screens.dialogs.palette import Palette
-from tui.screens.dialogs.pick_parameter import PickParameter
-from tui.screens.dialogs.skipped import Skipped
-from tui.screens.faults import FaultsScreen
-from tui.screens.monitor import MonitorScreen
-from tui.screens.parameters import ParametersScreen
-from tui.widgets.lean import cells_of
+from tui.screens.faults.screen import FaultsScreen
+from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.parameters.edit_value import EditNumber
+from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.parameters.skipped import Skipped
+from tui.terminal.lean import cells_of
 from tui.widgets.plain import entry
 
 from . import fakes

@@ -10,8 +10,7 @@ from typing import Protocol
 from .errors import LineLost
 from .expectation import Expectation
 from .model import Timing
-from .rtu.exchange import Verdict
-from .rtu.frames import Piece
+from .result import Piece, Verdict
 from .tally import Tally
 from .trace import Trace
 

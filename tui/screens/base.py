@@ -14,8 +14,8 @@ from tui.terminal.fields import takes_space
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
-from .actions import elsewhere, line_of
-from .panel import Panel
+from .app_port import Panel
+from .keys.table import elsewhere, line_of
 
 
 class PanelScreen(Screen[None]):

@@ -8,8 +8,8 @@ from .base import PanelScreen
 from .dialogs.palette import Palette
 
 if TYPE_CHECKING:
-    from .finding import Found
-    from .panel import Panel
+    from .app_port import Panel
+    from .keys.finding import Found
 
 
 def open_palette(app: Panel) -> None:

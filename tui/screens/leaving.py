@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from .app_port import Panel
 from .dialogs.confirm import Confirm
 from .dialogs.leave import Choice, Leave
 from .dialogs.now import MotorsNow
-from .panel import Panel
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 
 from textual.screen import Screen
 
-from .action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
-from .panel import Panel
+from .app_port import Panel
+from .keys.action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
 
 if TYPE_CHECKING:
     from textual.widget import AwaitMount
@@ -34,7 +34,7 @@ class Places(Panel):
 
     def show_monitor(self, console: DriveConsole) -> None:
         """Show Monitor on a drive, in place of whatever is above the list of lines."""
-        from .monitor import MonitorScreen
+        from .monitor.screen import MonitorScreen
 
         log.info("watching device %s, %s", console.device, console.session.profile.id)
         self.chosen = console
@@ -60,7 +60,7 @@ class Places(Panel):
 
     def show_place(self, place: str, console: DriveConsole) -> AwaitMount | None:
         """Show a screen of a drive, above its Monitor; whoever needs it there awaits it."""
-        from .monitor import MonitorScreen
+        from .monitor.screen import MonitorScreen
 
         if place == SOURCES and not console.session.profile.data.control_sources:
             self.tell(
@@ -102,7 +102,7 @@ class Places(Panel):
 
     def action_messages(self) -> None:
         """Everything that was said."""
-        from .messages import MessagesScreen
+        from .messages.screen import MessagesScreen
 
         if not isinstance(self.screen, MessagesScreen):
             self.push_screen(MessagesScreen())
@@ -134,22 +134,22 @@ class Places(Panel):
 def _made(place: str, console: DriveConsole) -> Screen[None]:
     """A screen of a drive; each is imported when it is first looked at."""
     if place == PARAMETERS:
-        from .parameters import ParametersScreen
+        from .parameters.screen import ParametersScreen
 
         return ParametersScreen(console)
     if place == BLOCKS:
-        from .blocks import BlocksScreen
+        from .blocks.screen import BlocksScreen
 
         return BlocksScreen(console)
     if place == FAULTS:
-        from .faults import FaultsScreen
+        from .faults.screen import FaultsScreen
 
         return FaultsScreen(console)
     if place == SOURCES:
-        from .control_source import ControlSourceScreen
+        from .control.screen import ControlSourceScreen
 
         return ControlSourceScreen(console)
     assert place == FRAMES
-    from .frames import FramesScreen
+    from .frames.screen import FramesScreen
 
     return FramesScreen(console)

@@ -11,8 +11,7 @@ from tui.session.monitor.line_watch import GLANCE, Look
 from tui.session.monitor.monitor import STALE_CYCLES, Snapshot
 from tui.session.reading import Quality
 
-from .monitor_state import STATE_SIGNS, STATE_STYLES
-from .monitor_view import age_text
+from .drive_signs import STATE_SIGNS, STATE_STYLES, age_text
 from .palette import ALARM, FAINT, PLAIN, STALE, STRONG
 
 SHOWN: tuple[Quantity, ...] = ("output_frequency", "motor_current")

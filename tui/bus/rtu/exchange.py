@@ -5,43 +5,12 @@ Knows no clock and no port: fed with bytes, told of silence and of the time-out.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from enum import Enum
-
 from ..expectation import Expectation
-from .frames import Match, Piece, begins_reply, find_reply, pieces
+from ..result import Kind, Piece, Verdict
+from .frames import Match, begins_reply, find_reply, pieces
 
 NOISE = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""
-
-
-class Kind(Enum):
-    """How an exchange ended."""
-
-    REPLY = "reply"
-    EXCEPTION = "exception"
-    DAMAGED = "damaged"
-    WRONG = "wrong"
-    NOTHING = "nothing"
-    UNSURE = "unsure"
-    """One copy of the request came back: its answer, or the adapter's echo."""
-
-
-@dataclass(slots=True)
-class Verdict:
-    """The end of an exchange, with everything that was received."""
-
-    kind: Kind
-    pdu: bytes = b""
-    exception: int = 0
-    detail: str = ""
-    received: bytes = b""
-    strays: list[Piece] = field(default_factory=list)
-    """Whole frames that are neither the reply nor an echo."""
-    resynchronised: bool = False
-    """Whether the reply was found behind or between other bytes."""
-    recognised: bool = False
-    """Of damaged bytes: whether they are surely what is left of the reply."""
 
 
 class RtuExchange:

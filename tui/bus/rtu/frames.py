@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from tui.wire.frames import frame_end, is_whole
 
 from ..expectation import EXCEPTION, Expectation, exception_code, exception_extents
+from ..result import Piece
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,24 +56,6 @@ def _candidates(
         code = exception_code(function, pdu)
         if code is not None and at + length + 3 <= len(data):
             yield Match(at, at + length + 3, pdu, code)
-
-
-@dataclass(frozen=True, slots=True)
-class Piece:
-    """A stretch of received bytes: a whole frame of anybody, or bytes that form none."""
-
-    data: bytes
-    whole: bool
-
-    @property
-    def device(self) -> int:
-        """The device of a whole frame."""
-        return self.data[0]
-
-    @property
-    def pdu(self) -> bytes:
-        """Function and data of a whole frame."""
-        return self.data[1:-2]
 
 
 def pieces(data: bytes | bytearray) -> list[Piece]:

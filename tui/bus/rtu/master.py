@@ -11,8 +11,9 @@ from tui.wire.frames import MAX_FRAME, frame
 from ..errors import LineLost
 from ..link import Link, RtuTcpLink, character_time, silence
 from ..master import Outcome, Sending, Surroundings, settle
+from ..result import Kind, Verdict
 from ..transport.base import Transport
-from .exchange import Kind, RtuExchange, Verdict
+from .exchange import RtuExchange
 from .frames import pieces
 
 BABBLE = 1.0

@@ -19,8 +19,7 @@ from ..limits import STANDARD_EXCEPTIONS
 from ..master import Clock, Master, Outcome, Sending
 from ..model import Priority, Timing
 from ..requests import BROADCAST, Read
-from ..rtu.exchange import Kind
-from ..rtu.frames import Piece
+from ..result import Kind, Piece
 from ..tally import Tally
 from .patience import Devices
 from .queue import Answer, Job, JobQueue

@@ -11,7 +11,7 @@ from ..expectation import EXCEPTION, Expectation
 from ..limits import CAUTIOUS, Limits
 from ..model import DeviceState, Priority, Timing
 from ..requests import Read, WriteMany
-from ..rtu.frames import Piece
+from ..result import Piece
 from .backoff import pause
 
 RECENT = 16

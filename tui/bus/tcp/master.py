@@ -11,7 +11,7 @@ from pymodbus.pdu import DecodePDU
 from ..errors import LineLost
 from ..expectation import exception_code
 from ..master import Outcome, Sending, Surroundings, settle
-from ..rtu.exchange import Kind, Verdict
+from ..result import Kind, Verdict
 from ..transport.base import Transport
 
 HEADER = 7

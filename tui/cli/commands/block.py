@@ -139,7 +139,7 @@ async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
 
 def _status(views: list[BlockView]) -> int:
     """0 where every slot in use that can be compared brings what it stands for."""
-    from tui.session.blocks.verdict import Verdict
+    from tui.session.read.verdict import Verdict
 
     wrong = (Verdict.DIFFERS, Verdict.CHANGED, Verdict.NONE)
     for view in views:

@@ -10,7 +10,7 @@ from rich.text import Text
 from tui.widgets.palette import FAINT
 
 if TYPE_CHECKING:
-    from tui.screens.panel import Panel
+    from tui.screens.app_port import Panel
     from tui.session.drive import DriveSession
 
 MOST = 4

@@ -10,7 +10,7 @@ from textual.binding import Binding
 from textual.containers import Vertical
 from textual.widgets import Input, OptionList
 
-from tui.screens.finding import Found, find
+from tui.screens.keys.finding import Found, find
 from tui.widgets.drawing import cut
 from tui.widgets.fields import Field
 from tui.widgets.palette import FAINT, KEY, PLAIN

@@ -18,7 +18,7 @@ from tui.widgets.palette import FAINT, KEY
 from tui.widgets.plain import Plain
 
 if TYPE_CHECKING:
-    from tui.screens.panel import Panel
+    from tui.screens.app_port import Panel
 
     from .now import MotorsNow
 

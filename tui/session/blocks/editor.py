@@ -36,12 +36,12 @@ from tui.drive.settings.writable import AT_REST
 from ..drive import DriveSession
 from ..journal import Journal
 from ..monitor.monitor import Monitor, Snapshot, monitoring_codes, rates_of
+from ..read.verdict import Verdict
 from ..work import Kind, Outcome, Permit, Task
 from .exchange import exchange
 from .mapping import BlockView, Force, Mapper, wire_timing
 from .outputs import Meant, example, meant, refuse_pending, values_text
 from .user_words import load_words, read_words, save_words
-from .verdict import Verdict
 from .write import at_rest_only, write_assignment
 
 AGAIN = 1.0

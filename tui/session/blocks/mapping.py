@@ -25,8 +25,8 @@ from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 from ..drive import DriveSession
 from ..read.proof import SURE, Proof
 from ..read.retrying_reader import Asker
+from ..read.verdict import Verdict
 from ..reading import Reading
-from .verdict import Verdict
 
 MOST = 2 * SURE
 """Comparisons after which what is not proved stays so: values that are alike cannot be told."""

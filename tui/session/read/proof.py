@@ -15,8 +15,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import from_words, word_count
 
-from ..blocks.verdict import Verdict
 from ..reading import Reading
+from .verdict import Verdict
 
 SURE = 3
 """Comparisons that must speak for a parameter, and against each other one."""

@@ -6,7 +6,7 @@ import asyncio
 import logging
 import math
 import time
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Literal, Protocol
 
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
@@ -15,10 +15,36 @@ from .record import StartRecord, offer
 from .starts import StartNotRecorded, StartOvertaken, Starts
 
 if TYPE_CHECKING:
-    from ..drive import DriveSession
+    from tui.drive.profile.profile import Profile
+
+    from ..connect.identify import DriveIdentity
     from ..work import Permit
 
 log = logging.getLogger(__name__)
+
+
+class Startable(Protocol):
+    """What has to be known of a drive to put its start on record."""
+
+    device: int
+    profile: Profile
+    identity: DriveIdentity | None
+    starts: StartKeeper | None
+
+    @property
+    def line_text(self) -> str:
+        """The line as it was named."""
+        ...
+
+    @property
+    def known_identity(self) -> DriveIdentity:
+        """Who the drive is, as far as it is known."""
+        ...
+
+    @property
+    def commanded(self) -> bool:
+        """Whether this program has commanded it."""
+        ...
 
 
 class StartKeeper:
@@ -38,7 +64,7 @@ class StartKeeper:
         self._sent: dict[int, float] = {}
         self._left: dict[int, StartRecord] = {}
 
-    def begin(self, session: DriveSession, order: Literal["forward", "reverse"]) -> None:
+    def begin(self, session: Startable, order: Literal["forward", "reverse"]) -> None:
         """Put a start on the disk. Raises StartNotRecorded."""
         record = self._starts.record(
             session.line_text,
@@ -50,7 +76,7 @@ class StartKeeper:
         )
         self._put(session, record)
 
-    def _put(self, session: DriveSession, record: StartRecord) -> None:
+    def _put(self, session: Startable, record: StartRecord) -> None:
         try:
             self._starts.begin(record)
         except StartOvertaken:
@@ -62,12 +88,12 @@ class StartKeeper:
         self._sent = {**self._sent, session.device: math.inf}
         self._begun = {**self._begun, session.device: record}
 
-    def sent(self, session: DriveSession) -> None:
+    def sent(self, session: Startable) -> None:
         """The run frame went out: a standstill seen from now on ends the record."""
         self._sent = {**self._sent, session.device: time.monotonic()}
         self._starts.sent(session.line_text, session.device)
 
-    def standing(self, session: DriveSession, seen: float) -> None:
+    def standing(self, session: Startable, seen: float) -> None:
         """The motor was seen at rest at a time on the monotonic clock."""
         device = session.device
         if device in self._begun or device in self._left:
@@ -76,14 +102,14 @@ class StartKeeper:
                 self._begun = {d: one for d, one in self._begun.items() if d != device}
             self._starts.end(session.line_text, device, seen)
 
-    def withdraw(self, session: DriveSession) -> None:
+    def withdraw(self, session: Startable) -> None:
         """A stop was given: what an earlier program started is no longer offered.
 
         The record of a start goes with the standstill, not with the stop: that may be lost.
         """
         self._left = {d: one for d, one in self._left.items() if d != session.device}
 
-    def never_sent(self, session: DriveSession) -> None:
+    def never_sent(self, session: Startable) -> None:
         """The start was refused before its run frame went out."""
         if session.device in self._begun:
             self._begun = {d: one for d, one in self._begun.items() if d != session.device}
@@ -91,20 +117,20 @@ class StartKeeper:
 
     # What an earlier program left
 
-    def look(self, session: DriveSession) -> None:
+    def look(self, session: Startable) -> None:
         """Find what an earlier program has started of this drive; reads files."""
         found = self._starts.found(session.line_text, session.device)
         if found is not None:
             self._left = {**self._left, session.device: found}
 
-    def offered(self, session: DriveSession, *, runs: bool) -> str:
+    def offered(self, session: Startable, *, runs: bool) -> str:
         """What to tell of a motor that an earlier program has started; empty where nothing."""
         record = self._left.get(session.device)
         if record is None or session.commanded:
             return ""
         return offer(record, session.identity, runs)
 
-    def take_over(self, session: DriveSession) -> None:
+    def take_over(self, session: Startable) -> None:
         """Put an earlier program's start on record as this program's. Raises StartNotRecorded."""
         record = self._left.get(session.device)
         if record is None:
@@ -113,7 +139,7 @@ class StartKeeper:
         self.sent(session)
         self._left = {d: one for d, one in self._left.items() if d != session.device}
 
-    def leave(self, session: DriveSession) -> None:
+    def leave(self, session: Startable) -> None:
         """Note that a motor is left running on purpose. Raises StartNotRecorded."""
         if session.device in self._begun:
             self.left_running = True
@@ -130,7 +156,7 @@ class NothingToTakeOver(DriveError):
 
 
 async def record_start(
-    session: DriveSession, order: Literal["forward", "reverse"], permit: Permit
+    session: Startable, order: Literal["forward", "reverse"], permit: Permit
 ) -> None:
     """Put a start on record before its frame goes out, where starts are recorded.
 

@@ -1,7 +1,6 @@
-"""Words of the Altivar 31, 312 and 71 beside the status word: keypad state, records of faults.
+"""Words of the Altivar 31, 312 and 71 beside the status word: keypad state and marks.
 
-Source: ATV71 communication parameters list (HMIS, LRS1, LRS8, CNFS, DP0 and its record);
-ATV312 communication variables (EP1 to EP4).
+Source: ATV71 communication parameters list (HMIS, LRS1, LRS8, CNFS).
 """
 
 from __future__ import annotations
@@ -11,18 +10,6 @@ from collections.abc import Mapping
 from ..body import Body
 from ..plant.motor import Stop
 
-RECORDED: Mapping[str, str] = {
-    "EP": "ETA",
-    "IP": "ETI",
-    "CMP": "CMD",
-    "ULP": "ULN",
-    "LCP": "LCR",
-    "RFP": "RFR",
-    "THP": "THR",
-    "RTP": "RTH",
-}
-"""Beginnings of the codes of a fault's record, and the word that each keeps; 0 is the last."""
-RECORDS = 9
 VOLTAGES: Mapping[float, int] = {230.0: 4, 400.0: 6, 575.0: 8}
 """Raw values of VCAL on three phases, by the voltage of the motor in V."""
 
@@ -36,27 +23,6 @@ VOLTAGES: Mapping[float, int] = {230.0: 4, 400.0: 6, 575.0: 8}
     8,
     23,
 )
-
-
-class FaultRecords:
-    """What the drive did when its last faults came, the last first."""
-
-    def __init__(self, body: Body) -> None:
-        self._body = body
-        self._records: list[dict[str, int]] = []
-
-    def take(self) -> None:
-        """Keep the words of this moment as the record of a fault."""
-        registers = self._body.registers
-        record = {
-            start: registers.present(parameter)
-            for start, code in RECORDED.items()
-            if (parameter := registers.named(code))
-        }
-        self._records = [record, *self._records][:RECORDS]
-        for number, kept in enumerate(self._records):
-            for start, raw in kept.items():
-                self._body.show_code(f"{start}{number}", raw)
 
 
 def keypad_state(body: Body, stop: Stop | None, *, disabled: bool) -> int:

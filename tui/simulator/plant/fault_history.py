@@ -5,8 +5,8 @@ from __future__ import annotations
 from tui.drive.profile.profile import Profile
 
 from ..body import ActiveFault, Body
-from ..charts.altivar_words import FaultRecords
 from ..errors import SimulatorError
+from .fault_records import FaultRecords
 
 
 def fault_raw(profile: Profile, fault: str | int) -> int:

@@ -1,0 +1,53 @@
+"""How an exchange on the line ended, whatever the line is made of."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import Enum
+
+
+@dataclass(frozen=True, slots=True)
+class Piece:
+    """A stretch of received bytes: a whole frame of anybody, or bytes that form none."""
+
+    data: bytes
+    whole: bool
+
+    @property
+    def device(self) -> int:
+        """The device of a whole frame."""
+        return self.data[0]
+
+    @property
+    def pdu(self) -> bytes:
+        """Function and data of a whole frame."""
+        return self.data[1:-2]
+
+
+class Kind(Enum):
+    """How an exchange ended."""
+
+    REPLY = "reply"
+    EXCEPTION = "exception"
+    DAMAGED = "damaged"
+    WRONG = "wrong"
+    NOTHING = "nothing"
+    UNSURE = "unsure"
+    """One copy of the request came back: its answer, or the adapter's echo."""
+
+
+@dataclass(slots=True)
+class Verdict:
+    """The end of an exchange, with everything that was received."""
+
+    kind: Kind
+    pdu: bytes = b""
+    exception: int = 0
+    detail: str = ""
+    received: bytes = b""
+    strays: list[Piece] = field(default_factory=list)
+    """Whole frames that are neither the reply nor an echo."""
+    resynchronised: bool = False
+    """Whether the reply was found behind or between other bytes."""
+    recognised: bool = False
+    """Of damaged bytes: whether they are surely what is left of the reply."""

@@ -1,0 +1,1 @@
+"""Scanner and blocks: the screen, its keys, what it draws."""

@@ -1,0 +1,175 @@
+"""Keys of the Blocks screen beside its tables: files, user words, writing through outputs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+from tui.drive.blocks.assignment import no_blocks
+from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, word_named
+from tui.drive.errors import DriveError
+from tui.session.blocks.editor import MappingDesk
+
+from ..command.arming import Arming
+from ..dialogs.files import fault_of_new
+
+
+class BlockKeys(Arming):
+    """What these keys do; the desk does the work."""
+
+    @property
+    def desk(self) -> MappingDesk:
+        """What is known and proposed."""
+        return self.console.blocks
+
+    def _try(self, work: Callable[[], None]) -> None:
+        self.passed = self.desk.said
+        try:
+            work()
+        except DriveError as refused:
+            self.desk.refuse(str(refused))
+        self.look()
+
+    def _refuse(self, text: str) -> None:
+        self.desk.refuse(text)
+        self.look()
+
+    def action_exchange(self) -> None:
+        """Write values through the outputs."""
+        from ..dialogs.ask import Ask
+
+        desk = self.desk
+        if not self._armed():
+            self._refuse("Not armed: a arms this drive.")
+            return
+
+        try:
+            about = f"CODE=VALUE for one or more output slots in use, as now {desk.example()}"
+        except DriveError as refused:
+            self._refuse(str(refused))
+            return
+
+        def wrong(text: str) -> str:
+            try:
+                desk.meant(text)
+            except DriveError as refused:
+                return str(refused)
+            return ""
+
+        def given(text: str | None) -> None:
+            if not text:
+                return
+            try:
+                agreed = desk.meant(text)
+            except DriveError as refused:
+                self._refuse(str(refused))
+                return
+
+            question = "Write through the outputs?"
+            work = partial(desk.exchange, agreed)
+            self._ask(question, agreed.follows, "writes, read back", "writes nothing", work)
+
+        asked = Ask("Write through the outputs", wrong, about=about, takes="goes on to a question")
+        self.app.push_screen(asked, given)
+
+    # Files and user words
+
+    def action_save_file(self) -> None:
+        """Ask for a file, and save what is proposed, else today's assignment."""
+        from ..dialogs.ask import Ask
+
+        plans = [p for block in self.desk.blocks if (p := self.desk.proposed(block))]
+        if not plans:
+            self._refuse("Nothing was read yet that could be saved.")
+            return
+
+        def given(name: str | None) -> None:
+            if name:
+                self._try(lambda: self._save(Path(name).expanduser()))
+
+        proposed = f"{self.session.profile.id}-{self.session.device}-blocks.toml"
+        about = "The assignment shown, proposals included; one slot a line (TOML)."
+        text = str(Path.cwd() / proposed)
+        asked = Ask("Save to", fault_of_new, text=text, about=about, takes="writes the file")
+        self.app.push_screen(asked, given)
+
+    def _save(self, path: Path) -> None:
+        from tui.drive.blocks.file import dumps
+        from tui.drive.settings.set_file import write_file
+
+        desk, profile = self.desk, self.session.profile
+        plans = [plan for block in desk.blocks if (plan := desk.proposed(block))]
+        note = f"{profile.name}, device {self.session.device}, {self.session.line_text}"
+        write_file(path, dumps(profile, plans, note))
+        self.app.notify(f"Saved: {path}", timeout=5)
+
+    def action_load_file(self) -> None:
+        """Choose a file, and propose what it holds."""
+        from tui.session.paths import state_folder
+
+        from ..dialogs.pick_file import PickFile
+
+        if not self.desk.blocks:
+            self._refuse(no_blocks(self.session.profile))
+            return
+
+        def given(name: str | None) -> None:
+            if name:
+                self._try(lambda: self._load(Path(name).expanduser()))
+
+        question = "Open an assignment: it is proposed, not written"
+        self.app.push_screen(PickFile(question, [], [Path.cwd(), state_folder()]), given)
+
+    def _load(self, path: Path) -> None:
+        from tui.drive.blocks.assignment import MappingError
+        from tui.drive.blocks.file import loads
+
+        try:
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise MappingError(f"{path} cannot be read: {error}.") from error
+        for plan in loads(text, path.name, self.session.profile).values():
+            self.desk.propose(plan)
+
+    def action_words(self) -> None:
+        """Choose the four user words."""
+        from ..dialogs.ask import Ask
+
+        profile = self.session.profile
+
+        def wrong(text: str) -> str:
+            try:
+                self._words_typed(text)
+            except DriveError as refused:
+                return str(refused)
+            return ""
+
+        def given(text: str | None) -> None:
+            if text is not None:
+                self.desk.assign_words(self._words_typed(text))
+                self.look()
+
+        def spelled(word: UserWord) -> str:
+            parameter = profile.at(word.address) if word.address else None
+            name = parameter.code if parameter else f"W{word.address}"
+            return f"{name if word.address else 'none'} {word.format}"
+
+        about = (
+            "Four, with commas between: a code or address and hex, signed or unsigned."
+            " -----: not assigned, not known to the drive, or protected."
+        )
+        text = ", ".join(spelled(word) for word in self.desk.words)
+        self.app.push_screen(Ask("User words", wrong, text=text, about=about), given)
+
+    def _words_typed(self, text: str) -> UserWords:
+        """Four words from `LCR signed, W7121 hex, none`; raises DriveError."""
+        found: list[UserWord] = []
+        for part in text.split(",")[:COUNT]:
+            name, _, format = part.strip().partition(" ")
+            found.append(
+                word_named(
+                    self.session.profile, name or "none", format_named(format.strip() or "hex")
+                )
+            )
+        return (*found, *(UserWord(),) * (COUNT - len(found)))

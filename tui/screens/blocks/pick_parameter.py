@@ -1,0 +1,104 @@
+"""A dialog that picks what a slot stands for: a list that filters as one types."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.widgets import Input, OptionList
+
+from tui.drive.blocks.assignment import choices
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import Block, Parameter
+from tui.widgets.drawing import cut
+from tui.widgets.fields import Field
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.plain import Plain, entry
+
+from ..dialogs.question import Question, hint
+
+MOST = 100
+"""Parameters that are listed at once; a search brings the others."""
+NAME_WIDTH = 30
+KEYS = hint(("Up, Down", "choose"), ("Enter", "proposes it"), ("Esc", "proposes nothing"))
+
+
+class PickParameter(Question[str | None]):
+    """Gives the code of a parameter back, `none`, or None when it was left."""
+
+    BINDINGS: ClassVar = [
+        Binding("up", "step(-1)", "up", show=False, priority=True),
+        Binding("down", "step(1)", "down", show=False, priority=True),
+    ]
+
+    def __init__(self, profile: Profile, block: Block, slot: str) -> None:
+        super().__init__()
+        self._profile, self._block, self._slot = profile, block, slot
+        self._found: list[Parameter] = []
+
+    def compose(self) -> ComposeResult:
+        """A search, and what it finds."""
+        with Vertical(id="dialog"):
+            yield Plain(f"{self._slot} stands for", id="question")
+            yield Field(placeholder="code, number, address or name", id="search")
+            yield OptionList(id="choices", compact=True)
+            yield Plain("", id="count")
+            yield Plain(KEYS, id="hint")
+
+    def on_mount(self) -> None:
+        """Everything that the slot can stand for."""
+        options = self.query_one(OptionList)
+        options.can_focus = False
+        self._list("")
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """Fewer, as more is typed."""
+        self._list(event.value)
+
+    def _list(self, search: str) -> None:
+        every = choices(self._profile, self._block, search)
+        self._found = every[:MOST]
+        options = self.query_one(OptionList)
+        options.clear_options()
+        lines = [self._line(parameter) for parameter in self._found]
+        unused = [] if search else [Text(" none      the slot is unused", FAINT)]
+        options.add_options([entry(line) for line in (*unused, *lines)])
+        options.highlighted = 0 if options.option_count else None
+        more = f", the first {MOST} shown" if len(every) > MOST else ""
+        text = f"{len(every)} fit{more}" if every else "Nothing fits; clear some letters."
+        self.query_one("#count", Plain).update(text)
+
+    def _line(self, parameter: Parameter) -> Text:
+        text = Text(no_wrap=True)
+        sure = is_verified(parameter)
+        text.append(f" {parameter.code + ('' if sure else '?'):<9} ", STRONG if sure else ALARM)
+        text.append(cut(parameter.name, NAME_WIDTH), PLAIN)
+        text.append(f" {parameter.number:<8} 16#{parameter.address:04X}", FAINT)
+        return text
+
+    def action_step(self, step: int) -> None:
+        """Another one of the list."""
+        options = self.query_one(OptionList)
+        if options.option_count:
+            at = (options.highlighted or 0) + step
+            options.highlighted = min(max(0, at), options.option_count - 1)
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Take the one that is marked."""
+        at = self.query_one(OptionList).highlighted
+        self._take(at, searched=bool(event.value))
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Take the one that was clicked."""
+        self._take(event.option_index, searched=bool(self.query_one(Input).value))
+
+    def _take(self, at: int | None, *, searched: bool) -> None:
+        if at is None:
+            return
+        if not searched and at == 0:
+            self.answer("none")
+            return
+        self.answer(self._found[at if searched else at - 1].code)

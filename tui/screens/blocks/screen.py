@@ -1,0 +1,232 @@
+"""Blocks: what the slots of an indirect block or scanner bring, proposed, written, compared."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Horizontal
+
+from tui.drive.blocks.assignment import describe, no_blocks, refusing
+from tui.drive.profile.schema import Block
+from tui.screens.blocks.view import (
+    WIDE,
+    cost_lines,
+    detail_lines,
+    stretch_lines,
+    table_lines,
+    word_lines,
+)
+from tui.session.console import DriveConsole
+from tui.widgets.drawing import armed_text, rule, wrapped
+from tui.widgets.lines import Lines
+from tui.widgets.palette import ALARM, ATTENTION, FAINT
+
+from ..command.news import news
+from ..keys.table import BLOCKS, bindings
+from .block_keys import BlockKeys
+
+BELOW = 16
+"""Lines that are no slots: title, headings, details, cost, words, message, keys."""
+
+
+class BlocksScreen(BlockKeys):
+    """Two tables side by side; the desk reads, and writes when it is told so."""
+
+    CSS_PATH = "blocks.tcss"
+    BINDINGS: ClassVar = bindings(BLOCKS)
+    TITLE = "Blocks"
+    LOOK = 0.25
+    AUTO_FOCUS = ""
+
+    def __init__(self, console: DriveConsole) -> None:
+        super().__init__()
+        self.console = console
+        self.session = console.session
+        self._side = 0
+        self._at = 0
+
+    @property
+    def _block(self) -> Block | None:
+        blocks = self.desk.blocks
+        return blocks[self._side % len(blocks)] if blocks else None
+
+    def compose(self) -> ComposeResult:
+        """Title, tables, details, cost, user words, news, keys."""
+        yield Lines(id="title")
+        with Horizontal(id="tables"):
+            yield Lines(id="first")
+            yield Lines(id="second")
+        yield Lines(id="detail")
+        yield Lines(id="cost")
+        yield Lines(id="words")
+        yield Lines(id="message")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Begin to look."""
+        if not self.desk.blocks:
+            for id in ("#second", "#detail", "#cost"):
+                self.query_one(id).display = False
+        self.desk.start()
+
+    def on_unmount(self) -> None:
+        """Look no more; what is proposed stays."""
+        self.desk.stop()
+
+    def draw(self, width: int) -> None:
+        """The desk's state, and what it has come to."""
+        super().draw(width)
+        self.put("title", [self._title(width)])
+        self.put("words", word_lines(self.desk, self.desk.words, width))
+        self.put("message", self._message(width))
+        if self.desk.blocks:
+            self._show_tables(width)
+        else:
+            self._show_neighbours(width - 1)  # the table's margin
+
+    def _show_tables(self, width: int) -> None:
+        desk, block = self.desk, self._block
+        assert block is not None
+        each = (width - 1) // 2
+        most = max(len(b.slots) for b in desk.blocks)
+        double = width >= WIDE and self.size.height - BELOW >= 2 * most
+        for place, one in zip(("first", "second"), desk.blocks, strict=False):
+            at = self._at if one is block else None
+            self.put(place, table_lines(desk, one, each, at, double=double))
+        detail = [rule("Slot", width), *detail_lines(desk, block, self._at, width)]
+        self.put("detail", detail)
+        self.put("cost", cost_lines(desk, block, desk.saving(), width))
+
+    def _show_neighbours(self, width: int) -> None:
+        why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
+        head = rule("Neighbours of the monitoring set, one request each", width)
+        room = max(3, self.size.height - len(why) - 8)
+        found = stretch_lines(self.desk, self.desk.stretches(), width, room)
+        self.put("first", [*why, Text(""), head, *found])
+
+    def _title(self, width: int) -> Text:
+        title = rule(
+            f"Blocks · {self.session.profile.name} · device {self.session.device}", width - 12
+        )
+        return title.append_text(armed_text(self.commander.armed_for))
+
+    def _message(self, width: int) -> list[Text]:
+        desk, now = self.desk, self.app.clock.monotonic()
+        text, style = "", FAINT
+        if told := news(desk.said, now, busy=desk.busy, passed=self.passed):
+            text, style = told
+        elif desk.trouble:
+            text, style = desk.trouble, ALARM
+        elif count := sum(len(desk.changes(block)) for block in desk.blocks):
+            text, style = f"{count} slots proposed otherwise: w writes them, u drops.", ATTENTION
+        elif why := self.session.arming.why_disarmed:
+            text = why
+        lines = [Text(f" {line}", style) for line in wrapped(text, width - 2, 2)]
+        return [*lines, Text(""), Text("")][:2]
+
+    # Keys that move
+
+    def action_move(self, step: int) -> None:
+        """Another slot."""
+        if (block := self._block) is not None:
+            self._at = min(max(0, self._at + step), len(block.slots) - 1)
+        self.look()
+
+    def action_other_table(self) -> None:
+        """The other table."""
+        if self.desk.blocks:
+            self._side = (self._side + 1) % len(self.desk.blocks)
+        self.action_move(0)
+
+    # Keys that propose
+
+    def action_pick(self) -> None:
+        """Choose what the slot stands for."""
+        from .pick_parameter import PickParameter
+
+        block, place = self._block, self._at
+        if block is None:
+            self._refuse(no_blocks(self.session.profile))
+            return
+
+        def told(code: str | None) -> None:
+            if code is not None:
+                self._try(lambda: self.desk.pick(block, place, code))
+
+        slot = block.slots[place]
+        self.app.push_screen(PickParameter(self.session.profile, block, slot), told)
+
+    def action_shift(self, step: int) -> None:
+        """Move the slot's content."""
+        block, place = self._block, self._at
+        if block is not None and 0 <= place + step < len(block.slots):
+            self._try(lambda: self.desk.move(block, place, step))
+            self.action_move(step)
+
+    def action_clear(self) -> None:
+        """Propose the slot unused."""
+        if (block := self._block) is not None:
+            self._try(lambda: self.desk.clear(block, self._at))
+
+    def action_factory(self) -> None:
+        """Propose every slot as it left the factory."""
+
+        def work() -> None:
+            for block in self.desk.blocks:
+                self.desk.factory(block)
+
+        self._try(work)
+
+    def action_undo(self) -> None:
+        """Propose nothing."""
+        self.desk.drop()
+        self.look()
+
+    # Keys that write
+
+    def action_verify(self) -> None:
+        """Compare every slot several times."""
+        if self.desk.blocks:
+            self.desk.verify()
+        self.look()
+
+    def action_write(self) -> None:
+        """Say what follows, and write it."""
+        desk = self.desk
+        todo = {block.id: block for block in desk.blocks if desk.changes(block)}
+        if not todo:
+            self._refuse("Nothing is proposed: Enter picks what the slot stands for.")
+            return
+        wrong = [p.text for block in todo.values() for p in refusing(desk.problems(block))]
+        wrong += [text for block in todo.values() if (text := desk.not_now(block))]
+        if wrong:
+            self._refuse(wrong[0])
+            return
+        if not self._armed_or_told():
+            return
+
+        count = sum(len(desk.changes(block)) for block in todo.values())
+        yes, no = "writes, each slot read back", "writes nothing"
+        self._ask(f"Write {count} slots?", self._follows(), yes, no, desk.write)
+
+    def _follows(self) -> str:
+        """What would be written, and what that means for others."""
+        profile, lines, told = self.session.profile, [], []
+        for block in self.desk.blocks:
+            found = self.desk.changes(block)
+            lines += [
+                f"{c.slot}: {describe(profile, block, c.old)} → {describe(profile, block, c.new)}"
+                for c in found
+            ]
+            if found and block.effective == "after-reset":
+                told.append("It counts after the drive's next reset or switch-on.")
+            if found and any(profile[s].storage == "ram-until-saved" for s in block.slots):
+                told.append("Lost at power-off until saved (S).")
+            if found and block.direction == "write":
+                told.append("What a master writes to these outputs goes elsewhere from then on.")
+        told.append(
+            "Another master on this line may rely on today's assignment: its program must follow."
+        )
+        return "\n".join([*lines[:8], *([" …"] if len(lines) > 8 else []), "", *told])

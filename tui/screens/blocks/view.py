@@ -1,0 +1,270 @@
+"""Blocks and scanner in lines of text: the slots, one slot's details, what it costs, the frame."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.drive.blocks.assignment import Assignment, describe, target
+from tui.drive.blocks.user_words import UserWords
+from tui.drive.blocks.wire_cost import Saving, Stretch, frame, microseconds, together
+from tui.drive.profile.profile import is_verified
+from tui.drive.profile.schema import Block, Parameter
+from tui.drive.values import NOT_AVAILABLE
+from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.mapping import BlockView, Force, Slot, wire_timing
+from tui.session.read.verdict import Verdict
+from tui.widgets.drawing import cut, rule, wrapped
+from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG
+from tui.wire.frames import hex_text
+
+BOTH = 50
+"""Columns of a table from which the direct value stands in it too."""
+WIDE = 110
+"""Columns from which each slot takes two lines."""
+VERDICT_STYLES = {
+    Verdict.SAME: FAINT,
+    Verdict.MOVING: FAINT,
+    Verdict.DIFFERS: FAULT,
+    Verdict.CHANGED: ALARM,
+    Verdict.NONE: ALARM,
+    Verdict.UNUSED: FAINT,
+    Verdict.UNREAD: FAINT,
+}
+SHORT = {
+    Verdict.CHANGED: "changed",
+    Verdict.NONE: "no val",
+    Verdict.UNREAD: "-",
+    Verdict.UNUSED: "",
+}
+"""Verdicts in few characters."""
+
+
+def table_lines(
+    desk: MappingDesk, block: Block, width: int, at: int | None, *, double: bool
+) -> list[Text]:
+    """The slots of one block under its heading; `at` is the place of the cursor, if it is here."""
+    view = desk.views.get(block.id)
+    plan = desk.plans.get(block.id)
+    through = "through the block" if block.direction == "read" else "last written"
+    right = "proposed" if plan else f"{through} · direct" if width >= BOTH else ""
+    lines = [rule(block.name, width, right)]
+    for place, code in enumerate(block.slots):
+        slot = view.slots[place] if view else Slot(code, None)
+        raw = plan.raws[place] if plan else None
+        lines.append(_slot_line(desk, block, slot, raw, width, chosen=place == at))
+        if double:
+            lines.append(_second_line(desk, block, slot, raw, width))
+    return lines
+
+
+def _slot_line(
+    desk: MappingDesk, block: Block, slot: Slot, proposed: int | None, width: int, *, chosen: bool
+) -> Text:
+    profile = desk.session.profile
+    text = Text(no_wrap=True, style=CURSOR if chosen else Style())
+    text.append("▸" if chosen else " ", STRONG)
+    text.append(f"{slot.code:<5}", STRONG if chosen else PLAIN)
+    used = slot.raw not in (0, None)
+    stands = describe(profile, block, slot.raw)
+    if used and slot.parameter is None:
+        stands = f"{slot.raw}?"
+    text.append(cut(stands, 9 if width < BOTH else 12), PLAIN if used else FAINT)
+    changed = proposed is not None and proposed != slot.raw
+    if changed:
+        text.append(cut(f" → {describe(profile, block, proposed)}", 12), ATTENTION)
+        room = width - text.cell_len
+        text.append(f"{slot.text if used else '':>{max(0, min(14, room - 1))}}", FAINT)
+        return _filled(text, width)
+    room = width - text.cell_len
+    both = width >= BOTH
+    verdict, style = _verdict(block, slot)
+    value_room = max(4, (room - 9) // 2 if both else room - 9)
+    values = [slot.text, slot.direct_text] if both else [slot.text]
+    if block.direction == "write" and not both:
+        values, verdict = [slot.direct_text], verdict or "direct"
+    for place, value in enumerate(values):
+        shown = cut(value, value_room).rstrip() if used else ""
+        text.append(f"{shown:>{value_room}}", FAINT if place else PLAIN)
+    text.append(f" {verdict if used else '':<8}", style)
+    return _filled(text, width)
+
+
+def _verdict(block: Block, slot: Slot) -> tuple[str, Style]:
+    """The verdict in few characters; what was last written through an output is none."""
+    if slot.force is Force.PENDING:
+        return "pending", ALARM
+    if block.direction == "write" and slot.verdict not in (Verdict.CHANGED, Verdict.NONE):
+        return "", FAINT
+    return SHORT.get(slot.verdict, str(slot.verdict)), VERDICT_STYLES[slot.verdict]
+
+
+def _filled(text: Text, width: int) -> Text:
+    text.truncate(width)
+    text.append(" " * max(0, width - text.cell_len))
+    return text
+
+
+def _second_line(
+    desk: MappingDesk, block: Block, slot: Slot, proposed: int | None, width: int
+) -> Text:
+    """The three notations and the name, dim, under a slot."""
+    raw = slot.raw if proposed is None else proposed
+    parameter = target(desk.session.profile, block, raw) if raw else None
+    text = Text("      ", no_wrap=True)
+    if parameter is not None:
+        text.append(f"{notation_text(parameter)}  {parameter.name}", FAINT)
+    text.truncate(width, overflow="ellipsis")
+    return text
+
+
+def notation_text(parameter: Parameter) -> str:
+    """The manual's number, the wire address in hexadecimal and in decimal."""
+    hexadecimal = f"16#{parameter.address:04X}"
+    number = "" if parameter.number == hexadecimal else f"{parameter.number}  "
+    return f"{number}{hexadecimal}  {parameter.address}"
+
+
+def detail_lines(desk: MappingDesk, block: Block, place: int, width: int) -> list[Text]:
+    """The slot under the cursor, in four lines."""
+    view, plan = desk.views.get(block.id), desk.proposed(block)
+    code = block.slots[place]
+    if view is None or plan is None:
+        trouble = (view.trouble if view else "") or desk.trouble or "reading the slots"
+        return [Text(f" {trouble}", ALARM if view or desk.trouble else FAINT), *[Text("")] * 3]
+    slot, raw = view.slots[place], plan.raws[place]
+    parameter = target(desk.session.profile, block, raw)
+    own = desk.session.profile[code]
+    first = Text(f" {code}", STRONG)
+    first.append(f"  {notation_text(own)}", FAINT)
+    first.append("  stands for ", FAINT)
+    if parameter is None:
+        first.append(describe(desk.session.profile, block, raw), PLAIN)
+        return [first, *_remarks(desk, view, slot, code, width), *[Text("")] * 3][:4]
+    first.append(f"{parameter.code}{'' if is_verified(parameter) else '?'}", STRONG)
+    first.append(f"  {parameter.name}", PLAIN)
+    second = Text(f" {notation_text(parameter)}", PLAIN)
+    second.append(f"   unit {parameter.unit or '-'}", FAINT)
+    if raw == slot.raw:
+        through = "through the block" if block.direction == "read" else "last written"
+        second.append(f"   {through} ", FAINT)
+        second.append(slot.text, STRONG)
+        second.append("   direct ", FAINT)
+        second.append(slot.direct_text, PLAIN)
+    for line in (first, second):
+        line.truncate(width, overflow="ellipsis")
+    rest = _remarks(desk, view, slot, code, width)
+    return [first, second, *rest, Text(""), Text("")][:4]
+
+
+def _remarks(desk: MappingDesk, view: BlockView, slot: Slot, code: str, width: int) -> list[Text]:
+    """Verdict, force and problems of a slot, each a sentence."""
+    found = [(p.text, ALARM) for p in desk.problems(view.block) if p.slot == code]
+    if view.block.effective == "after-reset" and slot.raw:
+        found.append((_force_text(slot), ALARM if slot.force is Force.PENDING else FAINT))
+    elif view.block.direction == "read" and slot.verdict not in (Verdict.UNUSED, Verdict.UNREAD):
+        found.append((f"Compared with direct reads: {slot.verdict}.", VERDICT_STYLES[slot.verdict]))
+    if view.trouble:
+        found.append((view.trouble, ALARM if view.block.direction == "read" else FAINT))
+    text = [(line, style) for told, style in found for line in wrapped(told, width - 2, 2)]
+    return [Text(f" {line}", style) for line, style in text[:2]]
+
+
+def _force_text(slot: Slot) -> str:
+    """Whether a slot of an indirect block counts already, and how that is known."""
+    if slot.force is Force.ACTIVE:
+        return "Active: only this parameter can have brought that value; it cannot be read."
+    if slot.force is Force.PENDING:
+        brings = f"; until then it brings {slot.brings}" if slot.brings else ""
+        return f"Pending: it counts after the drive's next reset or switch-on{brings}."
+    return "Configured; whether it counts already cannot be read nor told by values of now."
+
+
+def cost_lines(desk: MappingDesk, block: Block, saving: Saving | None, width: int) -> list[Text]:
+    """What a monitoring cycle costs before and after, and the frame of the block looked at.
+
+    Always four lines.
+    """
+    profile = desk.session.profile
+    inputs, outputs = together(profile, *_plans(desk), block.direction)
+    lines = [rule("On the wire", width)]
+    text = Text(" ", no_wrap=True)
+    if saving is None:
+        text.append("not known until the slots were read", FAINT)
+    else:
+        text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
+        text.append(f" in {saving.before.requests}", FAINT)
+        if desk.plans:
+            text.append("  → proposed ", FAINT)
+            text.append(f"{_ms(saving.after.microseconds)}", STRONG)
+            text.append(f" in {saving.after.requests}", FAINT)
+            text.append(f"  ({_ms(-saving.microseconds, sign=True)})", ATTENTION)
+        whole = microseconds(profile, wire_timing(desk.session), inputs, outputs)
+        told = f"   one exchange {_ms(whole)}"
+        if whole and text.cell_len + len(told) <= width:
+            text.append(told, FAINT)
+    text.truncate(width, overflow="ellipsis")
+    sent = frame(profile, desk.session.device, inputs, outputs, _output_words(desk))
+    hexes = wrapped(hex_text(sent) or "none: no slot is in use", width - 8, 2)
+    frames = [
+        Text(f" {'frame' if not line else '':<6}{hexes[line] if line < len(hexes) else ''}", PLAIN)
+        for line in range(2)
+    ]
+    return [*lines, text, *frames]
+
+
+def _output_words(desk: MappingDesk) -> list[int]:
+    """What the outputs hold now, for the frame; 0 where that is not known."""
+    for block in desk.blocks:
+        view = desk.views.get(block.id)
+        if block.direction == "write" and view is not None:
+            held = [slot.direct.raw if slot.direct else None for slot in view.slots]
+            return [(raw or 0) & 0xFFFF for raw in held]
+    return []
+
+
+def _plans(desk: MappingDesk) -> tuple[Assignment | None, Assignment | None]:
+    found = {block.direction: desk.proposed(block) for block in desk.blocks}
+    return found.get("read"), found.get("write")
+
+
+def _ms(microseconds: int, *, sign: bool = False) -> str:
+    number = microseconds / 1000
+    return f"{number:+.1f} ms" if sign else f"{number:.1f} ms"
+
+
+def word_lines(desk: MappingDesk, words: UserWords, width: int) -> list[Text]:
+    """The four user words, two lines with their heading."""
+    text = Text(" ", no_wrap=True)
+    room = max(10, (width - 2) // max(1, len(words)))
+    for word, raw in zip(words, desk.word_raws, strict=False):
+        parameter = desk.session.profile.at(word.address) if word.address else None
+        name = parameter.code if parameter else f"W{word.address}" if word.address else "none"
+        shown = word.text(raw)
+        text.append(f"{name} ", FAINT)
+        style = FAINT if shown == NOT_AVAILABLE else PLAIN
+        text.append(f"{shown:<{max(0, room - len(name) - 1)}}", style)
+    text.truncate(width, overflow="ellipsis")
+    return [rule("User words", width), text]
+
+
+def stretch_lines(desk: MappingDesk, found: Sequence[Stretch], width: int, room: int) -> list[Text]:
+    """For a family without blocks: which neighbours come best in one request."""
+    lines: list[Text] = []
+    for stretch in found:
+        request = stretch.request
+        head = Text(no_wrap=True)
+        head.append(f" {request.count:>2} words", STRONG)
+        head.append(f" from {request.address} (16#{request.address:04X})  ", PLAIN)
+        head.append(_ms(stretch.cost), STRONG)
+        head.append(f"  one by one {_ms(stretch.alone)}, saves {_ms(stretch.saves)}", FAINT)
+        lines.append(head)
+        lines += [Text(f"    {t}", PLAIN) for t in wrapped(", ".join(stretch.brings), width - 5, 2)]
+        if stretch.beside:
+            text = f"beside them: {', '.join(stretch.beside)}"
+            lines += [Text(f"    {t}", FAINT) for t in wrapped(text, width - 5, 1)]
+    if not found:
+        lines = [Text(" No two values of the monitoring set lie close enough together.", FAINT)]
+    return lines[:room]

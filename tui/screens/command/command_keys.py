@@ -1,0 +1,170 @@
+"""Keys that command the drive on the Monitor screen."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal
+from functools import partial
+
+from tui.drive.orders import OrderRefused, chart_in_force, interlock
+from tui.drive.profile.schema import CommandOption, OrderId
+from tui.session.work import Outcome
+
+from .arming import Arming
+from .control import Control
+
+SHOWN = 8.0
+SHOWN_REFUSED = 20.0
+"""Seconds for which it is shown what became of an order."""
+
+
+STOPS_THAT_ASK = {
+    "freewheel": (
+        "Let the motor coast?",
+        "The output is switched off: nothing brakes the motor, and a hoist falls.",
+        "lets it coast",
+    ),
+    "dc-braking": (
+        "Brake by direct current?",
+        "Direct current heats the motor; it holds no load at standstill.",
+        "brakes it",
+    ),
+}
+"""Question, what follows and the yes of the stops that need no arming but ask."""
+
+
+class OrderKeys(Arming):
+    """The actions of the keys; everything else is the commander's."""
+
+    _asked: Outcome | None = None
+    """The refusal that a person was asked about last."""
+
+    def control(self, now: float) -> Control:
+        """Whether and how the drive is commanded from here, for the screen."""
+        commander, raws = self.commander, self.session.image.raws
+        chart = chart_in_force(self.session.profile, raws)
+        outcome = commander.outcome
+        if outcome is not None:
+            shown = SHOWN_REFUSED if outcome.kind == "refused" else SHOWN
+            outcome = outcome if now - outcome.time < shown else None
+        return Control(
+            armed_for=commander.armed_for,
+            why_disarmed=self.session.arming.why_disarmed,
+            outcome=outcome,
+            no_effect=interlock(chart, "forward", raws) if chart else "",
+            offer=self._offer(),
+            lost=commander.lost_orders(),
+        )
+
+    def _offer(self) -> str:
+        """A motor that runs by a command of an earlier program, and the key that takes it over."""
+        starts, latest = self.session.starts, self.console.latest
+        if starts is None or latest is None or latest.error:
+            return ""
+        said = starts.offered(self.session, runs=latest.state.kind == "running")
+        return f"{said[0].upper()}{said[1:]}. T takes over." if said else ""
+
+    def action_take_over(self) -> None:
+        """Look after a motor that an earlier program has started."""
+        self._give(self.commander.take_over)
+
+    def ask_unrecorded(self) -> None:
+        """Where a start could not be put on record, ask once whether to run all the same."""
+        from tui.session.starts.starts import StartNotRecorded, StartOvertaken
+
+        outcome, starts = self.commander.outcome, self.session.starts
+        if outcome is None or outcome is self._asked or starts is None:
+            return
+        refused = isinstance(outcome.error, StartNotRecorded)
+        if not refused or isinstance(outcome.error, StartOvertaken):
+            return
+        self._asked = outcome
+        if (last := self.commander.last_run) is None:
+            return
+        order, reference = last
+
+        def run(stamp: int) -> None:
+            starts.unrecorded = True
+            self.commander.run(order, reference, stamp)
+
+        self._ask(f"Run {order} unrecorded?", str(outcome.error), "runs it", "does not run it", run)
+
+    def _refuse(self, text: str) -> None:
+        self.commander.refuse(text)
+        self.look()
+
+    def action_reset(self) -> None:
+        """Reset a fault, after saying what that needs."""
+        if self._armed_or_told():
+            follows = "The cause must be gone. Nothing runs by itself: command it anew afterwards."
+            work = partial(self.commander.order, "reset")
+            self._ask("Reset the fault?", follows, "resets it", "leaves it", work)
+
+    def action_take_control(self) -> None:
+        """Take the control from the terminals, after saying what that means."""
+        if self._armed_or_told():
+            follows = (
+                "The terminals and the keypad command the drive no longer, their stop included;"
+                " the drive must be locked."
+            )
+            work = partial(self.commander.order, "take-control")
+            self._ask("Take the control?", follows, "takes it", "leaves it", work)
+
+    def action_step_reference(self, steps: int) -> None:
+        """Raise or lower the reference by so many Hz; arrows that came at once are one step."""
+        stroke = self.app.stroke
+        if stroke is None or stroke.steps:
+            self._give(lambda: self.commander.step(Decimal(steps)))
+
+    def action_hand_back(self) -> None:
+        """Give the control back, after saying what may start then."""
+        if self._armed_or_told():
+            follows = (
+                "This is no stop. Command and reference go back to the terminals or the keypad:"
+                " a run command that waits there starts the motor."
+            )
+            work = partial(self.commander.order, "hand-back")
+            self._ask("Give the control back?", follows, "gives it back", "keeps it", work)
+
+    def action_stop_as(self, id: OrderId) -> None:
+        """Stop the drive in another way than on its ramp; needs no arming."""
+        self.app.stop_drive(self.console, id)
+        self.look()
+
+    def action_ask_stop_as(self, id: OrderId) -> None:
+        """Let the motor coast, or brake it, after saying what that means; needs no arming."""
+        charts = self.session.profile.data.charts
+        if not any(order.id == id for chart in charts for order in chart.orders):
+            name = {"freewheel": "let the motor coast", "dc-braking": "brake by direct current"}
+            self._refuse(f"{self.session.profile.name} cannot be told to {name[id]} from here.")
+            return
+        question, follows, yes = STOPS_THAT_ASK[id]
+        stop = partial(self.app.stop_drive, self.console, id)
+        self._ask(question, follows, yes, "does not", lambda _stamp: stop())
+
+    def action_options(self) -> None:
+        """Choose a ramp, a preset speed, a motor, an output."""
+        from .options import OptionsScreen
+
+        if not self._armed_or_told():
+            return
+        raws = self.session.image.raws
+        chart = chart_in_force(self.session.profile, raws)
+        if chart is None or not chart.options:
+            self._refuse("This drive has no options of its commands.")
+            return
+
+        stamp = self.session.work.stops
+
+        def chosen(choice: tuple[CommandOption, int] | None) -> None:
+            if choice is not None:
+                self._give(lambda: self.commander.choose_option(*choice, stamp))
+
+        self.app.push_screen(OptionsScreen(chart.options, raws, self.motor_now()), chosen)
+
+    def _give(self, order: Callable[[], object]) -> None:
+        try:
+            order()
+        except OrderRefused as refused:
+            self.commander.refuse(str(refused))
+        self.look()

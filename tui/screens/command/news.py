@@ -1,0 +1,26 @@
+"""What work on a drive has come to, for as long as that is news."""
+
+from __future__ import annotations
+
+from rich.style import Style
+
+from tui.session.work import Kind, Outcome
+from tui.widgets.outcome import OUTCOME_STYLES
+
+SAID_FOR = {Kind.WORKING: 60.0, Kind.DONE: 15.0, Kind.REFUSED: 60.0}
+"""Seconds for which it is shown what the last work has come to."""
+
+
+def news(
+    said: Outcome | None, now: float, *, busy: bool, passed: Outcome | None = None
+) -> tuple[str, Style] | None:
+    """The sentence and its style while the work goes on and for some time after it, else None.
+
+    `passed` is the outcome that a key has led on from: it is no longer news.
+    """
+    if said is None or said is passed:
+        return None
+    kind = said.kind
+    if not busy and now - said.time >= SAID_FOR[kind]:
+        return None
+    return said.text, OUTCOME_STYLES[kind]

@@ -1,0 +1,1 @@
+"""Line: choosing a line, finding its drives."""

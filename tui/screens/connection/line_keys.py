@@ -1,0 +1,131 @@
+"""Keys of the Connection screen that open and close a line."""
+
+from __future__ import annotations
+
+from textual import work
+
+from tui.bus.errors import LineError
+from tui.drive.errors import DriveError
+
+from .choices import LINE_FORMS, LineChoice, fault_of_line, same_line
+from .scanning import Scanning
+
+
+class LineKeys(Scanning):
+    """A line that was opened is searched for drives at once."""
+
+    _opening = ""
+    """The line that is being opened, or nothing."""
+
+    def action_refresh_lines(self) -> None:
+        """Look for serial ports and recent lines."""
+        self.lines.look_for_lines()
+        self.lines.fill()
+
+    def line_of(self, choice: LineChoice) -> str:
+        """The line of a choice, with the settings of the form where it is a port."""
+        return self.form.line_at(choice.path) if choice.path else choice.text
+
+    def action_type_line(self) -> None:
+        """Type a line."""
+        from ..dialogs.ask import Ask
+
+        def typed(text: str | None) -> None:
+            if text:
+                self.open_line(text)
+
+        about = "\n".join(LINE_FORMS)
+        dialog = Ask(
+            "Line to open", fault_of_line, text=self.app.line_text, about=about, takes="opens it"
+        )
+        self.app.push_screen(dialog, typed)
+
+    @work(exclusive=True, group="ask", exit_on_error=False)
+    async def open_line(self, text: str) -> None:
+        """Open a line and ask for its drives; a good one is not left for it without asking."""
+        if self._opening and same_line(text, self._opening):
+            return
+        always = ""
+        if self._is_good():
+            if same_line(text, self.app.line_text):
+                self._tell_open()
+                return
+            always = f"{self._what_is_here()} It is closed, and {text} is opened."
+        question = "Close the line for another?"
+        if await self.app.may_let_go(question, yes="closes it", no="keeps it", always=always):
+            self._open_in_its_place(text)
+
+    @work(exclusive=True, group="line", exit_on_error=False)
+    async def _open_in_its_place(self, text: str) -> None:
+        self.forget_drives()
+        self.say(f"Opening {text}", "")
+        if await self._opens(text):
+            self.action_scan()
+
+    def _is_good(self) -> bool:
+        """Whether the open line is one with drives, or one on which they are looked for."""
+        return self._connected() and (bool(self.found) or self.scanning)
+
+    def is_on_open_line(self) -> bool:
+        """Whether the cursor is on the line that is open."""
+        chosen, here = self.lines.chosen, self.app.line_text
+        return chosen is not None and bool(here) and same_line(self.line_of(chosen), here)
+
+    def _what_is_here(self) -> str:
+        count = len(self.found)
+        drives = f"{count} drive{'s' if count > 1 else ''} found" if count else "a search going on"
+        return f"{self.app.line_label} is open, with {drives}."
+
+    def _tell_open(self) -> None:
+        """Enter on the line that is open looks for its drives, unless that goes on."""
+        if self.scanning:
+            self.say("This line is open; drives are looked for.", "Esc stops.")
+        else:
+            self.action_scan()
+
+    @work(exclusive=True, group="line", exit_on_error=False)
+    async def start(self, text: str, device: int | None) -> None:
+        """Open a line; with a device, watch that drive as soon as it is known."""
+        self._point_at(text)
+        if not await self._opens(text):
+            return
+        if device is None:
+            self.action_scan()
+            return
+        await self.scan([device]).wait()
+        if device in self.found:
+            self.open_drive(device)
+
+    async def _opens(self, text: str) -> bool:
+        """Whether the line could be opened; if not, why is shown."""
+        self._opening = text
+        try:
+            await self.app.connect(text)
+        except (LineError, DriveError) as error:
+            self.fail(error)
+            self._point_at(text)
+            return False
+        finally:
+            self._opening = ""
+        self._led = False
+        self.action_refresh_lines()
+        self._point_at(self.app.line_text)
+        self.show_heads()
+        return True
+
+    def _point_at(self, text: str) -> None:
+        """The cursor on a line; it stays where that is meant already, however it is spelled."""
+        chosen = self.lines.chosen
+        if chosen is None or not same_line(self.line_of(chosen), text):
+            self.lines.offer(text)
+
+    @work(exclusive=True, group="line", exit_on_error=False)
+    async def action_disconnect(self) -> None:
+        """Close the line; where that trips a running drive, only after saying so."""
+        if not await self.app.may_let_go("Close the line?", yes="closes it", no="keeps it"):
+            return
+        self.forget_drives()
+        await self.app.disconnect()
+        self.say("The line is closed.", "Choose a line and press Enter.")
+        self.show_heads()
+        self.lines.focus()

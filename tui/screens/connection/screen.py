@@ -1,0 +1,51 @@
+"""Connection: choose a line, find the drives on it."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.widgets import OptionList
+
+from ..keys.table import CONNECTION, bindings
+from .found import about_drive, next_step
+from .line_keys import LineKeys
+
+
+class ConnectionScreen(LineKeys):
+    """What the cursor and Enter do in the two lists."""
+
+    CSS_PATH = "connection.tcss"
+    BINDINGS: ClassVar = bindings(CONNECTION)
+    TITLE = "Connection"
+    AUTO_FOCUS = "#lines"
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Enter on a line opens it, Enter on a drive watches it."""
+        if event.option_list is self.drives:
+            self.open_drive(int(event.option.id or 0))
+        elif choice := self.lines.choice(event.option.id):
+            self.open_line(self.line_of(choice))
+
+    def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
+        """Say all that the chosen drive says of itself; a line that is no port has no settings."""
+        if event.option_list is self.lines:
+            choice = self.lines.choice(event.option.id)
+            self.form.offer_settings(bool(choice and choice.path))
+        elif self.drives.has_focus and (drive := self.found.get(int(event.option.id or 0))):
+            self.say(about_drive(drive), next_step(drive))
+
+    def on_input_submitted(self) -> None:
+        """Enter in a field."""
+        self.action_open_chosen()
+
+    def action_open_chosen(self) -> None:
+        """What Enter does in the lists; a field hands Enter over to the list of lines."""
+        focused = self.focused
+        if isinstance(focused, OptionList):
+            focused.action_select()
+            return
+        self.lines.focus()
+        if self.is_on_open_line():
+            self.action_scan()  # by what was typed
+        else:
+            self.lines.action_select()

@@ -1,0 +1,1 @@
+"""Control: who commands the drive."""

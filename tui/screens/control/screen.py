@@ -1,0 +1,143 @@
+"""Control source: who commands the drive today, what another configuration would change."""
+
+from __future__ import annotations
+
+from functools import partial
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.widgets import OptionList
+
+from tui.bus.errors import LineError
+from tui.drive.control_source import changes, source_codes, source_in_force
+from tui.drive.profile.schema import ControlSource
+from tui.screens.control.view import change_lines, diagram, note_lines
+from tui.session.console import DriveConsole
+from tui.widgets.drawing import armed_text, rule
+from tui.widgets.lines import Lines
+from tui.widgets.outcome import outcome_lines
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.plain import entry
+
+from ..command.command_keys import OrderKeys
+from ..keys.table import SOURCES, bindings
+
+
+class ControlSourceScreen(OrderKeys):
+    """The configurations of a family; Enter writes the chosen one, armed and at rest only."""
+
+    CSS_PATH = "control.tcss"
+    BINDINGS: ClassVar = bindings(SOURCES)
+    TITLE = "Control source"
+    LOOK = 0.5
+
+    def __init__(self, console: DriveConsole) -> None:
+        super().__init__()
+        self.console = console
+        self.session = console.session
+        self._sources = self.session.profile.data.control_sources
+        self._raws: dict[str, int] = {}
+        self._trouble = "reading today's configuration"
+        self._seen: object = None
+
+    def compose(self) -> ComposeResult:
+        """The list above, what belongs to the chosen one below."""
+        yield Lines(id="title")
+        yield OptionList(id="sources", compact=True)
+        yield Lines(id="detail")
+        yield Lines(id="message")
+        yield Lines(id="keys")
+
+    def on_mount(self) -> None:
+        """Show the list, and read what the drive holds."""
+        self._list()
+        self.query(OptionList).focus()
+        self.run_worker(self._read(), exclusive=True, group="sources")
+
+    async def _read(self) -> None:
+        try:
+            readings = await self.console.read(source_codes(self.session.profile))
+        except LineError as error:
+            self._trouble = str(error)
+        else:
+            self._raws = {c: r.raw for c, r in readings.items() if r.raw is not None}
+            bad = [r for r in readings.values() if r.raw is None]
+            self._trouble = f"{bad[0].parameter.code}: {bad[0].error}" if bad else ""
+        self._list()
+        self.look()
+
+    def _list(self) -> None:
+        """The configurations, with a mark at today's."""
+        if not (found := self.query(OptionList)):
+            return  # the screen was left before it stood
+        today = source_in_force(self.session.profile, self._raws)
+        options = found.first()
+        at = options.highlighted
+        if at is None:
+            at = self._sources.index(today) if today else 0
+        options.clear_options()
+        for source in self._sources:
+            text = Text(no_wrap=True)
+            text.append(" ● " if source is today else " · ", STRONG if source is today else FAINT)
+            text.append(source.name, STRONG if source is today else PLAIN)
+            text.append("   today" if source is today else "", FAINT)
+            options.add_option(entry(text))
+        options.highlighted = at
+
+    @property
+    def _chosen(self) -> ControlSource:
+        return self._sources[self.query_one(OptionList).highlighted or 0]
+
+    def on_option_list_option_highlighted(self) -> None:
+        """Another one is looked at."""
+        self.look()
+
+    def draw(self, width: int) -> None:
+        """Show the chosen configuration, and what became of the last order."""
+        super().draw(width)
+        found = changes(self.session.profile, self._chosen, self._raws)
+        lines = [rule("So it works", width), *diagram(self._chosen)]
+        lines.append(rule("It would write", width))
+        if self._raws:
+            lines += change_lines(self.session.profile, found, width)
+        lines += [Text(""), *note_lines(self._chosen, found, width)]
+        self.put("detail", lines)
+        self._head(width)
+        outcome = self.commander.outcome
+        if outcome is not None and outcome is not self._seen and outcome.kind != "working":
+            self._seen = outcome
+            self.run_worker(self._read(), exclusive=True, group="sources")
+
+    def _head(self, width: int) -> None:
+        title = rule(f"Control source · {self.session.profile.name}", width - 12)
+        title.append_text(armed_text(self.commander.armed_for))
+        self.put("title", [title])
+        control = self.control(self.app.clock.monotonic())
+        if control.outcome is not None:
+            message = [Text(" ") + line for line in outcome_lines(control.outcome, width - 2)]
+        elif self._trouble:
+            message = [Text(f" {self._trouble}", ALARM)]
+        elif source_in_force(self.session.profile, self._raws) is None:
+            message = [Text(" Today's setting is none of these.", FAINT)]
+        else:
+            message = [Text("")]
+        self.put("message", message)
+
+    def on_option_list_option_selected(self) -> None:
+        """Enter in the list."""
+        self.action_write_chosen()
+
+    def action_write_chosen(self) -> None:
+        """Say what follows, and write it."""
+        found = changes(self.session.profile, self._chosen, self._raws)
+        if self._armed_or_told() and found and self._raws:
+            codes = ", ".join(change.parameter.code for change in found)
+            follows = (
+                f"Writes {codes}, each read back. A run order that waits at the new source"
+                " starts the motor."
+            )
+            work = partial(self.commander.configure, self._chosen)
+            name = self._chosen.name
+            self._ask(f"{name}?", follows, "writes", "leaves all as it is", work)
+        self.look()

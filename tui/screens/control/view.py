@@ -1,0 +1,75 @@
+"""Who commands a drive, drawn: sources, what switches between them, what a change writes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.text import Text
+
+from tui.drive.control_source import Change
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import ControlSource, Way
+from tui.drive.shown import shown
+from tui.drive.values import NOT_AVAILABLE
+from tui.widgets.drawing import cut, wrapped
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
+
+SOURCE_WIDTH = 16
+WIRE = 18
+
+
+def diagram(source: ControlSource) -> list[Text]:
+    """Command and reference on their ways to the drive; always four lines."""
+    return [*_way(source.command, "command"), *_way(source.reference, "reference")]
+
+
+def _way(way: Way, goal: str) -> list[Text]:
+    first = Text(no_wrap=True)
+    first.append(f"   {way.sources[0]:<{SOURCE_WIDTH}}", STRONG)
+    if len(way.sources) == 1:
+        first.append("─" * (WIRE + 2) + "▶ ", LINE)
+        first.append(goal, PLAIN)
+        return [first, Text("")]
+    first.append("───┐ ", LINE)
+    first.append(way.switch, ATTENTION)
+    second = Text(no_wrap=True)
+    second.append(f"   {way.sources[1]:<{SOURCE_WIDTH}}", STRONG)
+    second.append("───┴" + "─" * (WIRE - 2) + "▶ ", LINE)
+    second.append(goal, PLAIN)
+    return [first, second]
+
+
+def change_lines(profile: Profile, found: Sequence[Change], width: int) -> list[Text]:
+    """What would be written, word by word."""
+    if not found:
+        return [Text("   Nothing: the drive is set up so.", STRONG)]
+    return [_change(profile, change, width) for change in found]
+
+
+def _change(profile: Profile, change: Change, width: int) -> Text:
+    parameter = change.parameter
+    text = Text(no_wrap=True)
+    mark = "" if change.verified else "?"
+    text.append(f"   {parameter.code + mark:<7}", PLAIN if change.verified else ALARM)
+    text.append(cut(parameter.name, 26) + " ", FAINT)
+    text.append(f"{_named(profile, change, change.old)} → ", FAINT)
+    text.append(_named(profile, change, change.new), STRONG)
+    text.truncate(width, overflow="ellipsis")
+    return text
+
+
+def _named(profile: Profile, change: Change, raw: int | None) -> str:
+    if raw is None:
+        return NOT_AVAILABLE
+    text = shown(profile, change.parameter, raw, {}).display
+    return text if str(raw) in text else f"{text} ({raw})"
+
+
+def note_lines(source: ControlSource, found: Sequence[Change], width: int) -> list[Text]:
+    """What else is to be known of a configuration."""
+    lines = [Text(f"   {line}", FAINT) for line in wrapped(source.note, width - 4, 2)]
+    unsure = [change.parameter.code for change in found if not change.verified]
+    if unsure:
+        text = f"? No manual in hand confirms the address of {', '.join(unsure)}."
+        lines.append(Text(cut(f"   {text}", width).rstrip(), ALARM))
+    return lines

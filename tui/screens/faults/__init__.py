@@ -1,0 +1,1 @@
+"""Faults: what the drive tripped on, and what it stored."""

@@ -1,0 +1,125 @@
+"""A drive's fault, its history with what it stored, and the seconds before a trip, as lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import datetime
+
+from rich.text import Text
+
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import FaultCode
+from tui.drive.values import NOT_AVAILABLE
+from tui.session.journal import Entry
+from tui.session.monitor.fault_record import FaultRecord, Moment
+from tui.session.reading import Reading
+from tui.widgets.drawing import cut, rule, wrapped
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
+
+VALUE_WIDTH = 9
+TIME_WIDTH = 8
+
+
+def fault_lines(fault: FaultCode | None, present: bool, width: int) -> list[Text]:
+    """What tripped the drive, why, and what to do; always four lines."""
+    if fault is None:
+        text = " ■ FAULT, its code was not read " if present else " No fault now."
+        return [Text(text, FAULT_BLOCK if present else STRONG), Text(""), Text(""), Text("")]
+    sign, style = (" ■ FAULT", FAULT_BLOCK) if present else (" Last trip:", FAULT)
+    lines = [Text(f"{sign} {fault.code} ({fault.raw}) {fault.name} ", style)]
+    cause = fault.cause or "The manual in hand gives no cause."
+    lines += [Text(f"   {line}", PLAIN) for line in wrapped(cause, width - 4, 2)]
+    remedy = f"Do: {fault.remedy}" if fault.remedy else ""
+    lines += [Text(f"   {line}", STRONG) for line in wrapped(remedy, width - 4, 4 - len(lines))]
+    return [*lines, *(Text("") for _ in range(4 - len(lines)))]
+
+
+def history_line(
+    profile: Profile, number: int, code: str, readings: Mapping[str, Reading], width: int
+) -> Text:
+    """One fault of the drive's history."""
+    text = Text(no_wrap=True)
+    text.append(f" {number} {code:<5}", FAINT)
+    reading = readings.get(code)
+    if reading is None or reading.raw is None:
+        text.append(NOT_AVAILABLE, FAINT)
+    else:
+        known = profile.fault(reading.raw)
+        none = reading.raw == profile.data.faults.none
+        name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
+        text.append(cut(name, max(1, width - 9)).rstrip(), FAINT if none else PLAIN)
+    return text
+
+
+def stored_lines(
+    profile: Profile, codes: Sequence[str], readings: Mapping[str, Reading], width: int
+) -> list[Text]:
+    """What the drive kept of the moment of a fault."""
+    if not codes:
+        return [Text(" The drive stores nothing of this fault.", FAINT)]
+    return [
+        stored_line(profile, code, readings.get(code), width)
+        for code in codes
+        if profile.get(code) is not None
+    ]
+
+
+def stored_line(profile: Profile, code: str, reading: Reading | None, width: int) -> Text:
+    """One stored value; its name without the words that all of them share."""
+    parameter = profile[code]
+    name = parameter.name
+    for tail in (" before the last fault", ", last fault"):
+        name = name.removesuffix(tail)
+    value = f"{reading.text} {reading.unit}".rstrip() if reading else NOT_AVAILABLE
+    text = Text(no_wrap=True)
+    room = max(8, width - len(value) - 8)
+    text.append(f" {code:<5} ", FAINT)
+    text.append(cut(name, room), FAINT)
+    text.append(f" {value}", STRONG if reading and reading.raw is not None else FAINT)
+    return text
+
+
+def record_lines(record: FaultRecord | None, width: int, height: int, offset: int) -> list[Text]:
+    """Values before the trip and what was written meanwhile, the newest first."""
+    if record is None:
+        return [
+            rule("Before the trip", width),
+            Text(" No trip was seen since this drive is watched.", FAINT),
+        ]
+    title = f"Before the trip: {len(record.moments)} cycles, {len(record.writes)} writes from here"
+    head = Text(f" {'s':>{TIME_WIDTH - 1}}", FAINT, no_wrap=True)
+    for heading in record.headings[: _columns(width)]:
+        head.append(f"{heading[: VALUE_WIDTH - 1]:>{VALUE_WIDTH}}", FAINT)
+    rows = record_rows(record, width)
+    return [rule(title, width), head, *rows[offset : offset + max(1, height - 2)]]
+
+
+def record_rows(record: FaultRecord, width: int) -> list[Text]:
+    """Every cycle and every write, the newest first."""
+    rows = [(moment.wall, _moment(moment, record, width)) for moment in record.moments]
+    for entry in record.writes:
+        wall = datetime.fromisoformat(entry.time).timestamp()
+        rows.append((wall, _write(entry, wall - record.wall, width)))
+    return [text for _, text in sorted(rows, key=lambda row: -row[0])]
+
+
+def _columns(width: int) -> int:
+    return max(1, (width - TIME_WIDTH - 1) // VALUE_WIDTH)
+
+
+def _moment(moment: Moment, record: FaultRecord, width: int) -> Text:
+    after = moment.wall - record.wall
+    text = Text(f" {after:>{TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
+    for value in moment.texts[: _columns(width)]:
+        text.append(f"{value[: VALUE_WIDTH - 1]:>{VALUE_WIDTH}}", PLAIN)
+    if after >= 0:
+        text.stylize(ALARM, 0, TIME_WIDTH)
+    return text
+
+
+def _write(entry: Entry, after: float, width: int) -> Text:
+    text = Text(f" {after:>{TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
+    text.append(f"  wrote {entry.code} {entry.new}", ATTENTION)
+    text.append(f"  {entry.why}" + ("" if entry.answer == "ok" else f": {entry.answer}"), FAINT)
+    text.truncate(width, overflow="ellipsis")
+    return text

@@ -1,0 +1,1 @@
+"""What each key does, on which screen: the table of actions, help, finding."""

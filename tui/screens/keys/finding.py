@@ -1,0 +1,106 @@
+"""Finding actions by words, those of every screen: what the palette lists, best first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from .action import Action
+from .table import ACTIONS
+
+NAME = 3
+"""Words of an action's help that count as its name."""
+BY_NAME = {
+    "stop": ("stop",),
+    "stop_all": ("stop", "all"),
+    "arm": ("arm",),
+    "run_line('forward')": ("run", "forward"),
+    "run_line('reverse')": ("run", "reverse"),
+    "ask_stop_as('dc-braking')": ("brake",),
+    "take_control": ("take",),
+    "take_over": ("after",),
+    "stop_as('quick-stop')": ("stop", "quick"),
+    "ask_stop_as('freewheel')": ("coast",),
+    "stop_as('emergency-stop')": ("stop", "emergency"),
+}
+"""What acts on a motor: listed for one of these words, and standing ready for all of them only."""
+NOT_FOUND = ("command_palette", "stop_by_space", "step_reference(")
+"""The palette itself, a key that has another one to the same end, and steps of a live motor."""
+WAYS = ("leave", "goto(", "move", "scroll(", "page", "end(", "group(")
+"""Beginnings of the ids of what only moves: found where one is, not on other screens."""
+
+_WORD = re.compile(r"[^\W_]+")
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """An action that fits what was typed."""
+
+    action: Action
+    screen: str
+    """Where it lives; where one is, for an action of the app."""
+    here: bool
+    """Whether it can be done from where one is."""
+    score: int
+    ready: bool
+    """Whether Enter may do it at once: each word that was typed begins a word of it."""
+
+    @property
+    def name(self) -> str:
+        """What it does, as a sentence without its point."""
+        return self.action.help.removesuffix(".")
+
+
+def find(query: str, screen: str, actions: Sequence[Action] = ACTIONS) -> list[Found]:
+    """The actions in which every word of the query occurs, best first; those of `screen` are here.
+
+    Without a query what can be done here is listed, in the order of the table.
+    """
+    words = query.split()
+    found: dict[tuple[str, str], Found] = {}
+    for action in actions:
+        here = screen in action.screens
+        if _is_left_out(action, words, here=here):
+            continue
+        marks = [_mark(action, screen, word, here=here) for word in words]
+        if all(marks):
+            ready = bool(marks) and min(marks) > 1 and _all_named(action, words)
+            one = Found(action, screen if here else action.screens[0], here, sum(marks), ready)
+            found.setdefault((action.id, action.help), one)
+    return sorted(found.values(), key=lambda one: (-one.score, not one.here))
+
+
+def _is_left_out(action: Action, words: Sequence[str], *, here: bool) -> bool:
+    if action.id.startswith(NOT_FOUND) or (not here and (not words or action.id.startswith(WAYS))):
+        return True
+    names = BY_NAME.get(action.id, ())
+    return bool(names) and not any(word.casefold().startswith(names) for word in words)
+
+
+def _all_named(action: Action, words: Sequence[str]) -> bool:
+    """Whether each of the names that an action must be called by was typed."""
+    typed = [word.casefold() for word in words]
+    return all(any(word.startswith(n) for word in typed) for n in BY_NAME.get(action.id, ()))
+
+
+def _mark(action: Action, screen: str, word: str, *, here: bool) -> int:
+    """How well a word fits an action: 0 not at all, 1 inside a word, more at its beginning."""
+    if here and word in (action.shown, *action.keys.split(",")):
+        return 6
+    typed = word.casefold()
+    said = _words(action.help)
+    name = {*said[:NAME], *_words(action.label), *_words(action.id)}
+    places = () if here else _words(action.screens[0])
+    every = {*said, *name, *places}
+    if typed in every:
+        mark = 4
+    elif any(one.startswith(typed) for one in every):
+        mark = 2
+    else:
+        return int(any(typed in one for one in every))
+    return mark + any(one.startswith(typed) for one in name)
+
+
+def _words(text: str) -> list[str]:
+    return _WORD.findall(text.casefold())

@@ -1,0 +1,1 @@
+"""Messages: everything that was said, newest first."""

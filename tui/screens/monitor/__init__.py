@@ -1,0 +1,1 @@
+"""Monitor: the motor as it is, and the line that runs it."""

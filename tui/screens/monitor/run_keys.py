@@ -1,0 +1,160 @@
+"""The keys that open, edit and close the line that runs a motor."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from decimal import Decimal
+
+from rich.text import Text
+from textual.events import Key
+
+from tui.bus.errors import LineError
+from tui.drive.shown import number_of
+from tui.session.command.reference import reference_codes
+from tui.session.reading import Reading
+from tui.terminal.stroke import stroke_of
+
+from ..command.command_keys import OrderKeys
+from ..keys.monitor_actions import COMMAND_ACTIONS
+from .run_line import GIVEN, STEPS, Purpose, RunLine, limits, proposed, run_lines
+
+STOP_KEYS = frozenset(one.keys for one in COMMAND_ACTIONS if one.id.startswith("stop_as("))
+"""Keys that stop in a way of their own, at once."""
+
+
+class RunKeys(OrderKeys):
+    """Nothing turns on one letter: r, v and f open a line, and Enter does what it says."""
+
+    _line: RunLine | None = None
+    _around: dict[str, Reading] | None = None
+    """What the line tells beside the reference: limits and ramp."""
+
+    def action_run_line(self, purpose: Purpose) -> None:
+        """Open the line, where the drive is armed and a command can have an effect."""
+        if not self._armed_or_told():
+            return
+        profile, raws = self.session.profile, self.session.image.raws
+        held = {}
+        for quantity, _ in GIVEN:
+            parameter = profile.quantity(quantity)
+            if parameter is None or parameter.code not in raws:
+                continue
+            number = number_of(profile, parameter, raws[parameter.code], raws)
+            if number is not None:
+                held[parameter.code] = number
+        wanted = self.commander.wanted
+        text, unit = proposed(profile, purpose, wanted.text if wanted else "", held)
+        if purpose == "reference" and not unit:
+            self._refuse(f"Where {profile.name} takes its reference is not known.")
+            return
+        now = self.app.clock.monotonic()
+        self._line = RunLine(purpose, text, unit, now, self.session.work.stops)
+        self._around = None
+        self.run_worker(self._read_around(), exclusive=True, group="run line")
+        self.look()
+
+    async def _read_around(self) -> None:
+        """The limits of a reference, and the ramp."""
+        profile = self.session.profile
+        codes = reference_codes(profile)
+        if (ramp := profile.quantity("acceleration")) is not None:
+            codes.append(ramp.code)
+        try:
+            self._around = await self.console.read(codes)
+        except LineError:
+            return  # the line shows what is known; Enter reads anew
+        self.look()
+
+    def close_line(self) -> None:
+        """Take nothing of what was typed."""
+        self._line = None
+        self.look()
+
+    def run_line_lines(self, now: float, width: int) -> list[Text] | None:
+        """The line and its keys; None while it is closed."""
+        line = self._line
+        if line is None:
+            return None
+        if line.stamp != self.session.work.stops or not self._armed():
+            self._line = None  # a stop, or the end of arming, has closed it
+            return None
+        return run_lines(line, self.session.profile, self._around or {}, now, width)
+
+    def on_key(self, event: Key) -> None:
+        """While the line is open every key but a stop's is the line's; an unknown one closes it."""
+        if self._line is None:
+            super().on_key(event)
+            return
+        line, key = self._line, event.key
+        self._line = None
+        if key in STOP_KEYS:
+            self.look()
+            return  # never swallowed: what stops, stops here too
+        event.stop()
+        event.prevent_default()
+        if key in STEPS and line.unit:
+            if not _steps(event):
+                self._line = line
+                return
+            low, high, _ = limits(self.session.profile, self._around or {})
+            hertz = line.unit == "Hz"
+            self._line = line.stepped(key, low if hertz else None, high if hertz else None)
+        elif key == "backspace":
+            self._line = line.erased()
+        elif key == "enter":
+            self._line = self._entered(line, event)
+        elif event.character and (typed := line.typed(event.character)) is not None:
+            self._line = typed
+        self.look()
+
+    def _entered(self, line: RunLine, event: Key) -> RunLine | None:
+        """Do what the line says; it stays where that cannot be meant, or is wrong."""
+        if not line.counts(self.app.clock.monotonic()) or not _alone(event):
+            return line
+        checked = line.checked(self.session.profile, self._around or {})
+        if checked.fault:
+            return checked
+        commander, stamp = self.commander, line.stamp
+        if (way := line.purpose) == "reference":
+            self._give(lambda: commander.refer(line.reference or "", stamp))
+        else:
+            self._give(lambda: commander.run(way, line.reference, stamp))
+        return None
+
+    @property
+    def takes_text(self) -> bool:
+        """Whether digits that come at once may be typed: while the line is open."""
+        return self._line is not None
+
+    def action_step_reference(self, steps: int) -> None:
+        """Raise or lower the reference; where that would start the motor, open the line."""
+        if self._would_start() and self._armed():
+            self.action_run_line("reference")
+            if self._line is not None:
+                key = next(k for k, step in STEPS.items() if step == steps)
+                self._line = replace(self._line.stepped(key, None, None), fresh=True)
+                self.look()
+            return
+        super().action_step_reference(steps)
+
+    def _would_start(self) -> bool:
+        """Whether the drive is enabled and stands at 0 Hz: a reference turns the motor."""
+        latest = self.console.latest
+        if latest is None or latest.state.kind != "running":
+            return False
+        frequency = self.session.profile.quantity("output_frequency")
+        reading = latest.readings.get(frequency.code) if frequency else None
+        number = reading.value.number if reading is not None and reading.value else None
+        return number == Decimal(0)
+
+
+def _alone(event: Key) -> bool:
+    """Whether a key was pressed by itself; one that no terminal has sent was."""
+    stroke = stroke_of(event)
+    return stroke is None or stroke.alone
+
+
+def _steps(event: Key) -> bool:
+    """Whether an arrow counts: of several that came at once only the first does."""
+    stroke = stroke_of(event)
+    return stroke is None or stroke.steps

@@ -1,0 +1,110 @@
+"""What the Monitor screen shows at one moment."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tui.bus.line import Counters, LineState, LineStatus
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import MonitoringValue
+from tui.screens.command.control import UNARMED, Control
+from tui.session.command.stop import StopReport
+from tui.session.connect.identify import DriveIdentity
+from tui.session.monitor.line_watch import Watch
+from tui.session.monitor.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
+from tui.session.reading import Reading
+from tui.widgets.drive_signs import age_text
+
+USUAL_SPAN = 60.0
+SPANS = (10.0, USUAL_SPAN, 600.0)
+"""Windows of the trend in seconds."""
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """All that the Monitor screen shows at one moment; times are monotonic, in seconds."""
+
+    profile: Profile
+    identity: DriveIdentity | None
+    device: int
+    line_label: str
+    snapshot: Snapshot | None
+    line: LineState
+    counters: Counters
+    load: float
+    trend: tuple[TrendPoint, ...]
+    period: float
+    now: float
+    clock: str
+    read_only: bool = False
+    low_bandwidth: bool = False
+    """Whether the trend is left out and the screen looked at less often."""
+    watch: Watch | None = None
+    """The drive's watch over the line, where it has one that runs."""
+    heard: float | None = None
+    """When the drive last answered anybody on this line."""
+    control: Control = UNARMED
+    stop: StopReport | None = None
+    """What became of a stop that was ordered lately."""
+    was: str = ""
+    """What the drive did when it was last known."""
+    span: float = USUAL_SPAN
+    """Seconds that the trend shows."""
+    unseen: bool = False
+    """Whether the drive has tripped and nobody has said that he saw it."""
+
+    def reading(self, code: str) -> Reading | None:
+        """A reading as good as it is now, not as it was when it came."""
+        if self.snapshot is None or (reading := self.snapshot.readings.get(code)) is None:
+            return None
+        rate = self.snapshot.rate
+        cycle = max(self.period, 1 / rate if rate else self.period)
+        often = self.lost or not (self.slow(code) or self.rare(code))
+        return reading.aged(self.now, STALE_CYCLES * cycle * (1 if often else SLOW_FACTOR))
+
+    def slow(self, code: str) -> bool:
+        """Whether the value is one that need not come with every cycle."""
+        return any(v.parameter == code and v.rate != "fast" for v in self.values)
+
+    def rare(self, code: str) -> bool:
+        """Whether the value is one of those read seldom beside the monitoring set."""
+        return code not in {value.parameter for value in self.values}
+
+    @property
+    def time_left(self) -> float | None:
+        """Seconds until the drive acts on its time-out if nobody asks it; None if it does not."""
+        if self.watch is None or not self.watch.active or self.heard is None:
+            return None
+        return self.watch.timeout - (self.now - self.heard)
+
+    @property
+    def values(self) -> list[MonitoringValue]:
+        """The monitoring set."""
+        return self.profile.data.monitoring.values
+
+    @property
+    def lost(self) -> bool:
+        """Whether nothing on the screen is known to be current."""
+        if self.line.status is not LineStatus.CONNECTED:
+            return True
+        return self.snapshot is not None and bool(self.trouble)
+
+    @property
+    def trouble(self) -> str:
+        """Why what is shown is not the present; empty while it is."""
+        if self.snapshot is None or self.snapshot.error:
+            return self.snapshot.error if self.snapshot is not None else ""
+        if self.snapshot.is_stale(self.now):
+            return f"Nothing was read for {age_text(self.now - self.snapshot.time)}."
+        return ""
+
+
+def end_of(view: View, end: str) -> float | None:
+    """The end of a bar: a number, or the value of a parameter of the drive."""
+    if not end:
+        return None
+    try:
+        return float(end)
+    except ValueError:
+        reading = view.snapshot.readings.get(end) if view.snapshot else None
+        return reading.number if reading is not None else None

@@ -1,0 +1,1 @@
+"""Parameters: the list, staging, writing, sets."""

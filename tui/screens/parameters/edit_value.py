@@ -1,0 +1,221 @@
+"""Dialogs that take a new value: a number as it is typed, a name from a list, bits of a word."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from decimal import Decimal, InvalidOperation
+from typing import ClassVar
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical
+from textual.widgets import Input, OptionList
+
+from tui.drive.errors import DriveError
+from tui.drive.profile.schema import Parameter
+from tui.drive.values import encode
+from tui.screens.parameters.view import factory_text, range_text, value_text
+from tui.session.settings.editor import Editor
+from tui.widgets.fields import NumberInput
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.plain import Plain, entry
+
+from ..dialogs.question import KeyQuestion, Question, hint
+
+STAGES_NOTHING = ("Esc", "stages nothing")
+
+
+class EditNumber(Question[str | None]):
+    """A number with its unit: checked while it is typed, shown as the drive will hold it."""
+
+    BINDINGS: ClassVar = [
+        Binding("up", "step(1)", "one step up", show=False),
+        Binding("down", "step(-1)", "one step down", show=False),
+        Binding("pageup", "step(10)", "ten steps up", show=False),
+        Binding("pagedown", "step(-10)", "ten steps down", show=False),
+    ]
+
+    def __init__(self, editor: Editor, parameter: Parameter) -> None:
+        super().__init__()
+        self._editor, self._parameter = editor, parameter
+
+    def compose(self) -> ComposeResult:
+        """The field, what it comes to, and what is known."""
+        editor, parameter = self._editor, self._parameter
+        staged = editor.edits.get(parameter.code)
+        raw = staged.new if staged else editor.raws.get(parameter.code)
+        value = editor.value(parameter.code, raw) if raw is not None else None
+        limits, factory = range_text(editor, parameter), factory_text(editor, parameter)
+        with Vertical(id="dialog"):
+            yield Plain(f"{parameter.code}  {parameter.name}", id="question")
+            yield NumberInput(value.text if value else "", id="answer", select_on_focus=True)
+            yield Plain("", id="held")
+            about = [f"now {value_text(editor, parameter.code)}"]
+            about += [f"range {limits}"] if limits else []
+            about += [f"factory {factory}"] if factory else []
+            yield Plain("   ".join(about), id="about")
+            keys = (("Enter", "stages it"), ("Up Down", "one step"), STAGES_NOTHING)
+            yield Plain(hint(*keys), id="hint")
+
+    def on_mount(self) -> None:
+        """Tell what stands there."""
+        self._check(self.query_one(Input).value)
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """Tell at once what it comes to."""
+        self._check(event.value)
+
+    def _check(self, text: str) -> bool:
+        """Show what the text comes to; whether it may be staged."""
+        held = self.query_one("#held", Plain)
+        editor, parameter = self._editor, self._parameter
+        try:
+            edits = editor.edits.stage(
+                editor.session.profile, parameter.code, text, editor.raws, editor.lacking
+            )
+        except DriveError as refused:
+            held.update(Text(str(refused), ALARM))
+            return False
+        edit = edits.get(parameter.code)
+        if edit is None:
+            held.update(Text("as it is held now", FAINT))
+            return True
+        shown = Text(f"→ {edit.text}", STRONG)
+        shown.append(f"   raw {edit.new} = 16#{edit.new & 0xFFFF:04X}", FAINT)
+        if edit.rounded:
+            shown.append("   rounded to what the drive can hold", ALARM)
+        if edit.warning:
+            shown.append(f"\n{edit.warning}", ALARM)
+        held.update(shown)
+        return True
+
+    def action_step(self, steps: int) -> None:
+        """The next value that the drive can hold."""
+        editor, parameter = self._editor, self._parameter
+        profile, field = editor.session.profile, self.query_one(Input)
+        scale = profile.scale(parameter, editor.raws, editor.lacking)
+        if scale is None:
+            return
+        try:
+            raw = encode(parameter, field.value, profile.names(parameter), scale).raw
+            number = Decimal(raw + steps) * scale
+        except (DriveError, InvalidOperation):
+            return
+        field.value = f"{number:f}"
+        field.cursor_position = len(field.value)
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Give it back once nothing is wrong with it."""
+        if self._check(event.value):
+            self.answer(event.value.strip())
+
+
+class PickValue(KeyQuestion[int | None]):
+    """One of the names of an enumeration."""
+
+    def __init__(self, editor: Editor, parameter: Parameter) -> None:
+        super().__init__()
+        self._editor, self._parameter = editor, parameter
+        self._names = sorted(editor.session.profile.names(parameter).items())
+
+    def compose(self) -> ComposeResult:
+        """The list with the held value marked."""
+        with Vertical(id="dialog"):
+            yield Plain(f"{self._parameter.code}  {self._parameter.name}", id="question")
+            yield OptionList(
+                *(entry(self._line(raw, name)) for raw, name in self._names),
+                id="choices",
+                compact=True,
+            )
+            yield Plain(hint(("Enter", "stages it"), STAGES_NOTHING), id="hint")
+
+    def on_mount(self) -> None:
+        """Begin at the staged or held value."""
+        code = self._parameter.code
+        staged = self._editor.edits.get(code)
+        raw = staged.new if staged else self._editor.raws.get(code)
+        places = [place for place, (value, _) in enumerate(self._names) if value == raw]
+        self.query_one(OptionList).highlighted = places[0] if places else 0
+
+    def _line(self, raw: int, name: str) -> Text:
+        held = self._editor.raws.get(self._parameter.code) == raw
+        text = Text(no_wrap=True)
+        text.append(" ● " if held else " · ", STRONG if held else FAINT)
+        text.append(f"{raw:>5}  ", FAINT)
+        text.append(name, STRONG if held else PLAIN)
+        if raw == self._parameter.factory:
+            text.append("   factory", FAINT)
+        return text
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Give the raw value back."""
+        self.answer(self._names[event.option_index][0])
+
+
+class EditBits(KeyQuestion[int | None]):
+    """The bits of a word, one by one."""
+
+    BINDINGS: ClassVar = [
+        Binding("s", "take", "stage", show=False),
+    ]
+
+    def __init__(self, editor: Editor, parameter: Parameter) -> None:
+        super().__init__()
+        self._parameter = parameter
+        staged = editor.edits.get(parameter.code)
+        held = editor.raws.get(parameter.code, 0)
+        self._held = held & 0xFFFF
+        self._word = (staged.new if staged else held) & 0xFFFF
+
+    def compose(self) -> ComposeResult:
+        """Every named bit; reserved ones cannot be chosen."""
+        parameter = self._parameter
+        with Vertical(id="dialog"):
+            yield Plain(f"{parameter.code}  {parameter.name}", id="question")
+            yield OptionList(id="choices", compact=True)
+            yield Plain("", id="held")
+            keys = (("Enter", "turns a bit"), ("s", "stages the word"), STAGES_NOTHING)
+            yield Plain(hint(*keys), id="hint")
+
+    def on_mount(self) -> None:
+        """Show the word."""
+        self._show(0)
+
+    def _show(self, at: int) -> None:
+        options = self.query_one(OptionList)
+        options.clear_options()
+        for bit in self._parameter.bits:
+            on, was = self._word >> bit.bit & 1, self._held >> bit.bit & 1
+            text = Text(no_wrap=True)
+            text.append(f" {bit.bit:>2} {'●' if on else '·'} ", STRONG if on else FAINT)
+            text.append(f"{bit.name}", STRONG if on != was else PLAIN)
+            words = bit.on if on else bit.off
+            text.append(f": {words}" if words else "", FAINT)
+            options.add_option(entry(text, disabled=bit.bit in self._parameter.reserved))
+        options.highlighted = at
+        shown = f"16#{self._held:04X} → 16#{self._word:04X}"
+        self.query_one("#held", Plain).update(Text(shown, STRONG))
+
+    def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:
+        """Turn the bit over."""
+        self._word ^= 1 << self._parameter.bits[event.option_index].bit
+        self._show(event.option_index)
+
+    def action_take(self) -> None:
+        """Give the word back."""
+        self.answer(self._word)
+
+
+Dialog = EditNumber | PickValue | EditBits
+
+
+def dialog_for(editor: Editor, parameter: Parameter) -> Callable[[], Dialog]:
+    """The dialog that fits a parameter."""
+    from tui.drive.values import is_enumeration
+
+    if parameter.bits:
+        return lambda: EditBits(editor, parameter)
+    if is_enumeration(parameter):
+        return lambda: PickValue(editor, parameter)
+    return lambda: EditNumber(editor, parameter)

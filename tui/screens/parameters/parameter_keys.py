@@ -1,0 +1,43 @@
+"""What the keys of the Parameters screen work on: the list, what is staged, the messages."""
+
+from __future__ import annotations
+
+from textual.widgets import Input
+
+from tui.session.console import DriveConsole
+from tui.session.settings.editor import Editor
+
+from ..command.arming import Arming
+from .parameter_list import ParameterList
+
+
+class ParameterKeys(Arming):
+    """The base of the keys that stage, write and handle parameter sets."""
+
+    def __init__(self, console: DriveConsole) -> None:
+        super().__init__()
+        self.console = console
+        self.session = console.session
+        self.listed = ParameterList()
+        self.remark = ""
+        """What a key has come to, until the cursor moves."""
+
+    @property
+    def editor(self) -> Editor:
+        """What is known and staged; stays with the drive while the panel runs."""
+        return self.console.editor
+
+    def list_again(self) -> None:
+        """Make the list anew, by what was chosen and what is searched."""
+        for search in self.query("#search").results(Input):  # none once the screen was left
+            self.listed.fill(self.editor, search.value)
+            self.look()
+
+    def note(self, text: str) -> None:
+        """Say something in the line of messages, in place of what work has come to."""
+        self.passed = self.editor.said
+        self.remark = text
+        self.look()
+
+    def _refuse(self, text: str) -> None:
+        self.note(text)

@@ -1,0 +1,195 @@
+"""Keys of the Parameters screen that handle parameter sets: back up, compare, stage a set."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tui.bus.errors import LineError
+from tui.drive.errors import DriveError
+
+from ..dialogs.files import fault_of_new
+from .parameter_keys import ParameterKeys
+
+if TYPE_CHECKING:
+    from tui.drive.settings.parameter_set import ParameterSet
+
+
+class SetKeys(ParameterKeys):
+    """Reads and writes files of parameter sets; what a set has otherwise is staged, not written."""
+
+    # Back up and report
+
+    def action_save_file(self) -> None:
+        """Ask for a file, read everything, write it."""
+        from tui.drive.settings.parameter_set import dumps
+
+        about = "Every readable parameter, in units and raw, one a line (TOML)."
+        profile = self.session.profile
+        self._ask_for_file("Back up to", "toml", about, lambda values: dumps(profile, values))
+
+    def action_report(self) -> None:
+        """Ask for a file, read everything, write what a customer may be given."""
+        from tui.session.report import entries_of, report
+
+        def text(values: ParameterSet) -> str:
+            entries = entries_of(self.editor.journal, self.session.line_text, self.session.device)
+            return report(self.session.profile, values, entries)
+
+        about = (
+            "Identity, line, changed settings, control source, reaction to a lost line, faults and"
+            " what was written from here (Markdown)."
+        )
+        self._ask_for_file("Report to", "md", about, text)
+
+    def _ask_for_file(
+        self, question: str, suffix: str, about: str, text: Callable[[ParameterSet], str]
+    ) -> None:
+        from ..dialogs.ask import Ask
+
+        when = time.strftime("%Y%m%d-%H%M")
+        name = f"{self.session.profile.id}-{self.session.device}-{when}.{suffix}"
+
+        def told(name: str | None) -> None:
+            if name:
+                work = self._read_to_file(Path(name).expanduser(), text)
+                self.run_worker(work, exclusive=True, group="sets")
+
+        proposed = str(Path.cwd() / name)
+        asked = Ask(question, fault_of_new, text=proposed, about=about, takes="writes the file")
+        self.app.push_screen(asked, told)
+
+    async def _read_to_file(self, path: Path, text: Callable[[ParameterSet], str]) -> None:
+        from tui.drive.settings.set_file import write_file
+        from tui.session.read.upload import Upload
+
+        def progress(done: int, count: int) -> None:
+            self.note(f"Reading for {path.name}: {done} of {count}")
+
+        upload = Upload(self.session, progress=progress)
+        try:
+            await upload.run()
+            values = upload.parameter_set()
+            # the disk may hang
+            await asyncio.to_thread(lambda: write_file(path, text(values)))
+        except (LineError, DriveError) as error:
+            self.note(f"No file: {error}")
+        else:
+            bad = len(upload.absent)
+            without = f"; {bad} the drive does not tell" if bad else ""
+            self.note(f"{len(upload.raws)} parameters{without}: {path}")
+
+    # Compare
+
+    def action_load_file(self) -> None:
+        """Choose what to compare with: a file, another drive of the line, the factory settings."""
+        from tui.session.paths import state_folder
+
+        from ..dialogs.pick_file import PickFile
+
+        def told(text: str | None) -> None:
+            if text:
+                self.run_worker(self._compare(text), exclusive=True, group="sets")
+
+        others = [("factory", "the factory settings")]
+        consoles = self.app.fleet.consoles if self.app.fleet else []
+        others += [
+            (str(one.device), f"drive {one.device}, {one.session.profile.name}")
+            for one in consoles
+            if one is not self.console
+        ]
+        question = "Compare with; what it has otherwise can be staged"
+        self.app.push_screen(PickFile(question, others, [Path.cwd(), state_folder()]), told)
+
+    async def _compare(self, text: str) -> None:
+        editor = self.editor
+        typed = text.strip()
+        editor.source = None
+        try:
+            if typed.casefold() == "factory":
+                editor.other, editor.other_label = {}, "factory"
+                self.note("Compared with the factory settings; d shows what differs.")
+                return
+            if typed.isdecimal():
+                await self._compare_drive(int(typed))
+            else:
+                await self._compare_file(typed)
+            if editor.source is not None:
+                await self._look_at_source()
+        except (LineError, DriveError) as error:
+            self.note(str(error))
+
+    async def _compare_file(self, name: str) -> None:
+        from tui.drive.settings.set_file import read_set
+
+        path = Path(name)
+        # by its name alone: a long path leaves no room for what is wrong in the file
+        self.editor.source = await asyncio.to_thread(lambda: read_set(path.expanduser(), path.name))
+        self.editor.other_label = path.name
+
+    async def _compare_drive(self, device: int) -> None:
+        from tui.session.read.upload import Upload, setting_codes
+
+        found = self.app.fleet.console(device) if self.app.fleet else None
+        if found is None:
+            return
+        other = found.session
+
+        def progress(done: int, count: int) -> None:
+            self.note(f"Reading device {device}: {done} of {count}")
+
+        upload = Upload(other, setting_codes(other.profile), progress)
+        await upload.run()
+        self.editor.source = upload.parameter_set()
+        self.editor.other_label = f"device {device}"
+
+    async def _look_at_source(self) -> None:
+        """Read the drive's settings, and tell what would be staged and what left out."""
+        editor = self.editor
+        assert editor.source is not None
+        self.note("Reading the settings to compare")
+        plan = await editor.plan()
+        same_family = editor.source.head.profile == self.session.profile.id
+        editor.other = dict(editor.source.raws) if same_family else plan_values(plan)
+        if not editor.other:
+            editor.other = {"": 0}
+        writes, skips = plan.count("write"), plan.count("skip")
+        self.note(
+            f"{editor.other_label}: {writes} differ and can be staged (i), {plan.count('equal')}"
+            f" are equal, {skips} left out."
+        )
+        self.listed.chosen = "differs"
+        self.list_again()
+
+    def action_stage_set(self) -> None:
+        """Stage what the set has otherwise; nothing is written."""
+        if self.editor.source is None:
+            self.note("Nothing to stage from: Ctrl+O chooses a file or another drive.")
+            return
+        self.run_worker(self._stage_set(), exclusive=True, group="sets")
+
+    async def _stage_set(self) -> None:
+        from .skipped import Skipped
+
+        editor = self.editor
+        try:
+            plan = await editor.plan()
+        except (LineError, DriveError) as error:
+            self.note(str(error))
+            return
+        editor.take_plan(plan)
+        left = [item for item in plan.of_kind("skip") if item.reason != "no setting"]
+        self.note(f"{len(plan.edits)} staged from {editor.other_label}; w writes them.")
+        if left:
+            self.app.push_screen(Skipped(len(plan.edits), editor.other_label, left))
+
+
+def plan_values(plan: object) -> dict[str, int]:
+    """The raw values that a plan would write, by code."""
+    from tui.drive.settings.restore_plan import RestorePlan
+
+    assert isinstance(plan, RestorePlan)
+    return {edit.code: edit.new for edit in plan.edits}

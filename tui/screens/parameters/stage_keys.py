@@ -1,0 +1,139 @@
+"""Keys of the Parameters screen that stage: edit, step, confirm, undo."""
+
+from __future__ import annotations
+
+from tui.drive.errors import DriveError
+
+from .parameter_keys import ParameterKeys
+
+
+class StageKeys(ParameterKeys):
+    """What is typed is checked and staged; nothing here reaches the drive."""
+
+    def action_edit(self) -> None:
+        """A dialog for the parameter under the cursor."""
+        from .edit_value import dialog_for
+
+        code = self.listed.code
+        if not code or not self._may_edit(code):
+            return
+
+        def told(answer: str | int | None) -> None:
+            if answer is not None:
+                self._stage(code, answer)
+
+        dialog = dialog_for(self.editor, self.session.profile[code])()
+        self.app.push_screen(dialog, told)
+
+    def _may_edit(self, code: str) -> bool:
+        """Whether it may be staged; a motor that runs hinders only the writing."""
+        refused = self.editor.refusal(code)
+        if refused is None or refused.reason == "running":
+            if code in self.editor.raws:
+                return True
+            self.note(self.editor.absent.get(code) or f"{code} was not read yet.")
+            return False
+        if refused.reason == "unverified":
+            self.action_confirm()
+        else:
+            self.note(refused.text)
+        return False
+
+    def _stage(self, code: str, answer: str | int) -> None:
+        try:
+            if isinstance(answer, str):
+                remark = self.editor.stage(code, answer)
+            else:
+                remark = self.editor.stage_raw(code, answer)
+        except DriveError as refused:
+            self.note(str(refused))
+        else:
+            self.note(remark)
+
+    def action_step_value(self, steps: int) -> None:
+        """Stage the next value that the drive can hold."""
+        code = self.listed.code
+        if not code or not self._may_edit(code):
+            return
+        edit = self.editor.edits.get(code)
+        self._stage(code, (edit.new if edit else self.editor.raws[code]) + steps)
+
+    def action_confirm(self) -> None:
+        """Confirm an unverified parameter, or keep an edit over another's change."""
+        from ..dialogs.confirm import Confirm
+
+        code = self.listed.code
+        if code in self.editor.changed_elsewhere:
+            self.editor.accept_changes()
+            self.note("Your edits stay, against what the drive holds now.")
+            return
+        refused = self.editor.refusal(code) if code else None
+        if refused is None or refused.reason != "unverified":
+            return
+        parameter = self.session.profile[code]
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                self.editor.confirm(code)
+                self.look()
+
+        follows = (
+            f"No document at hand confirms that {code} is at {parameter.number} on this family."
+            " Read it at the keypad: only if both show the same, confirm it."
+            f" Here it reads {self.editor.raws.get(code, 'nothing')}."
+        )
+        asked = Confirm(
+            f"Confirm {code}?",
+            follows,
+            yes="the keypad shows the same",
+            no="not confirmed",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
+
+    def action_undo(self) -> None:
+        """Take the last edit back; where nothing is staged, stage what was held before a write."""
+        if len(self.editor.edits.asked):
+            self.editor.undo(self.editor.edits.asked[-1].code)
+        else:
+            self.note(self.editor.stage_old())
+        self.list_again()
+
+    def action_undo_this(self) -> None:
+        """Take the edit under the cursor back."""
+        if self.listed.code in self.editor.edits:
+            self.editor.undo(self.listed.code)
+        else:
+            self.note("This parameter is not staged.")
+        self.list_again()
+
+    def action_undo_all(self) -> None:
+        """Take every edit back, after asking."""
+        from ..dialogs.confirm import Confirm
+
+        count = len(self.editor.edits)
+        if not count:
+            return
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                self.editor.undo_all()
+                self.list_again()
+
+        follows = f"{count} staged edits are dropped; the drive is not touched."
+        asked = Confirm(
+            "Undo all edits?",
+            follows,
+            yes="drops them",
+            no="keeps them",
+            loses=True,
+            now=self.motor_now(),
+        )
+        self.app.push_screen(asked, told)
+
+    def action_favourite(self) -> None:
+        """Mark or unmark the parameter."""
+        if self.listed.code:
+            self.editor.toggle_favourite(self.listed.code)
+            self.look()

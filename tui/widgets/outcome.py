@@ -1,0 +1,23 @@
+"""What became of work on a drive, as a person reads it."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from tui.session.work import Kind, Outcome
+
+from .drawing import cut
+from .palette import ALARM, ATTENTION, STRONG
+
+OUTCOME_STYLES = {Kind.WORKING: ATTENTION, Kind.DONE: STRONG, Kind.REFUSED: ALARM}
+
+
+def outcome_lines(outcome: Outcome, width: int) -> list[Text]:
+    """What became of the last order, on at most two lines."""
+    head = {Kind.WORKING: "ORDERED ", Kind.DONE: "DONE ", Kind.REFUSED: "NOT DONE "}[outcome.kind]
+    text = head + outcome.text
+    style = OUTCOME_STYLES[outcome.kind]
+    if len(text) <= width:
+        return [Text(text, style)]
+    at = text.rfind(" ", 0, width)
+    return [Text(text[:at], style), Text(cut(text[at + 1 :], width).rstrip(), style)]
