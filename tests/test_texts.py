@@ -12,7 +12,7 @@ PACKAGE = Path(__file__).resolve().parent.parent / "tui"
 TEXTS = PACKAGE / "widgets" / "plain.py"
 """The one module that makes labels and entries of lists, with markup off."""
 FIELDS = PACKAGE / "widgets" / "fields.py"
-PRINTS = {PACKAGE / "cli" / "say.py", PACKAGE / "cli" / "output.py"}
+PRINTS = {PACKAGE / "cli" / "shared" / "say.py", PACKAGE / "cli" / "shared" / "output.py"}
 """The modules that print for the commands, control characters as signs."""
 MADE_ELSEWHERE = {
     "Label": "Plain",
@@ -59,7 +59,7 @@ def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
         yield "a console with markup"
     if ast.unparse(call.func) in PRINTING and path not in PRINTS:
         yield f"{name}: take say"
-    if name == "add_row" and path.parent.name != "cli":
+    if name == "add_row" and PACKAGE / "cli" not in path.parents:
         for cell in call.args:
             if not (isinstance(cell, ast.Constant) or _name(cell) in ("Text", "assemble")):
                 yield "a cell that may be a str"

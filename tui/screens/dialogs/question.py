@@ -7,6 +7,7 @@ typed before it was there was meant for something else.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from rich.text import Text
@@ -24,6 +25,9 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
+STYLES = Path(__file__).with_name("dialogs.tcss")
+"""Absolute, as Textual looks beside the class that inherits it, which may be of another room."""
+
 NOW_EVERY = 0.5
 """Seconds between two looks at what the motor does."""
 
@@ -32,7 +36,7 @@ class Question(ModalScreen[T]):
     """A dialog that gives an answer back; Esc is no, as is a stop of the drive meanwhile."""
 
     app: Panel
-    CSS_PATH = "dialogs.tcss"
+    CSS_PATH = STYLES
     SETTLED: ClassVar[float] = 0.3
     """Seconds that a question has stood before Enter and `y` are answers."""
     NO: ClassVar[Any] = None

@@ -17,13 +17,13 @@ from tui.drive.settings.restore_plan import Item
 from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
 
-from ..dialogs.question import hint
+from ..dialogs.question import STYLES, hint
 
 
 class Skipped(ModalScreen[None]):
     """A list to read through; scrolls."""
 
-    CSS_PATH = "../dialogs/dialogs.tcss"
+    CSS_PATH = STYLES
     BINDINGS: ClassVar = [Binding("escape,enter,q", "dismiss(None)", show=False)]
 
     def __init__(self, staged: int, label: str, left: Sequence[Item]) -> None:
