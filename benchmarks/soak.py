@@ -2,7 +2,7 @@
 
     python -m benchmarks.soak [--minutes N] [--peer] [--seed N]
 
-Sessions monitor five drives as the panel does, with its keeper, on a faulty line in real time,
+Sessions monitor five drives as the panel does, with its line_watch, on a faulty line in real time,
 and an operator reads now and then, sometimes giving up on it. Every register that can have one
 holds a value of its own, so that each reading is checked. With `--peer` the drives are libmodbus
 servers that answer late on purpose, every third time twice: over RTU on pseudo-terminals (which
@@ -38,7 +38,7 @@ from tui.bus.line import Line
 from tui.bus.link import parse_link
 from tui.drive.profile.library import load
 from tui.session.drive import DriveSession
-from tui.session.monitor.line_watch import Keeper
+from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor, Snapshot
 from tui.session.read.reader import Reader
 from tui.session.reading import Reading
@@ -99,7 +99,7 @@ class Watched:
             for device in served.devices
         }
         self._monitors = {d: Monitor(session) for d, session in self._sessions.items()}
-        self._keeper = Keeper(self.line)
+        self._keeper = LineWatch(self.line)
 
     def start(self) -> None:
         """Open the line and watch all drives."""

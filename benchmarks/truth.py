@@ -126,7 +126,7 @@ def right(device: int, address: int, words: int) -> list[int]:
 
 
 async def ours(path: str, job: Job) -> Tally:
-    """Our line: an asker for each drive, some requests given up on their way, some writes."""
+    """Our line: an retrying for each drive, some requests given up on their way, some writes."""
     link = SerialLink(path, 19200 if job.real else 115200, "8N1")
     line = Line(link, timing=Timing() if job.real else FAST)
     tally = Tally(job.contestant, time_out=line.timing.first_timeout)
@@ -155,7 +155,7 @@ async def ours(path: str, job: Job) -> Tally:
             answer = (await line.read(device, SCRATCH + 2 * at, 2)).words
         tally.note(answer, values)
 
-    async def asker(reads: list[tuple[int, int, int]], number: int) -> None:
+    async def retrying(reads: list[tuple[int, int, int]], number: int) -> None:
         for at, read in enumerate(reads):
             if chance.random() < WRITTEN:
                 await write(read[0], (4 * at + number) % 2000)
@@ -166,7 +166,7 @@ async def ours(path: str, job: Job) -> Tally:
     begun = time.monotonic()
     # each drive has a monitor of its own
     share = ([read for read in reads if read[0] == device] for device in DEVICES)
-    await asyncio.gather(*(asker(each, number) for number, each in enumerate(share)))
+    await asyncio.gather(*(retrying(each, number) for number, each in enumerate(share)))
     tally.seconds = time.monotonic() - begun
     line.close()
     return tally

@@ -72,7 +72,7 @@ async def _run(size: tuple[int, int]) -> None:
         fleet = app.fleet
         if fleet is None:
             raise RuntimeError("drives were found on no line")
-        await until(pilot, lambda: len(fleet.keeper.looks) == len(DRIVES))
+        await until(pilot, lambda: len(fleet.line_watch.looks) == len(DRIVES))
         await pilot.pause(1.0)
         save("connection")
         await pilot.press(*["down"] * (WATCHED - 1), "enter")

@@ -44,10 +44,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-CONNECT_WITHIN = 4.0
+CHOSEN_CONNECTS_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""
 
-HUNGER_LOOK = 0.25
+WARNINGS_LOOK = 0.25
 """Seconds between two looks for drives that are about to act on their time-out."""
 
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
@@ -270,18 +270,18 @@ class DrivePanelApp(LeanApp, Places, Leaving):
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
         self.push_screen(self.connection)
-        self.set_interval(HUNGER_LOOK, self._tell_hunger)
-        self.set_interval(HUNGER_LOOK, self._tell_stops)
-        self.set_interval(HUNGER_LOOK, self._tell_journal)
+        self.set_interval(WARNINGS_LOOK, self._tell_timeouts)
+        self.set_interval(WARNINGS_LOOK, self._tell_stops)
+        self.set_interval(WARNINGS_LOOK, self._tell_journal)
         if self._on_shown is not None:
             self.connection.call_after_refresh(self._on_shown)
         self.call_after_refresh(self._try_f12)
         if self._start is not None:
             self.call_after_refresh(self.connection.start, self._start, self._device)
 
-    def _tell_hunger(self) -> None:
+    def _tell_timeouts(self) -> None:
         """Tell of a drive that is about to act because it was not asked in time."""
-        hungry = self.fleet.keeper.hungry() if self.fleet else []
+        hungry = self.fleet.line_watch.warnings() if self.fleet else []
         for one in hungry:
             if one.device not in self._hungry and one.left > 0:
                 does = f": {one.watch.reaction.does}" if one.watch.reaction else "."
@@ -366,7 +366,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
 
     def _open_here(self, text: str) -> OpenLine:
         """Open a line in a thread; closed again where the panel was left meanwhile."""
-        opened = self._open(text, read_only=self.read_only, wait=CONNECT_WITHIN)
+        opened = self._open(text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN)
         # here, where nobody waits for a key: what the loop asks for next
         import tui.screens.monitor.screen
         import tui.session.fleet  # noqa: F401

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from tui.bus.expectation import exception_code
-from tui.bus.limits import CAUTIOUS, Limits, Window, refusal
+from tui.bus.limits import CAUTIOUS, Limits, Window, send_refusal
 from tui.bus.requests import (
     Diagnose,
     Identify,
@@ -127,7 +127,7 @@ REFUSED: list[tuple[Request, str]] = [
 
 @pytest.mark.parametrize(("request_", "text"), REFUSED)
 def test_never_sent(request_: Request, text: str) -> None:
-    reason = refusal(request_, WIDE)
+    reason = send_refusal(request_, WIDE)
     assert text in reason
     assert reason.endswith(".")
 
@@ -180,7 +180,7 @@ SCANNER = replace(ATV21, read_windows=(Window(100, 1, 8, fixed_start=False),))
     ],
 )
 def test_limits_of_a_device(request_: Request, limits: Limits, allowed: bool) -> None:
-    assert (refusal(request_, limits) == "") is allowed
+    assert (send_refusal(request_, limits) == "") is allowed
 
 
 @pytest.mark.parametrize(
@@ -198,4 +198,4 @@ def test_limits_of_a_device(request_: Request, limits: Limits, allowed: bool) ->
     ],
 )
 def test_read_only(request_: Request, allowed: bool) -> None:
-    assert (refusal(request_, WIDE, read_only=True) == "") is allowed
+    assert (send_refusal(request_, WIDE, read_only=True) == "") is allowed

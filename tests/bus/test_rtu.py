@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.bus.requests import Identify, Read, Request, WriteOne
-from tui.bus.result import Kind, Piece
+from tui.bus.result import Piece, ResultKind
 from tui.bus.rtu.exchange import RtuExchange
 from tui.bus.rtu.frames import find_reply, pieces
 from tui.wire.frames import frame, is_whole
@@ -78,7 +78,7 @@ def test_reply_in_lumps(sizes: list[int]) -> None:
         lump, rest = rest[:size], rest[size:]
         verdict = verdict or exchange.feed(lump)
     assert verdict is not None
-    assert verdict.kind is Kind.REPLY
+    assert verdict.kind is ResultKind.REPLY
     assert verdict.resynchronised
 
 
@@ -87,7 +87,7 @@ def test_first_replies_can_belong_to_others() -> None:
     assert exchange.feed(REPLY) is None
     verdict = exchange.feed(REPLY)
     assert verdict is not None
-    assert verdict.kind is Kind.REPLY
+    assert verdict.kind is ResultKind.REPLY
 
 
 WRITE = WriteOne(1, 5, 7)
@@ -97,18 +97,18 @@ COPY = frame(1, WRITE.pdu())
 @pytest.mark.parametrize(
     ("echo", "received", "kind"),
     [
-        (False, b"", Kind.NOTHING),
-        (False, COPY, Kind.REPLY),
-        (True, COPY, Kind.NOTHING),
-        (True, COPY * 2, Kind.REPLY),
-        (None, b"", Kind.NOTHING),
-        (None, COPY, Kind.UNSURE),
-        (None, COPY * 2, Kind.REPLY),
-        (True, COPY + frame(1, bytes([0x86, 3])), Kind.EXCEPTION),
-        (None, COPY + frame(1, bytes([0x86, 3])), Kind.EXCEPTION),
+        (False, b"", ResultKind.NOTHING),
+        (False, COPY, ResultKind.REPLY),
+        (True, COPY, ResultKind.NOTHING),
+        (True, COPY * 2, ResultKind.REPLY),
+        (None, b"", ResultKind.NOTHING),
+        (None, COPY, ResultKind.UNSURE),
+        (None, COPY * 2, ResultKind.REPLY),
+        (True, COPY + frame(1, bytes([0x86, 3])), ResultKind.EXCEPTION),
+        (None, COPY + frame(1, bytes([0x86, 3])), ResultKind.EXCEPTION),
     ],
 )
-def test_write_through_an_adapter(echo: bool | None, received: bytes, kind: Kind) -> None:
+def test_write_through_an_adapter(echo: bool | None, received: bytes, kind: ResultKind) -> None:
     exchange = exchange_of(WRITE, echo=echo)
     verdict = exchange.feed(received) or exchange.expired()
     assert verdict.kind is kind
@@ -153,20 +153,20 @@ def test_silence_ends_the_wait_for_remains_of_the_reply_only(received: bytes, en
     verdict = exchange.silent()
     assert (verdict is not None) is ends
     if verdict is not None:
-        assert verdict.kind is Kind.DAMAGED
+        assert verdict.kind is ResultKind.DAMAGED
 
 
 @pytest.mark.parametrize(
     ("received", "kind"),
     [
-        (b"", Kind.NOTHING),
-        (b"\x55", Kind.NOTHING),
-        (OTHER, Kind.NOTHING),
-        (b"\x55\x66\x77\x88", Kind.DAMAGED),
-        (frame(1, bytes([4, 2, 0, 9])), Kind.WRONG),
+        (b"", ResultKind.NOTHING),
+        (b"\x55", ResultKind.NOTHING),
+        (OTHER, ResultKind.NOTHING),
+        (b"\x55\x66\x77\x88", ResultKind.DAMAGED),
+        (frame(1, bytes([4, 2, 0, 9])), ResultKind.WRONG),
     ],
 )
-def test_end_of_time(received: bytes, kind: Kind) -> None:
+def test_end_of_time(received: bytes, kind: ResultKind) -> None:
     exchange = exchange_of(READ)
     exchange.feed(received)
     assert exchange.expired().kind is kind

@@ -52,7 +52,7 @@ def test_the_example_is_found_loaded_and_decodes(folder: Path) -> None:
     assert save_order(profile).parameter == "KEEP"
     with pytest.raises(MemoryRefused, match="Example pump drive recalls"):
         factory_order(profile)
-    assert library.identify("EXPUMP-22") == ["example-pump"]
+    assert library.matching_profiles("EXPUMP-22") == ["example-pump"]
 
 
 def test_packaged_profiles_stay_in_the_list(folder: Path) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.drive.control_source import changes, source_codes, source_in_force
+from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile import library
 from tui.drive.values import check_raw
 
@@ -42,7 +42,7 @@ def test_a_configuration_is_known_again_and_leaves_nothing_to_write(family: str)
         raws = dict.fromkeys(source_codes(profile), 7)
         raws |= {setting.parameter: setting.value for setting in source.settings}
         assert source_in_force(profile, raws) is source
-        assert changes(profile, source, raws) == []
+        assert source_changes(profile, source, raws) == []
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -66,5 +66,5 @@ def test_of_two_that_fit_the_one_that_says_more_counts() -> None:
 def test_an_unread_word_fits_nothing() -> None:
     profile = library.load("atv21")
     assert source_in_force(profile, {"CMOD": 2}) is None
-    unread = changes(profile, profile.data.control_sources[0], {"CMOD": 2})
+    unread = source_changes(profile, profile.data.control_sources[0], {"CMOD": 2})
     assert [(change.parameter.code, change.old) for change in unread] == [("FMOD", None)]

@@ -17,9 +17,9 @@ from tui.drive.settings.edits import (
     Edits,
     consequences,
     cuts_line,
+    edit_problems,
     limit_pairs,
     ordered,
-    problems,
 )
 from tui.drive.shown import shown
 
@@ -139,14 +139,14 @@ def test_the_order_of_different_things() -> None:
 
 def test_a_value_past_another_is_told_with_both() -> None:
     edits = Edits().stage(ATV71, "LSP", "55", HELD)
-    told = problems(ATV71, edits, HELD)
+    told = edit_problems(ATV71, edits, HELD)
     assert told == {
         "LSP": "LSP = 55.0 Hz would be above HSP = 50.0 Hz: change HSP too, or another value."
     }
-    assert problems(ATV71, edits.stage(ATV71, "HSP", "60", HELD), HELD) == {}
+    assert edit_problems(ATV71, edits.stage(ATV71, "HSP", "60", HELD), HELD) == {}
     lowered = Edits().stage(ATV71, "TFR", "40", HELD)
-    assert "below HSP = 50.0 Hz" in problems(ATV71, lowered, HELD)["TFR"]
-    assert problems(ATV71, Edits().stage(ATV71, "ACC", "4", HELD), {**HELD, "LSP": 600}) == {}
+    assert "below HSP = 50.0 Hz" in edit_problems(ATV71, lowered, HELD)["TFR"]
+    assert edit_problems(ATV71, Edits().stage(ATV71, "ACC", "4", HELD), {**HELD, "LSP": 600}) == {}
 
 
 def test_values_that_the_drive_took_on_meanwhile_are_seen() -> None:
@@ -210,7 +210,7 @@ def test_every_value_is_held_at_the_end(
     for edit in ordered(profile, edits, held):
         drive.write(edit)
     assert drive.raws == edits.after(held) == dict(zip(SPEEDS[family], new, strict=True))
-    assert problems(profile, edits, held) == {}
+    assert edit_problems(profile, edits, held) == {}
 
 
 @given(

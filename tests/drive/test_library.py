@@ -190,11 +190,11 @@ def test_an_unknown_code_proposes_near_ones() -> None:
      ("ATV312HU09M3", "atv312")],
 )  # fmt: skip
 def test_a_reference_finds_its_profile(reference: str, profile_id: str) -> None:
-    assert library.identify(reference)[0] == profile_id
+    assert library.matching_profiles(reference)[0] == profile_id
 
 
 def test_an_unknown_reference_finds_none() -> None:
-    assert library.identify("ACS550") == []
+    assert library.matching_profiles("ACS550") == []
 
 
 def test_the_committed_schema_is_up_to_date() -> None:

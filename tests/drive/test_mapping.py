@@ -12,7 +12,7 @@ from tui.drive.blocks.assignment import (
     Assignment,
     MappingError,
     assignment,
-    changes,
+    assignment_problems,
     choices,
     describe,
     empty,
@@ -21,15 +21,15 @@ from tui.drive.blocks.assignment import (
     no_blocks,
     pick,
     place_of,
-    problems,
     raw_named,
     refusing,
+    slot_changes,
+    slot_target,
     steps,
-    target,
 )
-from tui.drive.blocks.file import dumps, loads
+from tui.drive.blocks.file import dump_blocks, load_blocks
 from tui.drive.blocks.user_words import UserWord, format_named, is_no_value, word_named
-from tui.drive.blocks.wire_cost import cost, frame, microseconds, saving, stretches
+from tui.drive.blocks.wire_cost import block_request, cost, microseconds, saving, stretches
 from tui.drive.errors import DriveError, UnknownParameter
 from tui.drive.profile import library
 from tui.drive.profile.schema import Block
@@ -64,9 +64,13 @@ def test_the_example_of_the_scanner_by_function_23() -> None:
     assert inputs.raws == (3201, 8604, 3204, 3205, 3207, 3209, 9630, 7121)
     assert outputs.raws == (8501, 8602, 3104, 3105, 9001, 9002, 0, 0)
     words = (0x000F, 0x1388, 0x1F40, 0x01F4, 0x04B0, 0x0258)
-    sent = frame(ATV71, 20, inputs, outputs, words)
+    sent = block_request(ATV71, 20, inputs, outputs, words)
     assert sent.hex() == "141731c5000831d900060c000f13881f4001f404b00258563d"
-    assert refusing(problems(ATV71, inputs)) == refusing(problems(ATV71, outputs)) == []
+    assert (
+        refusing(assignment_problems(ATV71, inputs))
+        == refusing(assignment_problems(ATV71, outputs))
+        == []
+    )
 
 
 @pytest.mark.parametrize(
@@ -78,13 +82,13 @@ def test_the_example_of_the_scanner_by_function_23() -> None:
     ],
 )
 def test_the_examples_of_the_read_block(codes: list[str], sent: str) -> None:
-    assert frame(ATV21, 1, made("atv21", "read", codes), None).hex().upper() == sent
+    assert block_request(ATV21, 1, made("atv21", "read", codes), None).hex().upper() == sent
 
 
 def test_the_example_of_the_write_block() -> None:
     outputs = made("atv21", "write", ["FA00", "FA01"])
     assert outputs.raws == (1, 3)
-    sent = frame(ATV21, 1, None, outputs, (0xC400, 0x1770))
+    sent = block_request(ATV21, 1, None, outputs, (0xC400, 0x1770))
     assert sent[:-2].hex().upper() == "01101870000204C4001770"
     assert crc16(sent) == 0
     assert hex_text(sent).startswith("01 10 18 70 00 02 04")
@@ -148,30 +152,30 @@ def test_what_a_slot_cannot_stand_for(family: str, direction: str, typed: str, s
 
 
 def test_twice_is_wrong_in_outputs_and_a_waste_in_inputs() -> None:
-    (wrong,) = problems(ATV71, made("atv71", "write", ["CMD", "CMD"]))
+    (wrong,) = assignment_problems(ATV71, made("atv71", "write", ["CMD", "CMD"]))
     assert wrong.refuses
     assert "NCA1 already" in wrong.text
-    (waste,) = problems(ATV71, made("atv71", "read", ["ETA", "ETA"]))
+    (waste,) = assignment_problems(ATV71, made("atv71", "read", ["ETA", "ETA"]))
     assert not waste.refuses
 
 
 def test_an_address_nobody_knows_is_a_problem_of_its_slot() -> None:
     plan = empty(block("atv71", "read")).with_raw(3, 3199)
-    (wrong,) = problems(ATV71, plan)
+    (wrong,) = assignment_problems(ATV71, plan)
     assert (wrong.slot, wrong.refuses) == ("NMA4", True)
-    (wrong,) = problems(ATV21, empty(block("atv21", "read")).with_raw(0, 99))[:1]
+    (wrong,) = assignment_problems(ATV21, empty(block("atv21", "read")).with_raw(0, 99))[:1]
     assert "none of its 11 choices" in wrong.text
 
 
 def test_a_write_block_whose_first_slot_is_unused_is_refused_by_the_drive() -> None:
     plan = empty(block("atv21", "write")).with_raw(1, 3)
-    assert any("exception 4" in p.text and p.refuses for p in problems(ATV21, plan))
+    assert any("exception 4" in p.text and p.refuses for p in assignment_problems(ATV21, plan))
     hole = made("atv21", "read", ["FD01", "none", "FE03"])
-    assert [p.refuses for p in problems(ATV21, hole)] == [False]
+    assert [p.refuses for p in assignment_problems(ATV21, hole)] == [False]
 
 
 def test_a_parameter_that_this_drive_lacks_is_told() -> None:
-    (wrong,) = problems(ATV71, made("atv71", "read", ["LCR"]), {"LCR"})
+    (wrong,) = assignment_problems(ATV71, made("atv71", "read", ["LCR"]), {"LCR"})
     assert "says that it has no LCR" in wrong.text
 
 
@@ -210,7 +214,7 @@ def test_the_steps_lead_there_and_move_nothing_without_freeing_it(
             assert list(held.values()).count(step.new) == 1
     assert tuple(held.values()) == after
     assert not steps(held, plan)
-    assert {c.slot for c in changes(Assignment(inputs, before).slots, plan)} == {
+    assert {c.slot for c in slot_changes(Assignment(inputs, before).slots, plan)} == {
         slot for slot, one, other in zip(inputs.slots, before, after, strict=True) if one != other
     }
 
@@ -229,12 +233,12 @@ def test_moving_there_and_back_changes_nothing(
 def test_a_file_holds_what_was_written_to_it(raws: tuple[int, ...]) -> None:
     inputs = Assignment(block("atv71", "read"), raws)
     outputs = factory(ATV71, block("atv71", "write"))
-    text = dumps(ATV71, [inputs, outputs], "pump 3")
-    assert loads(text, "x.toml", ATV71) == {"scanner-read": inputs, "scanner-write": outputs}
+    text = dump_blocks(ATV71, [inputs, outputs], "pump 3")
+    assert load_blocks(text, "x.toml", ATV71) == {"scanner-read": inputs, "scanner-write": outputs}
     whole = text.rstrip()
     for end in range(0, len(whole), 41):
         with pytest.raises(MappingError, match=r"x\.toml:\d+: "):
-            loads(whole[:end], "x.toml", ATV71)
+            load_blocks(whole[:end], "x.toml", ATV71)
 
 
 @given(raws=RAWS)
@@ -279,7 +283,7 @@ def test_the_time_of_the_exchange_that_is_shown() -> None:
     assert microseconds(ATV71, TIMING, None, outputs) == round(write * 1e6)
     nothing = empty(block("atv71", "read"))
     assert microseconds(ATV71, TIMING, nothing, None) == 0
-    assert frame(ATV71, 1, nothing, None) == b""
+    assert block_request(ATV71, 1, nothing, None) == b""
 
 
 @pytest.mark.parametrize("family", WITHOUT)
@@ -305,7 +309,7 @@ def test_a_drive_of_single_words_has_no_stretches() -> None:
 
 # Files
 
-GOOD = dumps(ATV21, [factory(ATV21, block("atv21", "read"))])
+GOOD = dump_blocks(ATV21, [factory(ATV21, block("atv21", "read"))])
 
 
 @pytest.mark.parametrize(
@@ -326,15 +330,15 @@ GOOD = dumps(ATV21, [factory(ATV21, block("atv21", "read"))])
 def test_a_wrong_file_is_refused_with_its_line(old: str, new: str, line: int, says: str) -> None:
     assert old in GOOD
     with pytest.raises(MappingError, match=says) as error:
-        loads(GOOD.replace(old, new), "block.toml", ATV21)
+        load_blocks(GOOD.replace(old, new), "block.toml", ATV21)
     assert str(error.value).startswith(f"block.toml:{line}: ")
 
 
 def test_a_file_may_be_written_by_hand() -> None:
     text = GOOD.replace('F875 = "none"', "F875 = 1").replace('F876 = "none"', 'F876 = "16#FD00"')
-    plan = loads(text, "x", ATV21)["read"]
+    plan = load_blocks(text, "x", ATV21)["read"]
     assert plan.raws == (1, 2, 0, 0, 0)
-    second = target(ATV21, plan.block, 2)
+    second = slot_target(ATV21, plan.block, 2)
     assert second is not None
     assert second.code == "FD00"
 

@@ -15,23 +15,23 @@ from tui.drive.errors import UnknownProfile
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
-from tui.drive.settings.compare import Side, compare, factory_side, side_of, told
-from tui.drive.settings.parameter_set import Head, ParameterSet, SetError, dumps
+from tui.drive.settings.compare import Side, compare_settings, factory_side, rows_text, side_of
+from tui.drive.settings.parameter_set import ParameterSet, SetError, SetHead, dump_set
 from tui.drive.settings.set_file import FileThere, read_set, write_file
-from tui.drive.settings.set_reading import loads
+from tui.drive.settings.set_reading import load_set
 from tui.drive.values import is_enumeration, raw_range, type_range
 
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
-HEAD = Head("atv71", "1.0", "Altivar 71", "2024-05-01T10:00:00+00:00", "serial:/dev/x", 2, "0.1")
+HEAD = SetHead("atv71", "1.0", "Altivar 71", "2024-05-01T10:00:00+00:00", "serial:/dev/x", 2, "0.1")
 SMALL = {"INR": 1, "ACC": 30, "HSP": 500, "CHCF": 1, "ETA": 0x21, "RFR": -503}
 
 
 def small(**more: int) -> str:
-    return dumps(library.load("atv71"), ParameterSet(HEAD, {**SMALL, **more}))
+    return dump_set(library.load("atv71"), ParameterSet(HEAD, {**SMALL, **more}))
 
 
 def read(text: str) -> ParameterSet:
-    return loads(text, "set.toml", library.load)
+    return load_set(text, "set.toml", library.load)
 
 
 @settings(max_examples=25)
@@ -41,13 +41,15 @@ def test_every_parameter_of_every_profile_there_and_back(data: st.DataObject) ->
     profile = library.load(data.draw(st.sampled_from(FAMILIES)))
     seed = data.draw(st.randoms(use_true_random=False))
     raws = {p.code: seed.randint(*type_range(p)) for p in profile.parameters}
-    head = Head(profile.id, "1", 'a "name"\\ with\tall\x7f', "t", "l", 7, "0", {"reference": "ATV"})
+    head = SetHead(
+        profile.id, "1", 'a "name"\\ with\tall\x7f', "t", "l", 7, "0", {"reference": "ATV"}
+    )
     values = ParameterSet(head, raws)
-    text = dumps(profile, values)
-    back = loads(text, "set.toml", library.load)
+    text = dump_set(profile, values)
+    back = load_set(text, "set.toml", library.load)
     assert dict(back.raws) == raws
     assert back.head == head
-    assert dumps(profile, back) == text
+    assert dump_set(profile, back) == text
 
 
 @settings(max_examples=25)
@@ -57,10 +59,10 @@ def test_a_value_without_its_raw_word_is_the_same(data: st.DataObject) -> None:
     profile = library.load(data.draw(st.sampled_from(FAMILIES)))
     seed = data.draw(st.randoms(use_true_random=False))
     raws = {p.code: seed.choice(allowed(profile, p)) for p in profile.parameters if not p.unit_by}
-    text = dumps(profile, ParameterSet(Head(profile.id), raws))
+    text = dump_set(profile, ParameterSet(SetHead(profile.id), raws))
     alone = re.sub(r"raw = -?\d+, ", "", text)
     assert "raw =" not in alone.replace("# `raw`", "")
-    assert dict(loads(alone, "set.toml", library.load).raws) == raws
+    assert dict(load_set(alone, "set.toml", library.load).raws) == raws
 
 
 def allowed(profile: Profile, parameter: Parameter) -> list[int]:
@@ -88,10 +90,10 @@ def test_a_line_a_parameter_in_a_stable_order() -> None:
 
 def test_what_could_not_be_read_is_listed_with_why() -> None:
     profile = library.load("powerdrive")
-    values = ParameterSet(Head("powerdrive"), {"15.07": 50}, {"15.03": 'no "answer"'})
-    text = dumps(profile, values)
+    values = ParameterSet(SetHead("powerdrive"), {"15.07": 50}, {"15.03": 'no "answer"'})
+    text = dump_set(profile, values)
     assert '"15.07" = { raw = 50, ' in text
-    assert loads(text, "f", library.load).absent == {"15.03": 'no "answer"'}
+    assert load_set(text, "f", library.load).absent == {"15.03": 'no "answer"'}
 
 
 def test_a_value_edited_by_hand_counts_once_raw_is_taken_out() -> None:
@@ -211,10 +213,10 @@ def test_differences_leave_measurements_out() -> None:
     profile = library.load("atv71")
     a = Side("a", SMALL)
     b = Side("b", {**SMALL, "ACC": 50, "RFR": 100, "ETA": 0x27, "CMD": 15})
-    assert [(row.code, row.a, row.b) for row in compare(profile, a, b)] == [
+    assert [(row.code, row.a, row.b) for row in compare_settings(profile, a, b)] == [
         ("ACC", "3.0 s", "5.0 s")
     ]
-    every = compare(profile, a, b, all_rows=True)
+    every = compare_settings(profile, a, b, all_rows=True)
     assert {row.code for row in every} == {*SMALL, "CMD"}
     assert [row.code for row in every if row.differs] == ["ACC"]
 
@@ -222,38 +224,43 @@ def test_differences_leave_measurements_out() -> None:
 def test_a_ramp_under_another_scale_is_the_same_ramp() -> None:
     profile = library.load("atv71")
     a, b = Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 0, "ACC": 300})
-    assert [row.code for row in compare(profile, a, b)] == ["INR"]
+    assert [row.code for row in compare_settings(profile, a, b)] == ["INR"]
     c = Side("c", {"INR": 0, "ACC": 30})
-    assert [row.code for row in compare(profile, a, c)] == ["INR", "ACC"]
+    assert [row.code for row in compare_settings(profile, a, c)] == ["INR", "ACC"]
 
 
 def test_what_one_side_could_not_read_differs_and_what_it_does_not_know_does_not() -> None:
     profile = library.load("atv71")
     a = Side("a", SMALL)
     b = Side("b", {k: v for k, v in SMALL.items() if k != "ACC"}, {"ACC": "refused"})
-    (row,) = compare(profile, a, b)
+    (row,) = compare_settings(profile, a, b)
     assert (row.code, row.b, row.note) == ("ACC", "-", "refused")
     bare = Side("c", {k: v for k, v in SMALL.items() if k != "ACC"})
-    assert compare(profile, a, bare) == []
+    assert compare_settings(profile, a, bare) == []
 
 
 @pytest.mark.parametrize("family", FAMILIES)
 def test_factory_settings_differ_from_themselves_in_nothing(family: str) -> None:
     profile = library.load(family)
     side = factory_side(profile)
-    assert compare(profile, side, side) == []
-    assert compare(profile, side, side_of("f", ParameterSet(Head(family), side.raws))) == []
+    assert compare_settings(profile, side, side) == []
+    assert (
+        compare_settings(profile, side, side_of("f", ParameterSet(SetHead(family), side.raws)))
+        == []
+    )
 
 
 def test_the_formats() -> None:
     profile = library.load("atv71")
-    rows = compare(profile, Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 1, "ACC": 50}))
+    rows = compare_settings(
+        profile, Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 1, "ACC": 50})
+    )
     labels = ("old.toml", "sim:atv71")
-    text = told(rows, labels, "text")
+    text = rows_text(rows, labels, "text")
     assert re.search(r"^\*  ACC   Acceleration time  3\.0 s     5\.0 s$", text, re.MULTILINE), text
-    markdown = told(rows, labels, "markdown")
+    markdown = rows_text(rows, labels, "markdown")
     assert "| yes | ACC | Acceleration time | 3.0 s | 5.0 s |  |" in markdown
-    assert told(rows, labels, "csv").splitlines()[1] == (
+    assert rows_text(rows, labels, "csv").splitlines()[1] == (
         "ACC,Acceleration time,Settings,3.0 s,5.0 s,30,50,yes,"
     )
-    assert "No setting differs" in told([], labels, "text")
+    assert "No setting differs" in rows_text([], labels, "text")

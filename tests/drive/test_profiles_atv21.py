@@ -8,7 +8,7 @@ import pytest
 
 from tui.drive.chart import read_chart
 from tui.drive.errors import ValueRefused
-from tui.drive.profile.library import identify, load_file, packaged_folder
+from tui.drive.profile.library import load_file, matching_profiles, packaged_folder
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.read_plan import plan_reads
 from tui.drive.values import decode, encode, speed_from_frequency
@@ -159,7 +159,7 @@ def test_models(profile: Profile) -> None:
 
 def test_identification(profile: Profile) -> None:
     identification = profile.data.identification
-    assert identify("ATV21H075M3X")[0] == "atv21"
+    assert matching_profiles("ATV21H075M3X")[0] == "atv21"
     objects = [item.example for item in identification.objects]
     assert objects[1:] == ["ATV21H075M3X", "0201"]
     header, checksum = 8, 2

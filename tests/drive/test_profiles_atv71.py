@@ -6,7 +6,7 @@ import pytest
 
 from tui.drive.chart import UNKNOWN, read_chart, state_of
 from tui.drive.errors import ValueRefused
-from tui.drive.profile.library import identify, load_file, packaged_folder
+from tui.drive.profile.library import load_file, matching_profiles, packaged_folder
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Chart, Erratum
 from tui.drive.values import check_raw, decode, encode, from_words, raw_range
@@ -241,7 +241,7 @@ def test_identification(atv71: Profile) -> None:
     ]
     assert found.conformity == 2
     assert found.exception_has_mei_byte
-    assert identify("ATV71HU15M3") == ["atv71"]
+    assert matching_profiles("ATV71HU15M3") == ["atv71"]
     ratings = {model.code: model.power_kw for model in found.models}
     assert (ratings[9], ratings[23], ratings[45]) == ("1.5", "37", "1200")
 

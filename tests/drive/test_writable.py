@@ -12,9 +12,9 @@ from tui.drive.settings.writable import (
     is_setting,
     marks,
     needs_standstill,
-    refusal,
     waits_for_reset,
     warning,
+    write_refusal,
 )
 
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
@@ -54,7 +54,7 @@ REFUSALS = [
 @pytest.mark.parametrize(("family", "code", "state", "reason", "text"), REFUSALS)
 def test_refusals(family: str, code: str, state: StateKind, reason: str, text: str) -> None:
     profile = library.load(family)
-    found = refusal(profile, profile[code], state)
+    found = write_refusal(profile, profile[code], state)
     assert found is not None
     assert found.reason == reason
     assert text in found.text
@@ -78,14 +78,14 @@ ALLOWED = [
 @pytest.mark.parametrize(("family", "code", "state"), ALLOWED)
 def test_allowed(family: str, code: str, state: StateKind) -> None:
     profile = library.load(family)
-    assert refusal(profile, profile[code], state) is None
+    assert write_refusal(profile, profile[code], state) is None
 
 
 def test_an_unverified_one_is_written_once_it_is_confirmed() -> None:
     profile = library.load("atv21")
-    assert refusal(profile, profile["F111"], "stopped", {"F112"}) is not None
-    assert refusal(profile, profile["F111"], "stopped", {"F111"}) is None
-    running = refusal(profile, profile["F111"], "running", {"F111"})
+    assert write_refusal(profile, profile["F111"], "stopped", {"F112"}) is not None
+    assert write_refusal(profile, profile["F111"], "stopped", {"F111"}) is None
+    running = write_refusal(profile, profile["F111"], "running", {"F111"})
     assert running is not None
     assert running.reason == "running"
 
@@ -110,11 +110,11 @@ def test_settings_can_be_written_in_some_state(family: str) -> None:
     settings = [p for p in profile.parameters if is_setting(profile, p)]
     assert settings
     for parameter in settings:
-        found = refusal(profile, parameter, "stopped", {parameter.code})
+        found = write_refusal(profile, parameter, "stopped", {parameter.code})
         assert (found is None) != bool(parameter.forbidden), parameter.code
-        assert needs_standstill(profile, parameter) or refusal(
+        assert needs_standstill(profile, parameter) or write_refusal(
             profile, parameter, "running", {parameter.code}
-        ) == refusal(profile, parameter, "stopped", {parameter.code})
+        ) == write_refusal(profile, parameter, "stopped", {parameter.code})
     assert "running" not in AT_REST
 
 

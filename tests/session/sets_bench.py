@@ -17,7 +17,7 @@ from tui.drive.settings.edits import Edits
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.monitor.monitor import Monitor
-from tui.session.read.retrying_reader import Asker
+from tui.session.read.retrying_reader import RetryingReader
 from tui.session.settings.apply import Applied, apply_edits
 from tui.session.work import Permit
 from tui.simulator import DriveSpec, FaultRates, Simulation
@@ -48,12 +48,12 @@ class Bench:
 
     async def stage(self, **typed: str) -> Edits:
         """Edits as typed, against what the drive holds."""
-        asker = Asker(self.session)
+        retrying = RetryingReader(self.session)
         codes = [*typed, *(p.code for p in self.profile.parameters if p.quantity in SOURCES)]
-        raws = await asker.ask_raws(codes)
+        raws = await retrying.ask_raws(codes)
         edits = Edits()
         for code, text in typed.items():
-            edits = edits.stage(self.profile, code, text, raws, asker.lacking)
+            edits = edits.stage(self.profile, code, text, raws, retrying.lacking)
         return edits
 
     async def apply(self, **typed: str) -> Applied:

@@ -11,12 +11,12 @@ from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.settings.memory_orders import MemoryRefused
 from tui.session.read import retrying_reader
-from tui.session.settings.apply import Applied, Outcome, Result, apply_edits
+from tui.session.settings.apply import Applied, EditOutcome, Result, apply_edits
 from tui.session.settings.eeprom import factory_reset, save_to_eeprom
 from tui.simulator import FaultRates
 
 
-def outcomes(applied: Applied) -> dict[str, Outcome]:
+def outcomes(applied: Applied) -> dict[str, EditOutcome]:
     return {result.edit.code: result.outcome for result in applied.results}
 
 
@@ -33,7 +33,7 @@ async def test_edits_are_written_read_back_and_recorded() -> None:
 
         edits = await made.stage(ACC="5 s", DEC="7,25")
         applied = await made.write(edits, progress=progress)
-        assert outcomes(applied) == {"ACC": Outcome.DONE, "DEC": Outcome.DONE}
+        assert outcomes(applied) == {"ACC": EditOutcome.DONE, "DEC": EditOutcome.DONE}
         assert (made.drive.raw("ACC"), made.drive.raw("DEC")) == (50, 73)
         assert told == [(1, 2, "ACC: 3.0 s -> 5.0 s"), (2, 2, "DEC: 3.0 s -> 7.3 s")]
         assert len(applied.left) == 0
@@ -48,7 +48,7 @@ async def test_edits_are_written_read_back_and_recorded() -> None:
 async def test_a_scale_and_a_ramp_at_once() -> None:
     with bench("atv312") as made:
         applied = await made.apply(ACC="2.55 s", Inr="0.01 s")
-        assert outcomes(applied) == {"Inr": Outcome.DONE, "ACC": Outcome.DONE}
+        assert outcomes(applied) == {"Inr": EditOutcome.DONE, "ACC": EditOutcome.DONE}
         assert made.drive.raw("ACC") == 255
 
 
@@ -62,7 +62,7 @@ async def test_limits_are_moved_before_what_they_limit() -> None:
 async def test_a_value_past_another_is_not_sent() -> None:
     with bench("atv71", sets={"HSP": 500}) as made:
         applied = await made.apply(LSP="55", ACC="4")
-        assert outcomes(applied) == {"LSP": Outcome.REFUSED, "ACC": Outcome.DONE}
+        assert outcomes(applied) == {"LSP": EditOutcome.REFUSED, "ACC": EditOutcome.DONE}
         assert "above HSP = 50.0 Hz" in text(applied, "LSP")
         assert "LSP" in applied.left
         assert 3105 not in [register for register, _ in made.writes()]
@@ -73,13 +73,13 @@ async def test_a_change_by_somebody_else_is_not_overwritten() -> None:
         edits = await made.stage(ACC="5 s", DEC="7 s")
         made.drive.set("ACC", 90)
         applied = await made.write(edits)
-        assert outcomes(applied) == {"ACC": Outcome.CHANGED, "DEC": Outcome.DONE}
+        assert outcomes(applied) == {"ACC": EditOutcome.CHANGED, "DEC": EditOutcome.DONE}
         assert "was 3.0 s and is now 9.0 s" in text(applied, "ACC")
         assert made.drive.raw("ACC") == 90
         (left,) = applied.left
         assert (left.old, left.new) == (90, 50)
         again = await made.write(applied.left)
-        assert outcomes(again) == {"ACC": Outcome.DONE}
+        assert outcomes(again) == {"ACC": EditOutcome.DONE}
         assert made.drive.raw("ACC") == 50
 
 
@@ -88,7 +88,7 @@ async def test_a_scale_that_somebody_else_changes_is_seen() -> None:
         edits = await made.stage(ACC="5 s")
         made.drive.set("INR", 0)
         applied = await made.write(edits)
-        assert outcomes(applied) == {"ACC": Outcome.CHANGED}
+        assert outcomes(applied) == {"ACC": EditOutcome.CHANGED}
         assert "INR was changed" in text(applied, "ACC")
         assert made.writes() == []
         (left,) = applied.left
@@ -100,31 +100,31 @@ async def test_what_the_drive_holds_already_is_not_written() -> None:
         edits = await made.stage(ACC="5 s")
         made.drive.set("ACC", 50)
         applied = await made.write(edits)
-        assert outcomes(applied) == {"ACC": Outcome.DONE}
+        assert outcomes(applied) == {"ACC": EditOutcome.DONE}
         assert made.writes() == []
 
 
 async def test_stopped_only_is_checked_against_the_state_of_now() -> None:
     with bench("atv312", run_hz=20.0) as made:
         applied = await made.apply(FrS="60", ACC="4")
-        assert outcomes(applied) == {"FrS": Outcome.REFUSED, "ACC": Outcome.DONE}
+        assert outcomes(applied) == {"FrS": EditOutcome.REFUSED, "ACC": EditOutcome.DONE}
         assert "motor stopped only" in text(applied, "FrS")
         assert "FrS" in applied.left
         made.drive.halt()
         await rest(made)
         again = await made.write(applied.left)
-        assert outcomes(again) == {"FrS": Outcome.DONE}
+        assert outcomes(again) == {"FrS": EditOutcome.DONE}
 
 
 async def test_unverified_ones_are_written_once_confirmed() -> None:
     with bench("atv21") as made:
         edits = await made.stage(F111="Forced local")
         refused = await made.write(edits)
-        assert outcomes(refused) == {"F111": Outcome.REFUSED}
+        assert outcomes(refused) == {"F111": EditOutcome.REFUSED}
         assert "unverified" in text(refused, "F111")
         assert made.writes() == []
         done = await made.write(refused.left, confirmed={"F111"})
-        assert outcomes(done) == {"F111": Outcome.DONE}
+        assert outcomes(done) == {"F111": EditOutcome.DONE}
 
 
 async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
@@ -132,7 +132,10 @@ async def test_a_refusal_tells_the_meaning_the_state_and_what_to_do() -> None:
         edits = await made.stage(ACC="5 s", DEC="6 s")
         made.drive.busy = True
         applied = await made.write(edits)
-        assert outcomes(applied) == {"ACC": Outcome.DRIVE_REFUSED, "DEC": Outcome.DRIVE_REFUSED}
+        assert outcomes(applied) == {
+            "ACC": EditOutcome.DRIVE_REFUSED,
+            "DEC": EditOutcome.DRIVE_REFUSED,
+        }
         told = text(applied, "ACC")
         assert "exception 4, Not completed" in told
         assert "The drive is ready" in told or "The drive is not ready" in told
@@ -149,7 +152,7 @@ async def test_a_protected_parameter_is_not_written_blindly() -> None:
         edits = await made.stage(ACC="5 s")
         made.drive.registers.protect([made.profile["ACC"]])
         applied = await made.write(edits)
-        assert outcomes(applied) == {"ACC": Outcome.REFUSED}
+        assert outcomes(applied) == {"ACC": EditOutcome.REFUSED}
         assert "cannot be read" in text(applied, "ACC")
         assert made.writes() == []
 
@@ -159,7 +162,7 @@ async def test_a_silent_refusal_is_found_by_reading() -> None:
         edits = await made.stage(**{"15.07": "5"})
         made.drive.busy = True
         applied = await made.write(edits)
-        assert outcomes(applied) == {"15.07": Outcome.NOT_TAKEN}
+        assert outcomes(applied) == {"15.07": EditOutcome.NOT_TAKEN}
         assert "refuses by silence" in text(applied, "15.07")
         assert "15.07" in applied.left
 
@@ -169,7 +172,7 @@ async def test_another_option_module_is_not_written(family: str) -> None:
     """With another code in 15.01 the words of menu 15 mean something else."""
     with bench(family, sets={"15.01": 400}) as made:
         applied = await made.apply(**{"15.07": "5", "11.63": "4"})
-        assert outcomes(applied) == {"15.07": Outcome.REFUSED, "11.63": Outcome.DONE}
+        assert outcomes(applied) == {"15.07": EditOutcome.REFUSED, "11.63": EditOutcome.DONE}
         assert "another option is fitted" in text(applied, "15.07")
         assert made.drive.raw("15.07") == 0
 
@@ -184,8 +187,8 @@ async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
 
         applied = await made.write(edits, progress=progress)
         first, *others = applied.results
-        assert first.outcome is Outcome.DONE
-        assert [result.outcome for result in others] == [Outcome.NOT_SENT] * 2
+        assert first.outcome is EditOutcome.DONE
+        assert [result.outcome for result in others] == [EditOutcome.NOT_SENT] * 2
         assert applied.stopped
         assert {edit.code for edit in applied.left} == {r.edit.code for r in others}
         made.simulation.replug()
@@ -206,7 +209,7 @@ async def test_what_lets_nothing_more_through_ends_it_and_keeps_the_rest(end: st
         made.after_writes(1, ended)
         applied = await apply_edits(made.session, made.journal, edits, permit=permit)
         assert [r.outcome for r in applied.results] == [
-            Outcome.DONE, Outcome.NOT_SENT, Outcome.NOT_SENT,
+            EditOutcome.DONE, EditOutcome.NOT_SENT, EditOutcome.NOT_SENT,
         ]  # fmt: skip
         assert {edit.code for edit in applied.left} == {r.edit.code for r in applied.results[1:]}
         why = "a stop came after it (F12)" if end == "a stop" else "no longer armed"
@@ -237,7 +240,7 @@ async def test_a_read_only_line_writes_nothing() -> None:
 async def test_nobody_answers_before_anything_was_written(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    monkeypatch.setattr(retrying_reader, "TRIES", 1)
+    monkeypatch.setattr(retrying_reader, "READ_TRIES", 1)
     with bench("atv71") as made:
         edits = await made.stage(ACC="5 s")
         made.drive.power_off()
@@ -252,7 +255,7 @@ async def test_an_address_at_once_is_sent_last_and_the_new_place_is_named() -> N
     with bench("atv21") as made:
         applied = await made.apply(F802="7", F803="5", F800="9600")
         assert [result.edit.code for result in applied.results] == ["F803", "F800", "F802"]
-        assert outcomes(applied)["F802"] is Outcome.SENT
+        assert outcomes(applied)["F802"] is EditOutcome.SENT
         assert made.drive.address == 7
         later, now = applied.links
         assert (later.code, later.at_once) == ("F800", False)
@@ -267,7 +270,7 @@ async def test_after_a_change_of_the_line_nothing_more_is_sent_to_the_old_place(
     with bench("atv71") as made:
         applied = await made.apply(TBR="9600 bit/s", ADD="5", TTO="5")
         assert outcomes(applied) == {
-            "TTO": Outcome.DONE, "TBR": Outcome.SENT, "ADD": Outcome.NOT_SENT,
+            "TTO": EditOutcome.DONE, "TBR": EditOutcome.SENT, "ADD": EditOutcome.NOT_SENT,
         }  # fmt: skip
         assert "ADD" in applied.left
         assert applied.links[0].code == "TBR"

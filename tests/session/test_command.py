@@ -26,7 +26,7 @@ from tui.session.command.stop import Phase, Stopper
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
-from tui.session.work import Kind, Outcome
+from tui.session.work import Outcome, OutcomeKind
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
@@ -51,7 +51,7 @@ class Bench(NamedTuple):
     def session(self) -> DriveSession:
         return self.console.session
 
-    async def done(self, kind: Kind = Kind.DONE, seconds: float = 10.0) -> str:
+    async def done(self, kind: OutcomeKind = OutcomeKind.DONE, seconds: float = 10.0) -> str:
         """What the order that was just given comes to."""
         before = self.commander.outcome
         end = time.monotonic() + seconds
@@ -63,7 +63,7 @@ class Bench(NamedTuple):
             await asyncio.sleep(0.01)
         raise AssertionError("the order came to nothing")
 
-    async def order(self, id: str, kind: Kind = Kind.DONE) -> str:
+    async def order(self, id: str, kind: OutcomeKind = OutcomeKind.DONE) -> str:
         self.commander.order(id)  # type: ignore[arg-type]
         return await self.done(kind)
 
@@ -209,7 +209,7 @@ async def test_a_read_only_line_is_not_armed() -> None:
 async def test_a_drive_whose_state_is_unknown_is_not_armed() -> None:
     async with bench("atv71", armed=False, sets={"CHCF": 0}) as made:
         made.commander.arm()
-        assert "state of the drive is not known" in await made.done(Kind.REFUSED)
+        assert "state of the drive is not known" in await made.done(OutcomeKind.REFUSED)
         assert made.commander.armed_for is None
 
 
@@ -253,7 +253,7 @@ async def test_refusals(family: str, sets: dict[str, int], order: str, text: str
     async with bench(family, sets=named) as made:
         import re
 
-        assert re.search(text, await made.order(order, Kind.REFUSED))
+        assert re.search(text, await made.order(order, OutcomeKind.REFUSED))
         assert made.writes() == [] or all(register == 8502 for register, _ in made.writes())
         assert made.drive.motor.frequency == 0
 
@@ -271,7 +271,7 @@ async def test_refusals(family: str, sets: dict[str, int], order: str, text: str
 async def test_references_that_are_refused(typed: str, text: str) -> None:
     async with bench("atv71", sets={"LSP": 50, "HSP": 500}) as made:
         made.commander.refer(typed)
-        assert text in await made.done(Kind.REFUSED)
+        assert text in await made.done(OutcomeKind.REFUSED)
         assert made.writes() == []
 
 
@@ -299,7 +299,7 @@ async def test_a_fault_is_reset_and_starts_nothing(family: str) -> None:
         await made.until(lambda: made.drive.fault is not None)
         await made.until(lambda: made.drive.motor.rotor == 0)
         if family != "atv21":
-            assert "reset it first" in await made.order("forward", Kind.REFUSED)
+            assert "reset it first" in await made.order("forward", OutcomeKind.REFUSED)
         made.drive.clear_cause()
         await made.order("reset")
         await made.until(lambda: made.drive.fault is None)
@@ -318,7 +318,7 @@ async def test_options_of_an_altivar_21_stay_from_order_to_order() -> None:
         await made.order("forward")
         assert made.drive.raw("FA00") == 0xC440
         made.commander.choose_option(options["motor"], 0x0010)
-        assert "stopped only" in await made.done(Kind.REFUSED)
+        assert "stopped only" in await made.done(OutcomeKind.REFUSED)
         made.stopper.stop([made.session])
         await made.until(lambda: made.stopped)
         assert made.drive.raw("FA00") == 0xC040
@@ -354,7 +354,7 @@ async def test_a_journal_that_cannot_be_written_stops_no_command(tmp_path: Path)
         commander.order("forward")
         await made.until(lambda: commander.outcome is not None)
         assert commander.outcome is not None
-        assert commander.outcome.kind is Kind.DONE
+        assert commander.outcome.kind is OutcomeKind.DONE
         assert not journal.flush()
         assert "cannot be written" in journal.trouble
         assert len(journal.recent) == 3
@@ -365,6 +365,6 @@ async def test_a_motor_that_starts_the_other_way_is_stopped() -> None:
     async with bench("atv71", sets={"CMI": 1 << 12}) as made:
         made.commander.refer("20Hz")
         await made.done()
-        said = await made.order("forward", Kind.REFUSED)
+        said = await made.order("forward", OutcomeKind.REFUSED)
         assert "turned reverse and was stopped" in said
         await made.until(lambda: made.drive.motor.frequency == 0)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.session.work import Kind
+from tui.session.work import OutcomeKind
 
 from .test_command import ALTIVARS, bench
 
@@ -36,7 +36,7 @@ async def test_never_while_the_motor_turns() -> None:
         await made.order("forward")
         before = made.writes()
         made.commander.configure(made.session.profile.data.control_sources[3])
-        assert "motor stopped only" in await made.done(Kind.REFUSED)
+        assert "motor stopped only" in await made.done(OutcomeKind.REFUSED)
         assert made.writes() == before
 
 
@@ -44,5 +44,5 @@ async def test_a_word_that_cannot_be_read_changes_nothing() -> None:
     async with bench("atv71", protects=frozenset({"RFC"})) as made:
         before = made.writes()
         made.commander.configure(made.session.profile.data.control_sources[1])
-        assert "RFC cannot be read" in await made.done(Kind.REFUSED)
+        assert "RFC cannot be read" in await made.done(OutcomeKind.REFUSED)
         assert made.writes() == before

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tui.drive.errors import ValueRefused
-from tui.drive.settings.parameter_set import dumps
+from tui.drive.settings.parameter_set import dump_set
 from tui.drive.settings.selection import FILTERS, rows
 from tui.drive.settings.set_file import read_set, write_file
 from tui.session.read.upload import Upload
@@ -186,7 +186,7 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
         upload = Upload(session, ["ACC", "DEC", "HSP", "INR"])
         await upload.run()
         file = tmp_path / "set.toml"
-        write_file(file, dumps(session.profile, upload.parameter_set()))
+        write_file(file, dump_set(session.profile, upload.parameter_set()))
         made.drive.set("ACC", 99)
         made.drive.set("HSP", 400)
         editor.source = read_set(file)

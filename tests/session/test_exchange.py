@@ -13,10 +13,10 @@ from tests.session.sets_bench import Bench, bench, state_known
 from tui.bus.errors import RequestRefused
 from tui.bus.line import Reply
 from tui.drive.blocks.assignment import Assignment, MappingError, empty, pick
-from tui.drive.blocks.wire_cost import frame, reach
+from tui.drive.blocks.wire_cost import block_request, reach
 from tui.drive.errors import DriveError, ValueRefused
 from tui.session.blocks import exchange as module
-from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.exchange import Exchanged
 from tui.session.blocks.outputs import Meant, meant, refuse_pending
 from tui.session.blocks.write import AssignmentRefused
@@ -79,7 +79,7 @@ async def test_eight_inputs_and_six_outputs_in_one_exchange() -> None:
         (request,) = sent(here, 23)
         held = {code: here.drive.raw(code) for code in EXAMPLE_OUT}
         words = tuple(held[code] & 0xFFFF for code in EXAMPLE_OUT)
-        assert request == frame(here.profile, 1, inputs, outputs, words)[:-2].hex()
+        assert request == block_request(here.profile, 1, inputs, outputs, words)[:-2].hex()
         assert request.startswith("011731c5000831d900060c")
         assert (held["ACC"], held["DEC"]) == (45, 55)
         assert set(done.inputs) == set(EXAMPLE_IN)
@@ -235,10 +235,14 @@ async def test_a_write_block_that_stands_for_something_else_is_found_out() -> No
 # A stop
 
 
-async def settled(desk: MappingDesk) -> str:
+async def settled(block_editor: BlockEditor) -> str:
     for _ in range(400):
-        if not desk.busy and desk.said is not None and desk.said.kind != "working":
-            return desk.said.text
+        if (
+            not block_editor.busy
+            and block_editor.said is not None
+            and block_editor.said.kind != "working"
+        ):
+            return block_editor.said.text
         await asyncio.sleep(0.02)
     raise AssertionError("it does not end")
 
@@ -248,20 +252,20 @@ async def test_a_stop_ends_an_exchange_before_its_words_go_out() -> None:
         await both(here)
         monitor = Monitor(here.session)
         monitor.start(period=0.1)
-        desk = MappingDesk(here.session, monitor, here.journal)
-        desk.start()
+        block_editor = BlockEditor(here.session, monitor, here.journal)
+        block_editor.start()
         for _ in range(400):
-            if len(desk.views) == 2:
+            if len(block_editor.views) == 2:
                 break
             await asyncio.sleep(0.02)
         stopper = Stopper(here.session.line, here.journal)
         here.permit()
-        desk.exchange(desk.meant("CMD=16#000F LFRD=900"))
+        block_editor.exchange(block_editor.meant("CMD=16#000F LFRD=900"))
         stopper.stop([here.session])
-        assert "stop" in await settled(desk)
+        assert "stop" in await settled(block_editor)
         await asyncio.sleep(0.5)
         assert sent(here, 23) == []
-        desk.stop()
+        block_editor.stop()
         monitor.stop()
 
 
@@ -269,21 +273,21 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
     with bench("atv71") as here:
         monitor = Monitor(here.session)
         monitor.start(period=0.1)
-        desk = MappingDesk(here.session, monitor, here.journal)
-        desk.start()
+        block_editor = BlockEditor(here.session, monitor, here.journal)
+        block_editor.start()
         for _ in range(400):
-            if len(desk.views) == 2 and state_known(monitor):
+            if len(block_editor.views) == 2 and state_known(monitor):
                 break
             await asyncio.sleep(0.02)
         commander = Commander(here.session, here.journal)
         here.permit()
-        desk.propose(plan_of(here, "read", EXAMPLE_IN))
-        desk.write()
+        block_editor.propose(plan_of(here, "read", EXAMPLE_IN))
+        block_editor.write()
         commander.order("forward")
         assert here.session.work.busy_for(commander)
         stopper = Stopper(here.session.line, here.journal)
         stopper.stop([here.session])
-        assert "ended by a stop" in (await settled(desk)).lower()
+        assert "ended by a stop" in (await settled(block_editor)).lower()
         await asyncio.sleep(0.5)
         assert commander.outcome is not None
         assert "ended by a stop" in commander.outcome.text.lower()
@@ -292,51 +296,51 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
         assert {word for register, word in here.writes() if register == 8501} <= {7}
         assert here.drive.raw("NMA8") != 7121
         # what was proposed stays, against what the drive holds now
-        assert desk.changes(plan_of(here, "read", []).block)
-        desk.write()
-        assert "no longer armed" in await settled(desk)
+        assert block_editor.changes(plan_of(here, "read", []).block)
+        block_editor.write()
+        assert "no longer armed" in await settled(block_editor)
         assert here.drive.raw("NMA8") != here.profile["LFT"].address
         here.permit()
-        desk.write()
-        assert "Written and read back" in await settled(desk)
+        block_editor.write()
+        assert "Written and read back" in await settled(block_editor)
         assert here.drive.raw("NMA8") == here.profile["LFT"].address
-        desk.stop()
+        block_editor.stop()
         monitor.stop()
 
 
 @asynccontextmanager
-async def at_desk(here: Bench) -> AsyncIterator[MappingDesk]:
-    """A desk that knows the blocks of an armed drive."""
+async def at_desk(here: Bench) -> AsyncIterator[BlockEditor]:
+    """A block editor that knows the blocks of an armed drive."""
     monitor = Monitor(here.session)
     monitor.start(period=0.1)
-    desk = MappingDesk(here.session, monitor, here.journal)
-    desk.start()
+    block_editor = BlockEditor(here.session, monitor, here.journal)
+    block_editor.start()
     for _ in range(400):
-        if len(desk.views) == 2:
+        if len(block_editor.views) == 2:
             break
         await asyncio.sleep(0.02)
     here.permit()
-    yield desk
-    desk.stop()
+    yield block_editor
+    block_editor.stop()
     monitor.stop()
 
 
 async def test_what_a_stop_cuts_short_is_said_to_stay() -> None:
     with bench("atv71") as here:
-        async with at_desk(here) as desk:
+        async with at_desk(here) as block_editor:
             here.after_writes(2, lambda: here.session.work.stop("F12"))
-            desk.propose(plan_of(here, "read", EXAMPLE_IN))
-            desk.write()
-            assert await settled(desk) == "Ended by a stop. What was written stays."
+            block_editor.propose(plan_of(here, "read", EXAMPLE_IN))
+            block_editor.write()
+            assert await settled(block_editor) == "Ended by a stop. What was written stays."
             assert len(here.writes()) == 2
 
 
 async def test_where_nothing_was_written_nothing_is_said_to_stay() -> None:
     with bench("atv71", run_hz=20.0) as here:
-        async with at_desk(here) as desk:
-            desk.propose(plan_of(here, "read", EXAMPLE_IN))
-            desk.write()
-            assert (await settled(desk)).endswith("Nothing was written.")
+        async with at_desk(here) as block_editor:
+            block_editor.propose(plan_of(here, "read", EXAMPLE_IN))
+            block_editor.write()
+            assert (await settled(block_editor)).endswith("Nothing was written.")
             assert here.writes() == []
 
 
@@ -344,23 +348,23 @@ async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
     with bench("atv21", sets=EXAMPLE_21) as here:
         monitor = Monitor(here.session)
         monitor.start(period=0.1)
-        desk = MappingDesk(here.session, monitor, here.journal)
-        desk.start()
+        block_editor = BlockEditor(here.session, monitor, here.journal)
+        block_editor.start()
         for _ in range(400):
-            if len(desk.views) == 2 and state_known(monitor):
+            if len(block_editor.views) == 2 and state_known(monitor):
                 break
             await asyncio.sleep(0.02)
         # disarmed as soon as one slot is another
-        desk.propose(plan_of(here, "write", ["FA50", "FA51"]))
+        block_editor.propose(plan_of(here, "write", ["FA50", "FA51"]))
         here.permit()
         disarm = here.session.arming.disarm
         here.after_writes(1, lambda: disarm("No key for a minute: no longer armed."))
-        desk.write()
-        assert "no longer armed" in await settled(desk)
+        block_editor.write()
+        assert "no longer armed" in await settled(block_editor)
         assert (here.drive.raw("F870"), here.drive.raw("F871")) == (4, 3)
         with pytest.raises(MappingError, match="F870: in force after the drive's next reset"):
-            desk.meant("FA50=0x0000")
-        desk.stop()
+            block_editor.meant("FA50=0x0000")
+        block_editor.stop()
         monitor.stop()
 
 

@@ -64,7 +64,7 @@ def disk(monkeypatch: pytest.MonkeyPatch) -> Iterator[Disk]:
     """The disk under every journal of the test; it works again at its end."""
     made = Disk()
     monkeypatch.setattr(os, "fsync", made.fsync)
-    monkeypatch.setattr(module, "AGAIN", 0.01)
+    monkeypatch.setattr(module, "RETRY_DISK_AFTER", 0.01)
     yield made
     made.refuses = False
     made.works.set()
@@ -207,7 +207,7 @@ def refusing(disk: Disk, tmp_path: Path) -> tuple[Callable[[], None], Callable[[
 
 def full(disk: Disk, tmp_path: Path) -> tuple[Callable[[], None], Callable[[], None]]:
     """A file that takes nothing: a folder stands in its place."""
-    aside, path = tmp_path / "aside", tmp_path / "state" / journal_file.NAME
+    aside, path = tmp_path / "aside", tmp_path / "state" / journal_file.JOURNAL_NAME
 
     def breaks() -> None:
         path.rename(aside)
@@ -253,7 +253,7 @@ def test_what_is_too_much_to_keep_is_lost_and_counted(
     monkeypatch: pytest.MonkeyPatch,
     caplog: pytest.LogCaptureFixture,
 ) -> None:
-    monkeypatch.setattr(module, "MOST", 5)
+    monkeypatch.setattr(module, "JOURNAL_BACKLOG", 5)
     disk.refuses = True
     for number in range(12):
         journal.add(entry(number))
@@ -270,12 +270,15 @@ def test_old_files_make_room(journal: Journal, monkeypatch: pytest.MonkeyPatch) 
     journal.add(entry(0))
     assert journal.flush(PATIENCE)
     size = journal.path.stat().st_size
-    monkeypatch.setattr(journal_file, "LARGEST", 2 * size)
+    monkeypatch.setattr(journal_file, "LARGEST_FILE", 2 * size)
     for number in range(1, 30):
         journal.add(entry(number % 10))
     assert journal.flush(PATIENCE)
     there = sorted(path.name for path in journal.path.parent.iterdir())
-    assert there == [journal_file.NAME, *(f"{journal_file.NAME}.{n}" for n in range(1, 10))]
+    assert there == [
+        journal_file.JOURNAL_NAME,
+        *(f"{journal_file.JOURNAL_NAME}.{n}" for n in range(1, 10)),
+    ]
     held = [one.new_raw for one in entries_of(journal, "line", 1)]
     assert held == [number % 10 for number in range(10, 30)]
 

@@ -16,7 +16,7 @@ from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.line import Reply
 from tui.drive.blocks.assignment import Assignment, empty, factory, pick
 from tui.drive.blocks.user_words import COUNT, UserWord
-from tui.drive.blocks.wire_cost import frame, span
+from tui.drive.blocks.wire_cost import block_request, span
 from tui.drive.profile import library
 from tui.drive.profile.schema import Block
 from tui.session.blocks.mapping import Force, Mapper, wire_timing
@@ -25,7 +25,7 @@ from tui.session.blocks.write import AssignmentRefused, write_assignment
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
 from tui.session.read.reader import Reader
-from tui.session.read.verdict import Verdict
+from tui.session.read.verdict import SlotMatch
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 NO_WORDS = (UserWord(),) * COUNT
@@ -77,8 +77,8 @@ async def test_the_scanner_as_it_leaves_the_factory() -> None:
         view = await Mapper(here.session).look(block(here, "read"))
         assert view.plan == factory(here.profile, view.block)
         assert [s.parameter.code for s in view.slots if s.parameter] == ["ETA", "RFRD"]
-        assert {s.verdict for s in view.slots[:2]} == {Verdict.SAME}
-        assert {s.verdict for s in view.slots[2:]} == {Verdict.UNUSED}
+        assert {s.verdict for s in view.slots[:2]} == {SlotMatch.SAME}
+        assert {s.verdict for s in view.slots[2:]} == {SlotMatch.UNUSED}
         assert view.slots[0].text == view.slots[0].direct_text
         assert view.slots[0].force is Force.ACTIVE
         outputs = await Mapper(here.session).look(block(here, "write"))
@@ -90,17 +90,17 @@ async def test_values_of_a_running_motor_are_the_same_or_moving() -> None:
         for slot, raw in plan_of(here, "read", EXAMPLE_IN).slots.items():
             here.drive.set(slot, raw)
         view = await Mapper(here.session).verify(block(here, "read"))
-        assert {s.verdict for s in view.slots} <= {Verdict.SAME, Verdict.MOVING}
-        assert view.slots[7].verdict is Verdict.SAME
+        assert {s.verdict for s in view.slots} <= {SlotMatch.SAME, SlotMatch.MOVING}
+        assert view.slots[7].verdict is SlotMatch.SAME
         assert all(s.text != "-----" for s in view.slots)
 
 
 async def test_an_address_that_the_drive_does_not_know_has_no_value() -> None:
     with bench("atv71", sets={"NMA3": 3199}) as here:
         view = await Mapper(here.session).look(block(here, "read"))
-        assert view.slots[2].verdict is Verdict.NONE
+        assert view.slots[2].verdict is SlotMatch.NONE
         assert (view.slots[2].parameter, view.slots[2].text) == (None, "-----")
-        assert view.slots[1].verdict is Verdict.SAME
+        assert view.slots[1].verdict is SlotMatch.SAME
 
 
 async def test_a_slot_that_brings_something_else_differs() -> None:
@@ -117,7 +117,7 @@ async def test_a_slot_that_brings_something_else_differs() -> None:
 
         line.read = swapped  # type: ignore[method-assign]
         view = await Mapper(here.session).verify(block(here, "read"))
-        assert [s.verdict for s in view.slots[:2]] == [Verdict.DIFFERS, Verdict.DIFFERS]
+        assert [s.verdict for s in view.slots[:2]] == [SlotMatch.DIFFERS, SlotMatch.DIFFERS]
 
 
 async def test_a_scanner_changed_between_never_shows_one_value_as_another() -> None:
@@ -147,7 +147,7 @@ async def test_a_scanner_changed_between_never_shows_one_value_as_another() -> N
                 verdicts.add(slot.verdict)
                 if slot.word is not None and slot.parameter is not None:
                     assert slot.word == words[slot.parameter.code]
-        assert Verdict.CHANGED in verdicts
+        assert SlotMatch.CHANGED in verdicts
 
 
 async def test_a_drive_without_blocks_has_nothing_to_look_at() -> None:
@@ -163,7 +163,7 @@ async def test_a_block_is_configured_then_pending_then_active() -> None:
         mapper, read = Mapper(here.session), block(here, "read")
         view = await mapper.verify(read)
         assert [s.force for s in view.slots[:4]] == [Force.ACTIVE] * 4
-        assert {s.verdict for s in view.slots} <= {Verdict.SAME, Verdict.MOVING}
+        assert {s.verdict for s in view.slots} <= {SlotMatch.SAME, SlotMatch.MOVING}
         here.drive.set("F875", 2)
         here.drive.set("F876", 1)
         # words in the drive are not what the block brings yet
@@ -172,7 +172,7 @@ async def test_a_block_is_configured_then_pending_then_active() -> None:
         view = await mapper.verify(read)
         assert [s.force for s in view.slots[2:4]] == [Force.PENDING] * 2
         assert [s.brings for s in view.slots[2:4]] == ["FE03", "FE05"]
-        assert [s.verdict for s in view.slots[2:4]] == [Verdict.DIFFERS] * 2
+        assert [s.verdict for s in view.slots[2:4]] == [SlotMatch.DIFFERS] * 2
         here.drive.power_cycle()
         await asyncio.sleep(2.5)
         view = await mapper.verify(read)
@@ -228,7 +228,7 @@ async def test_what_was_compared_before_a_change_counts_no_more(between: bool) -
         line.read = read  # type: ignore[method-assign]
         view = await Mapper(here.session).verify(block(here, "read"))
         assert [s.word for s in view.slots[:2]] == [59, 37]
-        assert [s.verdict for s in view.slots[:2]] == [Verdict.SAME] * 2
+        assert [s.verdict for s in view.slots[:2]] == [SlotMatch.SAME] * 2
 
 
 async def test_what_was_written_waits_for_a_reset_even_where_all_values_are_zero() -> None:
@@ -264,7 +264,7 @@ async def test_the_manuals_reads_of_the_block(count: int) -> None:
         reply = await here.session.line.read(1, *stretch)
         assert len(reply.words) == count
         assert sent(here, 3)[-1] == f"010318750{count:03x}"
-        assert frame(here.profile, 1, read, None)[:-2].hex() == sent(here, 3)[-1]
+        assert block_request(here.profile, 1, read, None)[:-2].hex() == sent(here, 3)[-1]
         assert reply.words[1] == here.drive.raw("FD00")
 
 
@@ -435,9 +435,9 @@ async def test_trembling_values_of_a_real_line_are_no_difference() -> None:
         read = block_of(session.profile, "read")
         for _ in range(3):
             view = await mapper.look(read)
-            assert Verdict.CHANGED not in {s.verdict for s in view.slots}
+            assert SlotMatch.CHANGED not in {s.verdict for s in view.slots}
             assert Force.PENDING not in {s.force for s in view.slots}
-            assert {s.verdict for s in view.slots} <= {Verdict.SAME, Verdict.MOVING}
+            assert {s.verdict for s in view.slots} <= {SlotMatch.SAME, SlotMatch.MOVING}
     finally:
         opened.close()
         simulation.stop()

@@ -15,7 +15,7 @@ from tui.bus.line import LineState, LineStatus, Priority, Reply, Worker
 from tui.bus.schedule.pace import Pace
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor, Snapshot
-from tui.session.read.rotation import Due
+from tui.session.read.rotation import Rotation
 
 from .fakes import FakeLine, parameter, profile_of
 
@@ -177,7 +177,7 @@ def one_each(codes: Iterable[str]) -> list[tuple[str, ...]]:
 
 
 def test_what_failed_comes_in_halves_and_then_in_doubles() -> None:
-    due, codes = Due(10), tuple("abcdefgh")
+    due, codes = Rotation(10), tuple("abcdefgh")
     due.add(codes)
     asked = []
     for fails in (True, True, False, False, False, False):
@@ -191,7 +191,7 @@ def test_what_failed_comes_in_halves_and_then_in_doubles() -> None:
 
 
 def test_all_have_their_turn_though_some_fail() -> None:
-    due, codes = Due(10), tuple("abcdefghijklmnopqrstuvwxyz")
+    due, codes = Rotation(10), tuple("abcdefghijklmnopqrstuvwxyz")
     read: set[str] = set()
     for cycle in range(120):
         turn = due.turn(codes, one_each)
@@ -204,7 +204,7 @@ def test_all_have_their_turn_though_some_fail() -> None:
 
 
 def test_values_that_no_request_brings_are_not_owed_for_ever() -> None:
-    due = Due(10)
+    due = Rotation(10)
     due.add("ab")
     due.turn("ab", one_each)
     due.failed(one_each)

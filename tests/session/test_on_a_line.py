@@ -23,14 +23,14 @@ from tui.bus.errors import (
     Superseded,
     WrongReply,
 )
-from tui.bus.line import Identification, Line, Priority
+from tui.bus.line import IdentificationObjects, Line, Priority
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.session.connect.addresses import parse_addresses
-from tui.session.connect.identify import ScanResult, identify, scan
+from tui.session.connect.identify import ScanResult, identify_drive, scan
 from tui.session.connect.open_line import OpenLine, check_line, demo_line, open_line
 from tui.session.drive import DriveSession
-from tui.session.monitor.line_watch import Keeper
+from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor, Snapshot
 from tui.session.paths import recent_lines, remember_line, state_folder
 from tui.session.read.reader import Reader
@@ -72,14 +72,14 @@ async def until(holds: Callable[[], bool], seconds: float = 20.0) -> None:
 async def test_identify(
     five: OpenLine, profile: str, vendor: str, reference: str, name: str
 ) -> None:
-    found = await identify(five.line, ADDRESSES[profile])
+    found = await identify_drive(five.line, ADDRESSES[profile])
     assert (found.vendor, found.name, found.profile) == (vendor, name, profile)
     assert found.reference.startswith(reference)
     assert found.version_text == "2.1"
 
 
 async def test_a_drive_without_function_43_is_found_by_its_status_word(five: OpenLine) -> None:
-    found = await identify(five.line, ADDRESSES["powerdrive"])
+    found = await identify_drive(five.line, ADDRESSES["powerdrive"])
     assert found.profile is None
     assert set(found.candidates) == {"powerdrive", "proxidrive", "varmeca"}
 
@@ -105,7 +105,7 @@ async def test_a_second_scan_finds_drives_without_function_43_and_those_behind_t
         nobody = library.load("powerdrive")
         DriveSession(opened.line, 4, nobody)
         with pytest.raises(NoAnswer):  # what is known of it does not make it present
-            await identify(opened.line, 4)
+            await identify_drive(opened.line, 4)
     finally:
         opened.close()
 
@@ -116,10 +116,10 @@ class Trouble:
     def __init__(self, error: LineError) -> None:
         self.error = error
 
-    async def identify(self, device: int, **_: object) -> Identification:
+    async def identify(self, device: int, **_: object) -> IdentificationObjects:
         if device == 2:
             raise self.error
-        return Identification(1, {1: b"ATV71HU15M3"})
+        return IdentificationObjects(1, {1: b"ATV71HU15M3"})
 
 
 @pytest.mark.parametrize(
@@ -158,7 +158,7 @@ async def test_a_broken_profile_of_the_user_ends_no_scan(five: OpenLine) -> None
 
 async def test_nobody_there(five: OpenLine) -> None:
     with pytest.raises(NoAnswer):
-        await identify(five.line, 99)
+        await identify_drive(five.line, 99)
 
 
 @pytest.mark.parametrize("profile", DRIVES)
@@ -244,56 +244,56 @@ async def test_listeners_hear_every_cycle_until_they_leave(five: OpenLine) -> No
 async def test_a_drive_left_alone_trips_and_a_kept_one_does_not() -> None:
     """The Altivar 21 watches the line from the first request on, for 3 s."""
     alone, kept = demo_line({"atv21": 35.0}), demo_line({"atv21": 35.0})
-    keeper = Keeper(kept.line)
+    line_watch = LineWatch(kept.line)
     kept_drive = session(kept, "atv21")
-    keeper.keep(kept_drive, Monitor(kept_drive))
+    line_watch.keep(kept_drive, Monitor(kept_drive))
     await Reader(session(alone, "atv21")).read(["FD01"])
     await asyncio.sleep(5.0)
     try:
         assert (await Reader(session(alone, "atv21")).read(["FC90"]))["FC90"].raw == 24
         assert (await Reader(kept_drive).read(["FC90"]))["FC90"].raw == 0
-        look = keeper.looks[1]
+        look = line_watch.looks[1]
         assert look.timeout == 3.0
         assert look.state is not None
         assert look.state.kind == "running"
     finally:
-        keeper.stop()
+        line_watch.stop()
         alone.close()
         kept.close()
 
 
 async def test_a_drive_watched_from_the_start_is_judged_by_its_monitor() -> None:
-    """The keeper learns the time-out though a monitor is at work, and takes its newer state."""
+    """The line watch learns the time-out though a monitor is at work, and takes its newer state."""
     opened = demo_line({"atv21": 35.0})
     drive = session(opened, "atv21")
     monitor = Monitor(drive)
     monitor.start(period=0.2)
-    keeper = Keeper(opened.line)
-    keeper.keep(drive, monitor)
+    line_watch = LineWatch(opened.line)
+    line_watch.keep(drive, monitor)
 
     def left_alone() -> dict[int, float]:
-        return {device: watch.timeout for device, watch in keeper.left_alone().items()}
+        return {device: watch.timeout for device, watch in line_watch.left_alone().items()}
 
     try:
-        await until(lambda: left_alone() == {1: 3.0} and keeper.runs(1))
-        assert keeper.looks == {}, "the monitor's states counted"
+        await until(lambda: left_alone() == {1: 3.0} and line_watch.runs(1))
+        assert line_watch.looks == {}, "the monitor's states counted"
         assert opened.simulation is not None
         opened.simulation.drive(1).halt()
-        await until(lambda: not keeper.runs(1))
+        await until(lambda: not line_watch.runs(1))
         # it trips at rest, too
         assert left_alone() == {1: 3.0}
     finally:
-        keeper.stop()
+        line_watch.stop()
         opened.close()
 
 
 async def test_a_drive_is_fed_whatever_else_the_line_does() -> None:
-    """A flood of polls and of operator's reads leaves the keeper its place before them."""
+    """A flood of polls and of operator's reads leaves the line watch its place before them."""
     opened = demo_line({"atv21": 35.0, "atv71": 50.0})
-    keeper = Keeper(opened.line)
+    line_watch = LineWatch(opened.line)
     drive = session(opened, "atv21")
-    keeper.keep(drive, Monitor(drive))
-    await until(lambda: keeper.watch(1) is not None)
+    line_watch.keep(drive, Monitor(drive))
+    await until(lambda: line_watch.watch(1) is not None)
     gaps: list[float] = []
 
     async def flood(priority: Priority) -> None:
@@ -310,11 +310,11 @@ async def test_a_drive_is_fed_whatever_else_the_line_does() -> None:
                 gaps.append(time.monotonic() - (opened.line.device_state(1).heard or 0.0))
                 await asyncio.sleep(0.01)
         assert max(gaps) < 3.0 / 3
-        assert not keeper.hungry()
+        assert not line_watch.warnings()
         assert opened.simulation is not None
         assert opened.simulation.drive(1).raw("FC90") == 0
     finally:
-        keeper.stop()
+        line_watch.stop()
         opened.close()
 
 
@@ -324,40 +324,40 @@ async def test_who_cannot_be_fed_is_told_of_before_it_acts(tmp_path: Path) -> No
     # a name of its own: the number of a pseudo-terminal may be taken by others meanwhile
     opened = open_line(f"serial:{simulation.serve_pty(str(tmp_path / 'line'))},19200,8N1", wait=5.0)
     opened.simulation = simulation
-    keeper = Keeper(opened.line)
+    line_watch = LineWatch(opened.line)
     drive = session(opened, "atv21")
-    keeper.keep(drive, Monitor(drive))
+    line_watch.keep(drive, Monitor(drive))
     try:
-        await until(lambda: keeper.watch(1) is not None)
-        assert not keeper.hungry()
+        await until(lambda: line_watch.watch(1) is not None)
+        assert not line_watch.warnings()
         assert opened.simulation is not None
         opened.simulation.unplug()
-        await until(lambda: bool(keeper.hungry()))
-        (hunger,) = keeper.hungry()
-        assert (hunger.device, hunger.watch.timeout) == (1, 3.0)
-        assert 1.0 < hunger.left <= 1.5
-        assert hunger.watch.reaction is not None
-        assert hunger.watch.reaction.trips
+        await until(lambda: bool(line_watch.warnings()))
+        (warning,) = line_watch.warnings()
+        assert (warning.device, warning.watch.timeout) == (1, 3.0)
+        assert 1.0 < warning.left <= 1.5
+        assert warning.watch.reaction is not None
+        assert warning.watch.reaction.trips
         opened.simulation.replug()
-        await until(lambda: not keeper.hungry())
+        await until(lambda: not line_watch.warnings())
     finally:
-        keeper.stop()
+        line_watch.stop()
         opened.close()
 
 
 async def test_a_watch_that_begins_with_a_command_is_not_told_of_before() -> None:
     opened = demo_line({"atv71": 50.0})
-    keeper = Keeper(opened.line)
+    line_watch = LineWatch(opened.line)
     drive = DriveSession(opened.line, 1, library.load("atv71"))
-    keeper.keep(drive, Monitor(drive))
+    line_watch.keep(drive, Monitor(drive))
     try:
-        await until(lambda: keeper.watch(1) is not None)
-        watch = keeper.watch(1)
+        await until(lambda: line_watch.watch(1) is not None)
+        watch = line_watch.watch(1)
         assert watch is not None
         assert (watch.timeout, watch.active) == (10.0, False)
-        assert keeper.left_alone() == {}
+        assert line_watch.left_alone() == {}
     finally:
-        keeper.stop()
+        line_watch.stop()
         opened.close()
 
 

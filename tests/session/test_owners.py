@@ -23,7 +23,7 @@ from tui.session.fleet import Fleet
 from tui.session.journal import Journal
 from tui.session.monitor import monitor as monitor_module
 from tui.session.read.reader import Reader
-from tui.session.work import Kind
+from tui.session.work import OutcomeKind
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
@@ -180,7 +180,7 @@ async def test_a_drive_that_does_not_tell_its_state_is_not_armed(
         here.console.commander.arm()
         await until(lambda: here.session.work.outcome is not None)
         assert here.session.work.outcome is not None
-        assert here.session.work.outcome.kind is Kind.REFUSED
+        assert here.session.work.outcome.kind is OutcomeKind.REFUSED
         assert not here.session.arming.armed
 
 
@@ -287,23 +287,23 @@ async def test_the_drives_are_walked_from_another_thread_while_they_come_and_go(
 async def test_drives_at_rest_that_will_trip_are_known() -> None:
     """An Altivar 21 watches the line from the first request on, at rest too."""
     async with bench("atv21") as here:
-        await until(lambda: here.fleet.keeper.watch(1) is not None)
-        alone = here.fleet.keeper.left_alone()
+        await until(lambda: here.fleet.line_watch.watch(1) is not None)
+        alone = here.fleet.line_watch.left_alone()
         assert alone[1].timeout == 3.0
-        assert here.fleet.keeper.under_command() == []
+        assert here.fleet.line_watch.under_command() == []
 
 
 async def test_a_motor_that_runs_by_the_line_is_watched_whoever_started_it() -> None:
     """The time-out of an Altivar 71 runs once it was commanded, be it by another program."""
     async with bench("atv71", watch=False) as here:
-        keeper = here.fleet.keeper
-        await until(lambda: keeper.watch(1) is not None)
-        assert keeper.left_alone() == {}
+        line_watch = here.fleet.line_watch
+        await until(lambda: line_watch.watch(1) is not None)
+        assert line_watch.left_alone() == {}
         for address, word in ((8502, 200), (8501, 6), (8501, 7), (8501, 15)):
             await here.line.write(1, address, [word])
-        await until(lambda: keeper.runs(1))
+        await until(lambda: line_watch.runs(1))
         assert not here.session.commanded
-        assert 1 in keeper.left_alone()
+        assert 1 in line_watch.left_alone()
 
 
 async def test_arming_that_a_command_asked_for_does_not_run_out() -> None:

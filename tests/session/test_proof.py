@@ -13,8 +13,8 @@ from hypothesis import strategies as st
 from tests.blocks import block_of
 from tui.drive.profile import library
 from tui.drive.values import decode, type_range
-from tui.session.read.proof import Proof
-from tui.session.read.verdict import Verdict
+from tui.session.read.proof import SlotEvidence
+from tui.session.read.verdict import SlotMatch
 from tui.session.reading import Quality, Reading
 
 PROFILE = library.load("atv21")
@@ -60,9 +60,9 @@ def compared(
     rounds: int,
     chance: random.Random,
     chosen: Mapping[str, str] | None = None,
-) -> Proof:
+) -> SlotEvidence:
     """A proof after so many rounds; `behind` is what the slots really bring."""
-    proof = Proof(PROFILE, BLOCK)
+    proof = SlotEvidence(PROFILE, BLOCK)
     now = 0.0
 
     def raw(code: str) -> int:
@@ -119,25 +119,27 @@ def test_what_is_brought_in_place_of_a_choice_is_told() -> None:
 @pytest.mark.parametrize(
     ("code", "rounds", "verdict"),
     [
-        ("FE03", [], Verdict.UNREAD),
-        ("FE03", [(100, 100, 100)], Verdict.SAME),
-        ("FE03", [(100, 101, 100)], Verdict.DIFFERS),
-        ("FE03", [(100, 102, 104)], Verdict.MOVING),
-        ("FE03", [(104, 96, 100)], Verdict.MOVING),  # as far again as it went between them
-        ("FE03", [(104, 95, 100)], Verdict.DIFFERS),
-        ("FE03", [(100, 100, 100), (200, 200, 200)], Verdict.SAME),
-        ("FE03", [(100, 100, 100), (200, 201, 200)], Verdict.MOVING),
-        ("FE03", [(100, 101, 100), (200, 201, 200)], Verdict.DIFFERS),
-        ("FD01", [(0b100, 0b001, 0b001)], Verdict.MOVING),  # every bit as in one of them
-        ("FD01", [(0b100, 0b011, 0b001)], Verdict.DIFFERS),
+        ("FE03", [], SlotMatch.UNREAD),
+        ("FE03", [(100, 100, 100)], SlotMatch.SAME),
+        ("FE03", [(100, 101, 100)], SlotMatch.DIFFERS),
+        ("FE03", [(100, 102, 104)], SlotMatch.MOVING),
+        ("FE03", [(104, 96, 100)], SlotMatch.MOVING),  # as far again as it went between them
+        ("FE03", [(104, 95, 100)], SlotMatch.DIFFERS),
+        ("FE03", [(100, 100, 100), (200, 200, 200)], SlotMatch.SAME),
+        ("FE03", [(100, 100, 100), (200, 201, 200)], SlotMatch.MOVING),
+        ("FE03", [(100, 101, 100), (200, 201, 200)], SlotMatch.DIFFERS),
+        ("FD01", [(0b100, 0b001, 0b001)], SlotMatch.MOVING),  # every bit as in one of them
+        ("FD01", [(0b100, 0b011, 0b001)], SlotMatch.DIFFERS),
     ],
 )
-def test_how_words_compare(code: str, rounds: list[tuple[int, int, int]], verdict: Verdict) -> None:
-    proof = Proof(PROFILE, BLOCK)
+def test_how_words_compare(
+    code: str, rounds: list[tuple[int, int, int]], verdict: SlotMatch
+) -> None:
+    proof = SlotEvidence(PROFILE, BLOCK)
     for first, word, second in rounds:
         proof.note([word], {code: reading(code, first)}, {code: reading(code, second)})
     assert proof.verdict("F875", code) is verdict
-    assert proof.verdict("F876", code) is Verdict.UNREAD
+    assert proof.verdict("F876", code) is SlotMatch.UNREAD
 
 
 def test_an_even_ramp_does_not_hide_what_a_place_brings() -> None:
@@ -154,7 +156,7 @@ def test_values_that_are_alike_prove_nothing_but_hinder_no_other_place() -> None
 
 
 def test_a_parameter_that_was_not_compared_leaves_all_open() -> None:
-    proof = Proof(PROFILE, BLOCK)
+    proof = SlotEvidence(PROFILE, BLOCK)
     for _ in range(5):
         for code in CODES[:-1]:
             one = {code: reading(code, APART[code].base)}
@@ -208,5 +210,5 @@ def test_nothing_is_proved_that_is_not_so(
 
 
 def test_nothing_is_sure_before_anything_was_compared() -> None:
-    told: Callable[[str, int], bool] = Proof(PROFILE, BLOCK).holds
+    told: Callable[[str, int], bool] = SlotEvidence(PROFILE, BLOCK).holds
     assert not any(told(slot, raw) for slot in BLOCK.slots for raw in (0, *RAWS.values(), 99))

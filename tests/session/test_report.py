@@ -8,9 +8,9 @@ import pytest
 
 from tests.programs import wait_until
 from tests.session.sets_bench import FAMILIES, bench
-from tui.session.connect.identify import identify
+from tui.session.connect.identify import identify_drive
 from tui.session.read.upload import Upload
-from tui.session.report import entries_of, report
+from tui.session.report import entries_of, report_text
 
 SECTIONS = [
     "## Line settings of the drive",
@@ -28,7 +28,7 @@ async def test_every_family_has_its_report(family: str) -> None:
     with bench(family) as made:
         upload = Upload(made.session)
         await upload.run()
-        text = report(made.profile, upload.parameter_set(), [])
+        text = report_text(made.profile, upload.parameter_set(), [])
     heads = [line for line in text.splitlines() if line.startswith("## ")]
     assert heads == SECTIONS
     assert text.startswith(f"# {made.profile.name} at serial:")
@@ -40,14 +40,14 @@ async def test_every_family_has_its_report(family: str) -> None:
 
 async def test_what_was_changed_with_what_was_before() -> None:
     with bench("atv312", sets={"ttO": 33}) as made:
-        made.session.identity = await identify(made.session.line, 1)
+        made.session.identity = await identify_drive(made.session.line, 1)
         await made.apply(SP2="7", ttO="5")
         made.drive.provoke("OCF")
         upload = Upload(made.session)
         await upload.run()
         entries = entries_of(made.journal, made.session.line_text, 1)
         assert [entry.code for entry in entries] == ["SP2", "ttO"]
-        text = report(made.profile, upload.parameter_set(), entries)
+        text = report_text(made.profile, upload.parameter_set(), entries)
         assert entries_of(made.journal, made.session.line_text, 2) == []
     rows = [line for line in text.splitlines() if line.startswith("| ttO |")]
     assert any(row.endswith("| 10.0 s | 5.0 s | 3.3 s |") for row in rows), rows
@@ -63,7 +63,7 @@ async def test_what_the_drive_stored_with_a_fault() -> None:
         upload = Upload(made.session)
         await upload.run()
         held = upload.parameter_set()
-        text = report(made.profile, held, [])
+        text = report_text(made.profile, held, [])
     assert text.count("What the drive stored with") == 1
     found = text.partition("What the drive stored with DP0, OCF Overcurrent:")[2].partition("##")[0]
     stored = made.profile.data.faults.stored[0]
@@ -78,7 +78,7 @@ async def test_the_scanner_tells_what_it_brings() -> None:
     with bench("atv71", sets={"NMA1": 3201, "NMA2": 0}) as made:
         upload = Upload(made.session)
         await upload.run()
-        text = report(made.profile, upload.parameter_set(), [])
+        text = report_text(made.profile, upload.parameter_set(), [])
     assert f"| NMA1 | ETA {made.profile['ETA'].name} |" in text
     assert "| NMA2 | nothing |" in text
     assert "None." in text.partition("## Written from here")[2]

@@ -10,17 +10,17 @@ from tests.session.sets_bench import FAMILIES, Bench, bench
 from tui.bus.errors import RequestRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import is_verified
-from tui.drive.settings.compare import Side, compare, side_of
-from tui.drive.settings.parameter_set import Head, ParameterSet, dumps
-from tui.drive.settings.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
-from tui.drive.settings.set_reading import loads
+from tui.drive.settings.compare import Side, compare_settings, side_of
+from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
+from tui.drive.settings.restore_plan import NO_OPTIONS, Held, Options, RestorePlan, plan_restore
+from tui.drive.settings.set_reading import load_set
 from tui.drive.settings.writable import is_setting, line_setting
 from tui.drive.values import raw_range
-from tui.session.connect.identify import identify
+from tui.session.connect.identify import identify_drive
 from tui.session.read.upload import Upload
-from tui.session.settings.apply import Outcome, Result
+from tui.session.settings.apply import EditOutcome, Result
 from tui.session.settings.eeprom import factory_reset
-from tui.session.settings.restore import Mark, Restored, plan_for, restore
+from tui.session.settings.restore import Mark, Restored, plan_for, restore_set
 
 ATV71, ATV312, ATV31 = (library.load(p) for p in ("atv71", "atv312", "atv31"))
 
@@ -53,8 +53,8 @@ async def backed_up(made: Bench) -> ParameterSet:
     """The drive's parameter set, through its text."""
     upload = Upload(made.session)
     await upload.run()
-    text = dumps(made.profile, upload.parameter_set())
-    return loads(text, "set.toml", library.load)
+    text = dump_set(made.profile, upload.parameter_set())
+    return load_set(text, "set.toml", library.load)
 
 
 async def to_factory(made: Bench) -> None:
@@ -72,7 +72,9 @@ def skipped(plan: RestorePlan) -> dict[str, str]:
 
 async def restored(made: Bench, values: ParameterSet, options: Options) -> Restored:
     source = library.load(values.head.profile)
-    return await restore(made.session, made.journal, values, source, options, permit=made.permit())
+    return await restore_set(
+        made.session, made.journal, values, source, options, permit=made.permit()
+    )
 
 
 @pytest.mark.parametrize("family", FAMILIES)
@@ -80,12 +82,14 @@ async def test_back_up_factory_settings_restore_and_equal(family: str) -> None:
     with bench(family, sets=known(family)) as made:
         values = await backed_up(made)
         await to_factory(made)
-        lost = compare(made.profile, side_of("file", values), side_of("now", await backed_up(made)))
+        lost = compare_settings(
+            made.profile, side_of("file", values), side_of("now", await backed_up(made))
+        )
         assert lost, "the factory settings changed nothing: this test would prove nothing"
         done = await restored(made, values, all_unverified(family))
         assert done.complete, [result.text for result in done.results if not result.done]
         now = await backed_up(made)
-        left = compare(made.profile, side_of("file", values), side_of("now", now))
+        left = compare_settings(made.profile, side_of("file", values), side_of("now", now))
         assert {row.code for row in left} <= set(skipped(done.plan))
         reasons = {skipped(done.plan)[row.code] for row in left}
         assert reasons <= {"forbidden", "range"}
@@ -110,7 +114,7 @@ async def test_killed_half_way_and_resumed(family: str) -> None:
                 half.set()
 
         work = asyncio.create_task(
-            restore(
+            restore_set(
                 made.session,
                 made.journal,
                 values,
@@ -144,7 +148,7 @@ async def test_a_lost_line_keeps_the_rest_and_the_mark() -> None:
             if done == 2:
                 made.lose_line()
 
-        done = await restore(
+        done = await restore_set(
             made.session,
             made.journal,
             values,
@@ -172,7 +176,7 @@ async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
             if looked.count(of) == 1 and done < of:
                 made.lose_line()
 
-        done = await restore(
+        done = await restore_set(
             made.session,
             made.journal,
             values,
@@ -184,13 +188,13 @@ async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
         assert any(result.done for result in done.results)
         assert Mark.of(made.session).interrupted
         made.regain_line()
-        assert (await restored(made, values, PLAIN)).complete
+        assert (await restored(made, values, NO_OPTIONS)).complete
 
 
 async def test_a_read_only_line_is_not_restored_to() -> None:
     with bench("atv71", read_only=True) as made:
         with pytest.raises(RequestRefused, match="read-only"):
-            await restored(made, values_of("atv71", {"ACC": 50}), PLAIN)
+            await restored(made, values_of("atv71", {"ACC": 50}), NO_OPTIONS)
         assert not Mark.of(made.session).path.exists()
 
 
@@ -210,22 +214,22 @@ async def test_a_running_motor_takes_what_can_be_written_and_tells_the_rest() ->
         made.drive.run(20.0)
         done = await restored(made, values, Options())
         outcomes = {result.edit.code: result.outcome for result in done.results}
-        assert outcomes["ACC"] is Outcome.DONE
-        assert outcomes["FrS"] is Outcome.REFUSED
+        assert outcomes["ACC"] is EditOutcome.DONE
+        assert outcomes["FrS"] is EditOutcome.REFUSED
         assert {edit.code for edit in done.left} >= {"FrS"}
         assert done.plan.needs_stop
         assert not done.complete
 
 
 def values_of(family: str, raws: dict[str, int], **identity: str) -> ParameterSet:
-    return ParameterSet(Head(family, identity=identity), raws)
+    return ParameterSet(SetHead(family, identity=identity), raws)
 
 
 def plan(
     family: str,
     now: dict[str, int],
     values: ParameterSet,
-    options: Options = PLAIN,
+    options: Options = NO_OPTIONS,
     **held: str,
 ) -> RestorePlan:
     profile = library.load(family)
@@ -241,7 +245,7 @@ NOW = {"INR": 1, "ACC": 30, "HSP": 500, "LSP": 0, "TFR": 600, "NCR": 40, "UNS": 
 
 def test_what_is_left_out_and_why() -> None:
     values = ParameterSet(
-        Head("atv71"),
+        SetHead("atv71"),
         {**NOW, "ACC": 50, "ADD": 9, "TBR": 28, "FRY": 3, "CMD": 15, "RFR": 99, "DEC": 4},
         {"AC2": "refused"},
         {"XYZ": "7"},
@@ -333,7 +337,7 @@ async def test_a_set_of_another_family_on_a_drive() -> None:
     with bench("atv71", sets={"ACC": 77, "HSP": 420, "SP3": 222}) as made:
         values = await backed_up(made)
     with bench("atv312") as made:
-        made.session.identity = await identify(made.session.line, 1)
+        made.session.identity = await identify_drive(made.session.line, 1)
         done = await restored(made, values, Options())
         assert done.complete, done.results
         assert (made.drive.raw("ACC"), made.drive.raw("HSP"), made.drive.raw("SP3")) == (
@@ -350,10 +354,10 @@ def test_a_plan_never_writes_an_order_nor_what_is_forbidden(family: str) -> None
     now = {p.code: 0 for p in profile.parameters}
     raws = {p.code: max(raw_range(p)[0], 1) for p in profile.parameters}
     options = Options(True, True, frozenset(now))
-    values = ParameterSet(Head(family), raws)
+    values = ParameterSet(SetHead(family), raws)
     found = plan_restore(profile, Held(now), values, profile, options)
     for edit in found.edits:
         parameter = profile[edit.code]
         assert is_setting(profile, parameter)
         assert not parameter.forbidden
-    assert compare(profile, Side("a", now), Side("b", now)) == []
+    assert compare_settings(profile, Side("a", now), Side("b", now)) == []

@@ -7,8 +7,8 @@ import pytest
 from tests.session.sets_bench import FAMILIES, bench
 from tui.bus.errors import LineError
 from tui.drive.profile import library
-from tui.drive.settings.parameter_set import dumps
-from tui.drive.settings.set_reading import loads
+from tui.drive.settings.parameter_set import dump_set
+from tui.drive.settings.set_reading import load_set
 from tui.session.read.upload import Upload, readable_codes, setting_codes
 from tui.simulator import FaultRates
 
@@ -28,8 +28,8 @@ async def test_every_readable_parameter_is_read_and_right(family: str) -> None:
         assert values.absent == {}
         for code in setting_codes(made.profile):
             assert values.raws[code] == made.drive.raw(code), code
-        text = dumps(made.profile, values)
-        assert loads(text, "f", library.load).raws == values.raws
+        text = dump_set(made.profile, values)
+        assert load_set(text, "f", library.load).raws == values.raws
         requests = sum(frame.direction == "out" for frame in made.session.line.trace)
         single = made.profile.data.reading.single_words_only
         assert single or requests < len(codes)
@@ -42,7 +42,7 @@ async def test_what_the_drive_refuses_is_absent_with_why() -> None:
         absent = upload.parameter_set().absent
         assert set(absent) == {"ACC", "NMA1"}
         assert all("exception 2" in why for why in absent.values())
-        assert upload.asker.lacking == {"ACC", "NMA1"}
+        assert upload.retrying.lacking == {"ACC", "NMA1"}
 
 
 async def test_a_lost_line_and_on_where_it_was() -> None:
@@ -59,11 +59,11 @@ async def test_a_lost_line_and_on_where_it_was() -> None:
             await upload.run()
         half = len(upload.left)
         assert 0 < half < len(upload.codes)
-        before = dict(upload.asker.raws)
+        before = dict(upload.retrying.raws)
         made.regain_line()
         await upload.run()
         assert upload.done
-        assert {code: upload.asker.raws[code] for code in before} == before
+        assert {code: upload.retrying.raws[code] for code in before} == before
 
 
 async def test_lost_and_damaged_replies_are_asked_for_again() -> None:
@@ -72,4 +72,4 @@ async def test_lost_and_damaged_replies_are_asked_for_again() -> None:
         await upload.run()
         assert upload.done
         for code in setting_codes(made.profile):
-            assert upload.asker.raws[code] == made.drive.raw(code)
+            assert upload.retrying.raws[code] == made.drive.raw(code)

@@ -12,7 +12,16 @@ from tui.bus.errors import Superseded
 from tui.bus.line import Line, LineState, LineStatus
 from tui.drive.orders import OrderRefused
 from tui.session.arming import Arming, NotArmed
-from tui.session.work import BY_STOP, MOST_WAITING, Kind, Outcome, Permit, Stopped, Task, WorkQueue
+from tui.session.work import (
+    BY_STOP,
+    MOST_WAITING,
+    Outcome,
+    OutcomeKind,
+    Permit,
+    Stopped,
+    Task,
+    WorkQueue,
+)
 
 
 class Loop:
@@ -96,7 +105,7 @@ class Told:
                 return self.said
         raise AssertionError("the work does not end")
 
-    def outcome(self) -> tuple[Kind, str]:
+    def outcome(self) -> tuple[OutcomeKind, str]:
         assert self.queue.outcome is not None
         return self.queue.outcome.kind, self.queue.outcome.text
 
@@ -114,7 +123,7 @@ async def test_one_after_another(told: Told) -> None:
     told.put("b")
     assert told.queue.busy
     assert await told.idle() == ["a begun", "a done", "b begun", "b done"]
-    assert told.outcome() == (Kind.DONE, "b is done")
+    assert told.outcome() == (OutcomeKind.DONE, "b is done")
 
 
 async def test_whose_work_it_is(told: Told) -> None:
@@ -131,9 +140,9 @@ async def test_whose_work_it_is(told: Told) -> None:
 
 async def test_what_is_being_done_is_told(told: Told) -> None:
     told.put("a", 0.02, working="Writing")
-    assert told.outcome() == (Kind.WORKING, "Writing")
+    assert told.outcome() == (OutcomeKind.WORKING, "Writing")
     await told.idle()
-    assert told.outcome() == (Kind.DONE, "a is done")
+    assert told.outcome() == (OutcomeKind.DONE, "a is done")
 
 
 async def test_too_many_are_refused(told: Told) -> None:
@@ -164,7 +173,7 @@ async def test_a_stop_ends_the_one_under_way_and_those_behind_it(told: Told) -> 
     told.queue.stop("F12")
     assert sorted(await told.idle()) == ["a begun", "a cancelled", "a given up", "b given up"]
     assert told.queue.outcome is not None
-    assert told.queue.outcome.kind is Kind.REFUSED
+    assert told.queue.outcome.kind is OutcomeKind.REFUSED
     assert BY_STOP in told.queue.outcome.text.lower()
     assert isinstance(told.queue.outcome.error, Stopped)
     assert (told.queue.stops, told.queue.stopped_by) == (1, "F12")
@@ -211,7 +220,7 @@ async def test_a_worker_that_hears_late_of_a_stop_touches_no_task_behind_it(
     told.arming.arm()
     told.put("b", 0.05)
     assert await told.idle() == ["b begun", "b done"]
-    assert told.outcome() == (Kind.DONE, "b is done")
+    assert told.outcome() == (OutcomeKind.DONE, "b is done")
 
 
 # The count of stops under which a task was typed
@@ -247,7 +256,7 @@ async def test_a_task_is_refused_when_its_turn_comes_behind_a_stop(
     monkeypatch.setattr(told.queue, "_next", overtaken)
     told.put("a", armed=armed)
     assert await told.idle() == ["a given up"]
-    assert told.outcome() == (Kind.REFUSED, "Not sent: a stop came after it (F12).")
+    assert told.outcome() == (OutcomeKind.REFUSED, "Not sent: a stop came after it (F12).")
 
 
 async def test_a_task_is_refused_when_its_turn_comes_and_nothing_is_armed(told: Told) -> None:
@@ -256,7 +265,7 @@ async def test_a_task_is_refused_when_its_turn_comes_and_nothing_is_armed(told: 
     await asyncio.sleep(0)
     told.arming.disarm("No key for a minute: no longer armed.")
     assert await told.idle() == ["a begun", "a done", "b given up"]
-    assert told.outcome() == (Kind.REFUSED, "No key for a minute: no longer armed.")
+    assert told.outcome() == (OutcomeKind.REFUSED, "No key for a minute: no longer armed.")
 
 
 async def test_a_task_that_needs_no_arming_is_done_without(told: Told) -> None:
@@ -313,7 +322,7 @@ async def test_a_task_asks_before_each_frame(told: Told, end: str) -> None:
     told.queue.put(Task(carry_out))
     await told.idle()
     assert frames == [0, 1]
-    assert told.outcome()[0] is Kind.REFUSED
+    assert told.outcome()[0] is OutcomeKind.REFUSED
 
 
 # Tasks that fail
@@ -326,18 +335,18 @@ async def test_what_waits_behind_a_failed_task_is_dropped(told: Told) -> None:
     told.put("c")
     assert await told.idle() == ["a begun", "b given up", "c given up", "a given up"]
     text = "The drive is in fault. The commands behind it were dropped."
-    assert told.outcome() == (Kind.REFUSED, text)
+    assert told.outcome() == (OutcomeKind.REFUSED, text)
     assert told.queue.outcome is not None
     assert told.queue.outcome.error is refused
     told.put("d")
     await told.idle()
-    assert told.outcome() == (Kind.DONE, "d is done")
+    assert told.outcome() == (OutcomeKind.DONE, "d is done")
 
 
 async def test_a_failed_task_with_nothing_behind_it_drops_nothing(told: Told) -> None:
     told.put("a", error=OrderRefused("The drive is in fault."))
     assert await told.idle() == ["a begun", "a given up"]
-    assert told.outcome() == (Kind.REFUSED, "The drive is in fault.")
+    assert told.outcome() == (OutcomeKind.REFUSED, "The drive is in fault.")
 
 
 async def test_an_error_that_nobody_foresaw_leaves_nothing_behind(told: Told) -> None:
@@ -345,7 +354,7 @@ async def test_an_error_that_nobody_foresaw_leaves_nothing_behind(told: Told) ->
     told.put("b")
     assert await told.idle() == ["a begun", "b given up", "a given up"]
     kind, text = told.outcome()
-    assert kind is Kind.REFUSED
+    assert kind is OutcomeKind.REFUSED
     assert "ZeroDivisionError: none" in text
     told.put("c")
     assert (await told.idle())[3:] == ["c begun", "c done"]
@@ -354,12 +363,12 @@ async def test_an_error_that_nobody_foresaw_leaves_nothing_behind(told: Told) ->
 async def test_a_task_given_up_says_what_was_done_of_it(told: Told) -> None:
     told.put("a", error=OrderRefused("No."), left="2 written, 6 still staged.")
     await told.idle()
-    assert told.outcome() == (Kind.REFUSED, "No. 2 written, 6 still staged.")
+    assert told.outcome() == (OutcomeKind.REFUSED, "No. 2 written, 6 still staged.")
     told.put("b", 5.0, left="3 written, 5 still staged.")
     await asyncio.sleep(0.01)
     told.queue.stop()
     await told.idle()
-    assert told.outcome() == (Kind.REFUSED, "Ended by a stop. 3 written, 5 still staged.")
+    assert told.outcome() == (OutcomeKind.REFUSED, "Ended by a stop. 3 written, 5 still staged.")
 
 
 async def test_one_that_gave_way_to_a_newer_value_says_nothing(told: Told) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from tui.simulator import DriveSpec, FaultRates, LineTiming, SimulatedDrive
-from tui.simulator.server.conversation import IDLE, RtuConversation, TcpConversation
+from tui.simulator.server.conversation import SILENCE_ENDS_FRAME, RtuConversation, TcpConversation
 from tui.simulator.server.faults import FaultPlan
 from tui.simulator.server.frames import seal
 from tui.simulator.server.line import SimulatedLine
@@ -60,9 +60,9 @@ def test_glued_requests_are_not_understood_and_the_next_one_is() -> None:
 def test_garbage_ends_with_silence() -> None:
     talk = conversation()
     talk.feed(b"\x99\x88", 1.0)
-    assert talk.due == pytest.approx(1.0 + IDLE)
-    talk.feed(REQUEST, 1.0 + 2 * IDLE)
-    assert talk.poll(1.0 + 2 * IDLE) == REPLY
+    assert talk.due == pytest.approx(1.0 + SILENCE_ENDS_FRAME)
+    talk.feed(REQUEST, 1.0 + 2 * SILENCE_ENDS_FRAME)
+    assert talk.poll(1.0 + 2 * SILENCE_ENDS_FRAME) == REPLY
 
 
 def test_a_wrong_byte_count_is_understood_after_a_silence() -> None:

@@ -6,7 +6,7 @@ import pytest
 
 from tui.simulator import FaultRates
 from tui.simulator.server.faults import FaultPlan
-from tui.simulator.server.frames import is_whole, seal
+from tui.simulator.server.frames import is_sealed, seal
 
 FRAME = seal(bytes.fromhex("020308002802580 1F40000".replace(" ", "")))
 
@@ -47,7 +47,7 @@ def test_truncated(seed: int) -> None:
 def test_corrupted_by_one_bit(seed: int) -> None:
     [(_, data)] = hit("corrupted", seed)
     assert sum((a ^ b).bit_count() for a, b in zip(data, FRAME, strict=True)) == 1
-    assert not is_whole(data)
+    assert not is_sealed(data)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -60,7 +60,7 @@ def test_noise_before_the_reply(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(20))
 def test_another_drives_reply_is_whole_but_not_ours(seed: int) -> None:
     [(_, data)] = hit("foreign", seed)
-    assert is_whole(data)
+    assert is_sealed(data)
     assert data[0] != FRAME[0]
     assert data[1:-2] == FRAME[1:-2]
 

@@ -4,21 +4,21 @@ from __future__ import annotations
 
 import pytest
 
-from tui.simulator.server.frames import crc16, is_whole, request_length, seal
+from tui.simulator.server.frames import checksum, is_sealed, request_length, seal
 
 from .manual import FRAMES, Frame
 
 
 @pytest.mark.parametrize("frame", FRAMES, ids=lambda frame: f"{frame.family}-{frame.number}")
 def test_every_frame_of_the_manuals_has_the_checksum_that_we_compute(frame: Frame) -> None:
-    assert is_whole(frame.data)
+    assert is_sealed(frame.data)
     assert seal(frame.data[:-2]) == frame.data
 
 
 @pytest.mark.parametrize("frame", [f for f in FRAMES if f.printed], ids=lambda f: f"{f.number}")
 def test_a_misprinted_checksum_is_seen(frame: Frame) -> None:
     assert frame.printed is not None
-    assert not is_whole(frame.printed)
+    assert not is_sealed(frame.printed)
     assert frame.printed[:-2] == frame.data[:-2]
 
 
@@ -28,7 +28,7 @@ def test_there_are_72_frames_of_which_5_are_misprinted() -> None:
 
 
 def test_checksum_of_nothing_is_its_start_value() -> None:
-    assert crc16(b"") == 0xFFFF
+    assert checksum(b"") == 0xFFFF
 
 
 @pytest.mark.parametrize(

@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import pytest
 
-from tui.simulator.plant.motor import MotorState, Order, approach, rating_of, step
+from tui.simulator.plant.motor import MotorDemand, MotorState, approach, rating_of, step
 
 RATING = rating_of("ATV71HU15M3")
-GO = Order(energised=True, target=50.0, acceleration=10.0, deceleration=5.0)
+GO = MotorDemand(energised=True, target=50.0, acceleration=10.0, deceleration=5.0)
 
 
-def run(state: MotorState, order: Order, seconds: float, load: float = 0.7) -> MotorState:
+def run(state: MotorState, order: MotorDemand, seconds: float, load: float = 0.7) -> MotorState:
     for _ in range(round(seconds / 0.05)):
         state = step(state, RATING, order, load, 230.0, 0.05)
     return state
@@ -51,9 +51,9 @@ def test_the_ramp_takes_its_time_up_and_down() -> None:
 
 
 def test_reversing_goes_through_zero() -> None:
-    passed = approach(1.0, Order(True, -50.0, acceleration=10.0, deceleration=20.0), 0.1)
+    passed = approach(1.0, MotorDemand(True, -50.0, acceleration=10.0, deceleration=20.0), 0.1)
     assert passed == 0.0
-    assert approach(0.0, Order(True, -50.0, acceleration=10.0), 0.1) == pytest.approx(-1.0)
+    assert approach(0.0, MotorDemand(True, -50.0, acceleration=10.0), 0.1) == pytest.approx(-1.0)
 
 
 def test_at_speed_the_values_fit_the_rating() -> None:
@@ -85,16 +85,16 @@ def test_accelerating_takes_more_torque_and_braking_gives_some_back() -> None:
 
 
 def test_a_freewheeling_motor_coasts() -> None:
-    state = run(run(MotorState(), GO, 10), Order(), 1)
+    state = run(run(MotorState(), GO, 10), MotorDemand(), 1)
     assert (state.frequency, state.current, state.voltage) == (0, 0, 0)
     assert 20 < state.rotor < 45
-    assert run(state, Order(), 60).rotor == 0
+    assert run(state, MotorDemand(), 60).rotor == 0
 
 
 def test_injection_stops_sooner_than_coasting_and_takes_current() -> None:
     turning = run(MotorState(), GO, 10)
-    braked = run(turning, Order(injection=True), 1)
-    assert 0 < braked.rotor < run(turning, Order(), 1).rotor
+    braked = run(turning, MotorDemand(injection=True), 1)
+    assert 0 < braked.rotor < run(turning, MotorDemand(), 1).rotor
     assert braked.current > 0
     assert braked.braking
 
@@ -104,7 +104,7 @@ def test_thermal_states_rise_slowly_and_fall_again() -> None:
     warm = run(cold, GO, 120)
     hot = run(warm, GO, 1200)
     assert cold.motor_thermal < warm.motor_thermal < hot.motor_thermal < 100
-    assert run(hot, Order(), 600).motor_thermal < hot.motor_thermal
+    assert run(hot, MotorDemand(), 600).motor_thermal < hot.motor_thermal
     assert hot.drive_thermal > cold.drive_thermal
 
 
@@ -113,7 +113,7 @@ def test_energy_and_hours_add_up() -> None:
     assert state.run_hours == pytest.approx(1, rel=0.01)
     assert state.on_hours == pytest.approx(1, rel=0.01)
     assert 0.8 < state.energy < 1.6
-    idle = run(state, Order(), 3600)
+    idle = run(state, MotorDemand(), 3600)
     assert idle.run_hours == state.run_hours
     assert idle.on_hours == pytest.approx(2, rel=0.01)
 

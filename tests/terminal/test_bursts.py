@@ -8,17 +8,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.terminal.bursts import LONGEST, STEPPING, Bursts, Given
+from tui.terminal.bursts import HELD_LONGEST, STEPPING, Bursts, Given
 from tui.terminal.dialects import APART
-from tui.terminal.tokens import Key, Paste
+from tui.terminal.tokens import KeyToken, Paste
 
 QUIET = APART + 0.01
 CLOSE = 0.03
 STOPS = {"space", "f12", "f9"}
 
 
-def pressed(name: str, at: float) -> Key:
-    return Key(name, name if len(name) == 1 else None, at, at)
+def pressed(name: str, at: float) -> KeyToken:
+    return KeyToken(name, name if len(name) == 1 else None, at, at)
 
 
 class Bench:
@@ -48,7 +48,7 @@ class Bench:
         return self.read()
 
     def names(self) -> list[str]:
-        return [given.what.name for given in self.found if isinstance(given.what, Key)]
+        return [given.what.name for given in self.found if isinstance(given.what, KeyToken)]
 
 
 def test_a_key_alone_is_held_back_until_that_is_known() -> None:
@@ -191,7 +191,7 @@ def test_another_key_ends_a_held_one() -> None:
 def test_a_long_piece_is_not_held_back_to_its_end() -> None:
     bench = Bench()
     found = [given for _ in range(20) for given in bench.read("x", after=CLOSE)]
-    assert len(found) >= 20 - LONGEST / CLOSE - 2
+    assert len(found) >= 20 - HELD_LONGEST / CLOSE - 2
 
 
 def test_a_paste_keeps_its_place_and_leaves_no_key_beside_it_alone() -> None:
@@ -200,7 +200,7 @@ def test_a_paste_keeps_its_place_and_leaves_no_key_beside_it_alone() -> None:
     bursts.paste(Paste("text", 1.01))
     bursts.key(pressed("enter", 1.02))
     found = [*bursts.given(1.02), *bursts.given(2.0)]
-    assert [type(given.what) for given in found] == [Key, Paste, Key]
+    assert [type(given.what) for given in found] == [KeyToken, Paste, KeyToken]
     assert not any(given.alone for given in found)
 
 
@@ -216,7 +216,7 @@ def test_a_key_waits_for_a_sequence_that_began_beside_it() -> None:
     bursts.key(pressed("r", 1.0))
     assert bursts.given(1.08, pending=1.03) == []
     assert bursts.deadline(pending=1.03) is None
-    bursts.key(Key("escape", "\x1b", 1.03, 1.03))
+    bursts.key(KeyToken("escape", "\x1b", 1.03, 1.03))
     assert [given.alone for given in bursts.given(1.13)] == [False, False]
     bursts.key(pressed("r", 2.0))
     assert [given.alone for given in bursts.given(2.1, pending=2.06)] == [True]
@@ -247,13 +247,13 @@ def test_what_is_given_out_is_true(reads: list[tuple[list[str], float]]) -> None
         bench.read(*names, after=gap)
     bench.rest()
     typed = _times(reads)
-    keys = [given.what for given in bench.found if isinstance(given.what, Key)]
+    keys = [given.what for given in bench.found if isinstance(given.what, KeyToken)]
     # in order, each once, none that was not typed
     rest = iter(name for name, _ in typed)
     assert all(any(name == key.name for name in rest) for key in keys)
     for one in bench.found:
         key = one.what
-        assert isinstance(key, Key)
+        assert isinstance(key, KeyToken)
         near = [name for name, at in typed if abs(at - key.at) <= APART - 1e-6]
         if one.alone:
             assert near == [key.name]
@@ -266,7 +266,9 @@ def test_what_is_given_out_is_true(reads: list[tuple[list[str], float]]) -> None
     for name, at in typed:
         near = [other for other, time in typed if abs(time - at) <= APART + 1e-6]
         if name not in STOPS and near == [name] and not [s for s in stops if s == at]:
-            assert any(isinstance(g.what, Key) and g.what.at == at and g.alone for g in bench.found)
+            assert any(
+                isinstance(g.what, KeyToken) and g.what.at == at and g.alone for g in bench.found
+            )
 
 
 @given(

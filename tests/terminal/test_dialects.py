@@ -14,7 +14,7 @@ from textual._ansi_sequences import ANSI_SEQUENCES_KEYS, IGNORE_SEQUENCE
 from textual._xterm_parser import XTermParser
 
 from tui.terminal.dialects import APART, ESCAPE_DELAY, SEQUENCE_WITHIN, Tokenizer
-from tui.terminal.tokens import Key, Paste, Report, Token
+from tui.terminal.tokens import KeyToken, Paste, Report, Token
 
 from .dialect_tables import DIALECTS, REPLIES, REPORTS, SHIFTED_AND_MORE
 
@@ -51,7 +51,7 @@ def tokens(reads: Sequence[str], gap: float = 0.0, *, mouse: bool = False) -> li
 
 def names(found: Sequence[Token]) -> list[str]:
     assert not [token for token in found if isinstance(token, Paste | Report)]
-    return [token.name for token in found if isinstance(token, Key)]
+    return [token.name for token in found if isinstance(token, KeyToken)]
 
 
 @pytest.mark.parametrize(("sequence", "key"), FUNCTION_KEYS)
@@ -82,7 +82,7 @@ def test_other_keys_of_the_dialects_type_nothing_and_stop_nothing(dialect: str, 
             continue
         for reads in cuts(sequence, 1):
             for token in tokens(reads, gap):
-                if isinstance(token, Key):
+                if isinstance(token, KeyToken):
                     assert token.character in (None, "\x1b"), (reads, token)
                     assert token.name not in STOPS | {"space", "enter"}, (reads, token)
 
@@ -96,7 +96,7 @@ def test_a_report_is_passed_on_and_is_no_key(sequence: str, gap: float) -> None:
 
 
 def _escape(token: Token) -> Token | None:
-    return token if isinstance(token, Key) and token.name == "escape" else None
+    return token if isinstance(token, KeyToken) and token.name == "escape" else None
 
 
 @pytest.mark.parametrize("sequence", REPLIES.values(), ids=REPLIES)
@@ -126,9 +126,9 @@ def test_a_space_stops_inside_of_any_sequence(begin: str, gap: float) -> None:
 def test_no_stop_key_is_lost_where_an_end_was_lost(begin: str) -> None:
     for key in (" ", "\x1b[24~", "\x1bO[", "\x1b[U"):
         found = tokens([begin, key], APART + 0.01)
-        assert next(t.name for t in found if isinstance(t, Key)) in STOPS | {"space"}, key
+        assert next(t.name for t in found if isinstance(t, KeyToken)) in STOPS | {"space"}, key
     held_down = tokens([begin, *[" "] * 5], APART + 0.01)
-    assert sum(isinstance(token, Key) for token in held_down) == 5
+    assert sum(isinstance(token, KeyToken) for token in held_down) == 5
 
 
 def test_a_reply_without_end_gives_its_space_late() -> None:
@@ -161,13 +161,13 @@ def test_escape_alone_comes_after_its_delay_with_the_time_it_was_read() -> None:
     assert tokenizer.deadline == pytest.approx(5.2)
     assert tokenizer.pending == 5.0
     assert tokenizer.tick(5.19) == []
-    assert tokenizer.tick(5.21) == [Key("escape", "\x1b", 5.0, 5.0, "then")]
+    assert tokenizer.tick(5.21) == [KeyToken("escape", "\x1b", 5.0, 5.0, "then")]
 
 
 def test_a_cut_key_tells_when_it_began_and_when_it_was_complete() -> None:
     tokenizer = Tokenizer()
     tokenizer.feed("\x1b[", 1.0, "first")
-    assert tokenizer.feed("A", 1.5, "second") == [Key("up", None, 1.0, 1.5, "first")]
+    assert tokenizer.feed("A", 1.5, "second") == [KeyToken("up", None, 1.0, 1.5, "first")]
 
 
 @pytest.mark.parametrize("letter", string.ascii_letters + string.digits + "[]\r\n+-/?")
@@ -176,7 +176,7 @@ def test_alt_with_a_key_is_never_that_key_alone(letter: str) -> None:
         return  # these begin something else
     for reads in (["\x1b" + letter], ["\x1b", letter]):
         (found,) = tokens(reads, 0.02)
-        assert isinstance(found, Key)
+        assert isinstance(found, KeyToken)
         assert found.name not in ("enter", letter)
         assert found.character is None or found.character not in string.printable
 
@@ -227,7 +227,7 @@ def test_every_other_key_has_the_name_it_has_in_textual() -> None:
         if sequence[2:3] == "1" and sequence[-1] in "pqrstuvwxy":
             continue  # digits with Ctrl, in mintty alone
         (ours,) = tokens([sequence])
-        assert isinstance(ours, Key)
+        assert isinstance(ours, KeyToken)
         expected = ("enter", "\r") if sequence == "\x1bOM" else theirs[0]
         assert (ours.name, ours.character) == expected, sequence
         compared += 1
@@ -281,7 +281,7 @@ def test_the_keys_of_the_panel(sent: str, key: str) -> None:
 def test_a_lock_that_is_on_changes_no_key() -> None:
     for sent in ("\x1b[114;65u", "\x1b[114;129u", "\x1b[114;193:1;114u"):
         (found,) = tokens([sent])
-        assert isinstance(found, Key)
+        assert isinstance(found, KeyToken)
         assert (found.name, found.character) == ("r", "r"), sent
 
 
@@ -335,7 +335,7 @@ def test_no_sequence_gives_a_key_that_acts(sequence: str, gap: float, data: st.D
         return
     cut = data.draw(st.integers(1, len(sequence)))
     found = tokens([sequence[:cut], sequence[cut:]], gap)
-    typed = [token for token in found if isinstance(token, Key)]
+    typed = [token for token in found if isinstance(token, KeyToken)]
     assert not ACTS & {token.name for token in typed}
     # a keypad may type a digit; nothing else is typed out of a sequence
     assert {token.character for token in typed} <= {None, "\x1b", *"0123456789*+-./"}
@@ -352,7 +352,7 @@ def test_random_bytes_never_crash_and_always_come_to_an_end(
     found += tokenizer.tick(now + AFTERWARDS)
     found += tokenizer.tick(now + 2 * AFTERWARDS)
     assert tokenizer.deadline is None
-    keys = [token for token in found if isinstance(token, Key)]
+    keys = [token for token in found if isinstance(token, KeyToken)]
     times = [key.at for key in keys]
     assert times == sorted(times)
     assert all(key.began <= key.at for key in keys)
@@ -362,5 +362,5 @@ def test_random_bytes_never_crash_and_always_come_to_an_end(
 def test_a_space_is_never_lost(text: str, gap: float, data: st.DataObject) -> None:
     cut = data.draw(st.integers(0, len(text)))
     found = tokens([text[:cut], text[cut:]], gap)
-    spaces = [token for token in found if isinstance(token, Key) and token.name == "space"]
+    spaces = [token for token in found if isinstance(token, KeyToken) and token.name == "space"]
     assert bool(spaces) == (" " in text)

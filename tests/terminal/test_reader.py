@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tui.terminal.reader import KeyReader, Pressed, Read
+from tui.terminal.reader import KeyReader, Pressed, TerminalInput
 from tui.terminal.tokens import Paste, Report
 
 from .dialect_tables import DIALECTS, REPLIES, REPORTS
@@ -39,10 +39,10 @@ class Stops:
 
 def read(
     *reads: tuple[float, bytes], typing: bool = False
-) -> tuple[list[str], list[Pressed], list[Read]]:
+) -> tuple[list[str], list[Pressed], list[TerminalInput]]:
     """What reads at these times come to: stops, keys, and all that the app is told."""
     stops = Stops(typing=typing)
-    reader, found = KeyReader(stops), list[Read]()
+    reader, found = KeyReader(stops), list[TerminalInput]()
     for at, data in reads:
         while (deadline := reader.deadline) is not None and deadline < at - 0.001:
             found += reader.tick(deadline + 0.001)

@@ -10,7 +10,7 @@ from typing import Any, cast
 from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
-from tui.bus.line import Counters, DeviceState, Frame, Line, LineState, LineStatus
+from tui.bus.line import DeviceState, Frame, Line, LineCounters, LineState, LineStatus
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
@@ -23,7 +23,7 @@ from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.journal import Journal
-from tui.session.monitor.line_watch import Keeper, Look, Watch
+from tui.session.monitor.line_watch import LineWatch, Look, TimeoutWatch
 from tui.session.monitor.monitor import Monitor, Snapshot, TrendPoint
 from tui.session.reading import Quality, Reading
 from tui.widgets.clock import Clock
@@ -143,8 +143,8 @@ class FakeLine:
 
     state: LineState = CONNECTED
     link: SerialLink = field(default_factory=lambda: SerialLink("/dev/ttyUSB0"))
-    counters: Counters = field(
-        default_factory=lambda: Counters(
+    counters: LineCounters = field(
+        default_factory=lambda: LineCounters(
             requests=1204,
             replies=1203,
             timeouts=1,
@@ -178,19 +178,19 @@ class FakeLine:
 
 
 @dataclass
-class FakeKeeper:
-    """A keeper that has seen what the test gives, and no more."""
+class FakeLineWatch:
+    """A line watch that has seen what the test gives, and no more."""
 
-    given: Watch | None = None
-    alone: dict[int, Watch] = field(default_factory=dict)
+    given: TimeoutWatch | None = None
+    alone: dict[int, TimeoutWatch] = field(default_factory=dict)
     commanded: list[DriveSession] = field(default_factory=list)
     looks: dict[int, Look] = field(default_factory=dict)
 
-    def watch(self, _device: int) -> Watch | None:
+    def watch(self, _device: int) -> TimeoutWatch | None:
         """The watch that the test gives."""
         return self.given
 
-    def hungry(self) -> list[Any]:
+    def warnings(self) -> list[Any]:
         """No drive is about to trip."""
         return []
 
@@ -202,7 +202,7 @@ class FakeKeeper:
         """Every time-out is known."""
         return []
 
-    def left_alone(self) -> dict[int, Watch]:
+    def left_alone(self) -> dict[int, TimeoutWatch]:
         """The drives that trip."""
         return self.alone
 
@@ -248,16 +248,16 @@ def look_of(raws: Mapping[str, int]) -> Look:
 
 
 class StillFleet(Fleet):
-    """Drives that were found, looked after by a keeper that has seen what the test gives."""
+    """Drives that were found, looked after by a line watch that has seen what the test gives."""
 
     def __init__(
         self,
         *drives: FoundDrive,
-        keeper: FakeKeeper | None = None,
+        line_watch: FakeLineWatch | None = None,
         line: LineState = CONNECTED,
     ) -> None:
         super().__init__(cast("Line", FakeLine(line)), Journal())
-        self.keeper = cast("Keeper", keeper or FakeKeeper())
+        self.line_watch = cast("LineWatch", line_watch or FakeLineWatch())
         for drive in drives:
             self.hold(drive)
 

@@ -18,7 +18,7 @@ from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FramesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
-from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.editor import BlockEditor
 
 from .fakes import press
 from .test_command_flows import Bench, bench
@@ -44,10 +44,10 @@ async def message(made: Bench, *parts: str) -> None:
     await until(made.pilot, lambda: all(part in said() for part in parts))
 
 
-def desk(made: Bench) -> MappingDesk:
+def block_editor(made: Bench) -> BlockEditor:
     screen = made.app.screen
     assert isinstance(screen, BlocksScreen)
-    return screen.desk
+    return screen.block_editor
 
 
 async def pick(made: Bench, typed: str) -> None:
@@ -123,7 +123,7 @@ async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
         assert made.drive().raw("NMA1") == 9001
         # now that it was told, it may be overwritten
         await until(made.pilot, lambda: "→ ETA" in shown(made.app, "first"))
-        await until(made.pilot, lambda: not desk(made).busy)
+        await until(made.pilot, lambda: not block_editor(made).busy)
         await write(made)
         await message(made, "Written and read back: NMA1, NMA3")
 
@@ -208,9 +208,9 @@ async def test_outputs_of_an_indirect_block_wait_for_a_reset_and_a_persons_word(
         await until(made.pilot, lambda: "reset it first" in str(fault.render()))
         await made.pilot.press("escape")
         made.drive().power_off()
-        await until(made.pilot, lambda: not desk(made).mapper.written)
+        await until(made.pilot, lambda: not block_editor(made).mapper.written)
         made.drive().power_on()
-        await until(made.pilot, lambda: not desk(made).trouble)
+        await until(made.pilot, lambda: not block_editor(made).trouble)
         await until(made.pilot, lambda: "pending" not in shown(made.app, "second"))
         await answer(made, "X", "FA51=500")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))

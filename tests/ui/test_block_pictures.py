@@ -8,17 +8,17 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
-from tui.drive.blocks.assignment import target
+from tui.drive.blocks.assignment import slot_target
 from tui.drive.blocks.user_words import UserWord
 from tui.drive.profile import library
 from tui.drive.profile.schema import Block
 from tui.screens.blocks.screen import BlocksScreen
-from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.mapping import BlockView, Force, Slot
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
-from tui.session.read.verdict import Verdict
-from tui.session.work import Kind, Outcome
+from tui.session.read.verdict import SlotMatch
+from tui.session.work import Outcome, OutcomeKind
 
 from . import fakes
 from .test_pictures import SIZES, Compare
@@ -29,8 +29,8 @@ HELD = {**fakes.READY, "CMD": 0, "LFRD": 0, "HSP": 500, "LSP": 0, "ACC": 30, "DE
 ATV21 = {"FD01": 0x6404, "FD00": 3500, "FE03": 812, "FE05": 7000, "FE90": 1050, "FC91": 0}
 
 
-class StillDesk(MappingDesk):
-    """A desk whose values do not change."""
+class StillDesk(BlockEditor):
+    """A block editor whose values do not change."""
 
     def start(self) -> None:
         """Nothing is read."""
@@ -38,13 +38,13 @@ class StillDesk(MappingDesk):
     def stop(self) -> None:
         """Nothing was read."""
 
-    def _say(self, text: str, kind: Kind) -> None:
+    def _say(self, text: str, kind: OutcomeKind) -> None:
         """Said at the moment of every fake."""
         self.session.work.outcome = Outcome(kind, text, fakes.NOW)
 
 
 def desk_on(family: str) -> StillDesk:
-    """The desk of a drive that is ready, where the family is the one whose words are held."""
+    """The block editor of a drive that is ready, where its family has blocks."""
     held = fakes.snapshot_of(library.load("atv71"), fakes.READY) if family == "atv71" else None
     console = fakes.console_of(held, family=family)
     return StillDesk(console.session, console.monitor, console.journal)
@@ -64,9 +64,9 @@ def view_of(
     hold(session, dict(zip(block.slots, raws, strict=True)))
     slots = []
     for code, raw in zip(block.slots, raws, strict=True):
-        parameter = target(profile, block, raw)
+        parameter = slot_target(profile, block, raw)
         if parameter is None:
-            verdict = Verdict.UNUSED if raw == 0 else Verdict.NONE
+            verdict = SlotMatch.UNUSED if raw == 0 else SlotMatch.NONE
             slots.append(Slot(code, raw, verdict=verdict))
             continue
         reading = fakes.readings_of(
@@ -74,62 +74,62 @@ def view_of(
         )[parameter.code]
         text = f"{reading.text} {reading.unit}".strip()
         force = Force.ACTIVE if block.effective == "at-once" else Force.UNPROVED
-        slots.append(Slot(code, raw, parameter, reading.raw, text, reading, Verdict.SAME, force))
+        slots.append(Slot(code, raw, parameter, reading.raw, text, reading, SlotMatch.SAME, force))
     return BlockView(block, tuple(slots))
 
 
-def scanner() -> MappingDesk:
-    desk = desk_on("atv71")
-    session = desk.session
+def scanner() -> BlockEditor:
+    block_editor = desk_on("atv71")
+    session = block_editor.session
     hold(session, {"INR": 1})
-    first, second = desk.blocks
-    desk.views = {
+    first, second = block_editor.blocks
+    block_editor.views = {
         first.id: view_of(session, first, INPUTS, HELD),
         second.id: view_of(session, second, OUTPUTS, HELD),
     }
-    desk.words = (
+    block_editor.words = (
         UserWord(3204, "signed"), UserWord(3205, "signed"), UserWord(7121), UserWord(),
     )  # fmt: skip
-    desk.word_raws = [53, 725, 0, None]
-    return desk
+    block_editor.word_raws = [53, 725, 0, None]
+    return block_editor
 
 
-def proposed(desk: MappingDesk) -> None:
-    first = desk.blocks[0]
-    desk.pick(first, 7, "LFT")
-    desk.move(first, 2, 1)
+def proposed(block_editor: BlockEditor) -> None:
+    first = block_editor.blocks[0]
+    block_editor.pick(first, 7, "LFT")
+    block_editor.move(first, 2, 1)
 
 
-def wrong(desk: MappingDesk) -> None:
-    desk.pick(desk.blocks[1], 6, "CMD")
+def wrong(block_editor: BlockEditor) -> None:
+    block_editor.pick(block_editor.blocks[1], 6, "CMD")
 
 
-def differs(desk: MappingDesk) -> None:
-    block = desk.blocks[0]
-    view = desk.views[block.id]
+def differs(block_editor: BlockEditor) -> None:
+    block = block_editor.blocks[0]
+    view = block_editor.views[block.id]
     bad = Slot("NMA1", 3201, view.slots[0].parameter, 1480, "raw 1480", view.slots[0].direct,
-               Verdict.DIFFERS, Force.ACTIVE)  # fmt: skip
-    unknown = Slot("NMA2", 3199, None, None, verdict=Verdict.NONE)
-    hold(desk.session, {"NMA2": 3199})
-    desk.views[block.id] = BlockView(block, (bad, unknown, *view.slots[2:]))
-    desk.refuse("NMA1 differs; NMA2 no value. 5 slots bring the same as direct reads.")
+               SlotMatch.DIFFERS, Force.ACTIVE)  # fmt: skip
+    unknown = Slot("NMA2", 3199, None, None, verdict=SlotMatch.NONE)
+    hold(block_editor.session, {"NMA2": 3199})
+    block_editor.views[block.id] = BlockView(block, (bad, unknown, *view.slots[2:]))
+    block_editor.refuse("NMA1 differs; NMA2 no value. 5 slots bring the same as direct reads.")
 
 
-def indirect() -> MappingDesk:
-    desk = desk_on("atv21")
-    session = desk.session
-    first, second = desk.blocks
+def indirect() -> BlockEditor:
+    block_editor = desk_on("atv21")
+    session = block_editor.session
+    first, second = block_editor.blocks
     view = view_of(session, first, (1, 2, 3, 4, 11), ATV21)
     active = tuple(
         Slot(s.code, s.raw, s.parameter, s.word, s.text, s.direct, s.verdict, Force.ACTIVE)
         for s in view.slots[:3]
     )
     pending = tuple(
-        Slot(s.code, s.raw, s.parameter, 77, "raw 77", s.direct, Verdict.DIFFERS,
+        Slot(s.code, s.raw, s.parameter, 77, "raw 77", s.direct, SlotMatch.DIFFERS,
              Force.PENDING, "FC91")
         for s in view.slots[3:]
     )  # fmt: skip
-    desk.views = {
+    block_editor.views = {
         first.id: BlockView(first, (*active, *pending)),
         second.id: BlockView(
             second,
@@ -137,22 +137,22 @@ def indirect() -> MappingDesk:
             "Write block can only be written: what it would take cannot be read.",
         ),
     }
-    return desk
+    return block_editor
 
 
-def empty() -> MappingDesk:
+def empty() -> BlockEditor:
     return desk_on("atv71")
 
 
-def without(family: str) -> Callable[[], MappingDesk]:
+def without(family: str) -> Callable[[], BlockEditor]:
     return lambda: desk_on(family)
 
 
-def nothing(_: MappingDesk) -> None:
+def nothing(_: BlockEditor) -> None:
     """As it is."""
 
 
-STATES: dict[str, tuple[Callable[[], MappingDesk], Any, float | None, list[str]]] = {
+STATES: dict[str, tuple[Callable[[], BlockEditor], Any, float | None, list[str]]] = {
     "scanner": (scanner, nothing, None, []),
     "outputs": (scanner, nothing, 52.0, ["tab", "down", "down"]),
     "proposed": (scanner, proposed, 52.0, ["down", "down"]),
@@ -182,13 +182,15 @@ def test_blocks(
 ) -> None:
     make, prepare, armed, keys = STATES[state]
     monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
-    desk = make()
-    prepare(desk)
+    block_editor = make()
+    prepare(block_editor)
     app = fakes.app_of()
     app.opened = fakes.opened()
-    desk.session.arming = desk.session.work.arming = fakes.StillArming(desk.session.line, armed)
-    console = DriveConsole(desk.session, desk.journal)
-    console.blocks, console.monitor = desk, desk.monitor
+    block_editor.session.arming = block_editor.session.work.arming = fakes.StillArming(
+        block_editor.session.line, armed
+    )
+    console = DriveConsole(block_editor.session, block_editor.journal)
+    console.blocks, console.monitor = block_editor, block_editor.monitor
     fakes.choose(app, console)
 
     async def show(pilot: Pilot[None]) -> None:

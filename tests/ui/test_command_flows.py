@@ -93,7 +93,7 @@ class Bench(NamedTuple):
     async def commanded(self) -> None:
         """Wait until it is known that the motor runs by an order from here."""
         app = self.app
-        await until(self.pilot, lambda: bool(app.fleet and app.fleet.keeper.under_command()))
+        await until(self.pilot, lambda: bool(app.fleet and app.fleet.line_watch.under_command()))
 
     async def stopped(self, device: int = 1) -> None:
         await until(self.pilot, lambda: self.speed(device) == 0)
@@ -300,16 +300,18 @@ async def test_space_stops_where_a_number_is_typed(way: str, typed: str) -> None
 def test_numbers_references_and_addresses_take_no_space() -> None:
     """Each field says whether a space is a text there; a new one has to be thought of."""
     fields = {
-        path.stem: {name for name in ("Field", "NumberInput") if f"{name}(" in text}
+        path.relative_to(SOURCES).as_posix(): {
+            name for name in ("Field", "NumberInput") if f"{name}(" in text
+        }
         for path in SOURCES.rglob("*.py")
         if (text := path.read_text("utf-8"))
     }
     assert {name: kinds for name, kinds in fields.items() if kinds} == {
-        "edit_value": {"NumberInput"},
-        "line_form": {"NumberInput"},
-        "palette": {"Field"},
-        "screen": {"Field"},
-        "pick_parameter": {"Field"},
+        "parameters/edit_value.py": {"NumberInput"},
+        "connection/line_form.py": {"NumberInput"},
+        "dialogs/palette.py": {"Field"},
+        "parameters/screen.py": {"Field"},
+        "blocks/pick_parameter.py": {"Field"},
     }
     asked = {
         ast.unparse(call.args[0]): any(keyword.arg == "number" for keyword in call.keywords)

@@ -14,7 +14,7 @@ from tui.session.command.stop import Phase, Stopper, StopReport, StopSummary
 from tui.session.fleet import FoundDrive
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment, Recorder
-from tui.session.work import Kind, Outcome
+from tui.session.work import Outcome, OutcomeKind
 
 from . import fakes
 from .test_pictures import SIZES, WATCH, Compare
@@ -48,7 +48,7 @@ def stop(phase: Phase, text: str) -> StopReport:
     return StopReport(2, phase, text, fakes.NOW - 1, fakes.NOW - 1)
 
 
-def outcome(kind: Kind, text: str) -> Outcome:
+def outcome(kind: OutcomeKind, text: str) -> Outcome:
     return Outcome(kind, text, fakes.NOW - 0.5)
 
 
@@ -59,13 +59,15 @@ STATES: dict[str, tuple[dict[str, Any], Given, StopReport | None, bool]] = {
     "armed": ({"raws": fakes.READY}, Given(57), None, False),
     "done": (
         RUNNING,
-        Given(59, outcome(Kind.DONE, "Run forward: Operation enabled")),
+        Given(59, outcome(OutcomeKind.DONE, "Run forward: Operation enabled")),
         None,
         False,
     ),
     "refused": (
         {"raws": fakes.READY},
-        Given(41, outcome(Kind.REFUSED, "LFR: 80.0 Hz is above the high speed HSP, 60.0 Hz.")),
+        Given(
+            41, outcome(OutcomeKind.REFUSED, "LFR: 80.0 Hz is above the high speed HSP, 60.0 Hz.")
+        ),
         None,
         False,
     ),
@@ -120,7 +122,7 @@ def panel(name: str) -> tuple[Any, MonitorScreen]:
     app = fakes.app_of()
     app.opened = fakes.opened()
     found = FoundDrive(fakes.ATV71, console)
-    app.fleet = fakes.StillFleet(found, keeper=fakes.FakeKeeper(WATCH))
+    app.fleet = fakes.StillFleet(found, line_watch=fakes.FakeLineWatch(WATCH))
     fakes.choose(app, console)
     app.fleet.stopper = cast("Stopper", FakeStopper({2: report} if report else {}))
     return app, MonitorScreen(console)
@@ -178,7 +180,7 @@ def test_screens_of_commanding(
 
     monkeypatch.setattr(monitor.console, "read", read)
     if screen == "leave-running":
-        app.fleet.keeper.commanded = [monitor.session]
+        app.fleet.line_watch.commanded = [monitor.session]
     monkeypatch.setattr("tui.screens.faults.screen.state_folder", lambda: fakes.FOLDER)
 
     async def show(pilot: Pilot[None]) -> None:

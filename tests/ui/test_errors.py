@@ -183,7 +183,9 @@ async def test_no_size_of_the_terminal_is_too_much_for_a_screen(size: tuple[int,
 async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:
     app = DrivePanelApp(open_line=lambda *_, **__: demo_line({"atv21": 35.0}), start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
-        await until(pilot, lambda: app.fleet is not None and alone(app.fleet.keeper) == {1: 3.0})
+        await until(
+            pilot, lambda: app.fleet is not None and alone(app.fleet.line_watch) == {1: 3.0}
+        )
         for answer in ("escape", "y"):
             assert app.opened is not None
             await fakes.press(pilot, "(disconnect)")

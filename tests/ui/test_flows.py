@@ -25,7 +25,7 @@ from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
 from tui.session.connect.open_line import OpenLine, demo_line
-from tui.session.monitor.line_watch import Keeper
+from tui.session.monitor.line_watch import LineWatch
 from tui.widgets.lines import Lines
 
 from .fakes import press
@@ -167,9 +167,9 @@ async def test_percent_becomes_amperes_once_the_rating_is_told() -> None:
         await until(pilot, in_amperes)
 
 
-def alone(keeper: Keeper) -> dict[int, float]:
+def alone(line_watch: LineWatch) -> dict[int, float]:
     """Seconds after which drives act once they are left alone, by device."""
-    return {device: watch.timeout for device, watch in keeper.left_alone().items()}
+    return {device: watch.timeout for device, watch in line_watch.left_alone().items()}
 
 
 async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
@@ -177,8 +177,8 @@ async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)
         assert app.fleet is not None
-        keeper = app.fleet.keeper
-        await until(pilot, lambda: alone(keeper) == {1: 3.0})
+        line_watch = app.fleet.line_watch
+        await until(pilot, lambda: alone(line_watch) == {1: 3.0})
         await pilot.press("q")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
         await pilot.press("escape")

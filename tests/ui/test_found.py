@@ -62,13 +62,13 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.pause()
         screen, drives = app.connection, app.connection.query_one(DriveList)
-        keeper, overheated = fakes.FakeKeeper(), fakes.look_of({**fakes.FAULT, "LFT": 16})
+        line_watch, overheated = fakes.FakeLineWatch(), fakes.look_of({**fakes.FAULT, "LFT": 16})
         app.opened = fakes.opened()
-        app.fleet = fakes.StillFleet(keeper=keeper)
+        app.fleet = fakes.StillFleet(line_watch=line_watch)
         for device in range(1, 33):
             identity = replace(fakes.ATV71, device=device)
             app.fleet.hold(FoundDrive(identity, fakes.console_of(None, device=device)))
-            keeper.looks[device] = fakes.look_of(fakes.READY)
+            line_watch.looks[device] = fakes.look_of(fakes.READY)
         screen.show_drives()
         drives.focus()
         drives.highlighted = 31
@@ -78,7 +78,7 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives() -> None:
         screen.say("What was said last.", "")
         before = drives.scroll_offset
         assert before.y > 0
-        keeper.looks[5] = keeper.looks[26] = overheated
+        line_watch.looks[5] = line_watch.looks[26] = overheated
         screen.show_drives()
         await pilot.pause()
         assert (drives.scroll_offset, drives.highlighted) == (before, 25)

@@ -14,7 +14,7 @@ from textual.widgets import Input
 from tui.drive.profile import library
 from tui.screens.command.control import Control
 from tui.screens.keys.action import Action
-from tui.screens.keys.table import ACTIONS, CONNECTION, EVERYWHERE, PLACES, elsewhere, line_of
+from tui.screens.keys.table import ACTIONS, CONNECTION, EVERYWHERE, PLACES, elsewhere, keys_line
 from tui.screens.monitor.commands import order_keys
 from tui.widgets.palette import ATTENTION
 
@@ -228,7 +228,7 @@ async def back_to(made: Bench, screen: str) -> None:
 def test_a_key_that_cannot_work_now_is_dim(raws: dict[str, int], armed: float | None) -> None:
     faulty = raws is fakes.FAULT
     view = replace(view_of(library.load("atv71"), raws), control=Control(armed_for=armed))
-    line = order_keys(view, line_of("monitor", 80))
+    line = order_keys(view, keys_line("monitor", 80))
     bright = {line.plain[span.start : span.end] for span in line.spans if span.style == ATTENTION}
     assert ("x" in bright) is (faulty and armed is not None)
     assert ("r" in bright) is (armed is not None)

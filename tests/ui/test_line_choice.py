@@ -15,7 +15,7 @@ from textual.widgets import Input
 from tui.app import DrivePanelApp
 from tui.screens.connection.choices import same_line
 from tui.screens.connection.drive_list import DriveList
-from tui.screens.connection.found import State
+from tui.screens.connection.found import FoundState
 from tui.screens.connection.state import QUIET
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.monitor.screen import MonitorScreen
@@ -180,7 +180,7 @@ def drives(*devices: int) -> dict[int, FoundDrive]:
     return {d: FoundDrive(replace(fakes.ATV71, device=d)) for d in sorted(devices)}
 
 
-def states(*devices: int) -> dict[int, State]:
+def states(*devices: int) -> dict[int, FoundState]:
     return dict.fromkeys(devices, ("ready", "ready"))
 
 

@@ -16,11 +16,11 @@ from tui.screens.parameters.screen import ParametersScreen
 from tui.screens.parameters.view import news_lines
 from tui.session.console import DriveConsole
 from tui.session.image import Raw
-from tui.session.settings.apply import Outcome, Result
+from tui.session.settings.apply import EditOutcome, Result
 from tui.session.settings.editor import Editor
 from tui.session.settings.favourites import Marks
-from tui.session.work import Kind
 from tui.session.work import Outcome as WorkOutcome
+from tui.session.work import OutcomeKind
 
 from . import fakes
 from .test_pictures import SIZES, Compare
@@ -61,7 +61,7 @@ def editor_of(
     return console
 
 
-def say(editor: Editor, kind: Kind, text: str) -> None:
+def say(editor: Editor, kind: OutcomeKind, text: str) -> None:
     """Said at the moment of every fake."""
     editor.session.work.outcome = WorkOutcome(kind, text, fakes.NOW)
 
@@ -84,8 +84,8 @@ def refused(editor: Editor) -> None:
         "HSP: the drive refused with exception 4, not written. The drive is running forward."
         " Stop the motor and write again."
     )
-    editor.results = {"HSP": Result(edit, Outcome.DRIVE_REFUSED, text, 500)}
-    say(editor, Kind.REFUSED, "2 written and read back; 1 still staged: HSP")
+    editor.results = {"HSP": Result(edit, EditOutcome.DRIVE_REFUSED, text, 500)}
+    say(editor, OutcomeKind.REFUSED, "2 written and read back; 1 still staged: HSP")
 
 
 def elsewhere(editor: Editor) -> None:
@@ -96,7 +96,7 @@ def elsewhere(editor: Editor) -> None:
 def done(editor: Editor) -> None:
     editor.unsaved = {"ACC", "DEC"}
     editor.waits_for_reset = {"ADD"}
-    say(editor, Kind.DONE, "3 written and read back")
+    say(editor, OutcomeKind.DONE, "3 written and read back")
 
 
 def compared(editor: Editor) -> None:

@@ -19,7 +19,7 @@ from tui.session.connect.identify import DriveIdentity
 from tui.session.console import DriveConsole
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
-from tui.session.monitor.line_watch import Watch
+from tui.session.monitor.line_watch import TimeoutWatch
 
 from . import fakes
 
@@ -68,7 +68,7 @@ def test_monitor(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
     assert snap_compare(app, terminal_size=size, run_before=show)
 
 
-WATCH = Watch(10.0, library.load("atv71").data.communication_fault.reactions[6], active=True)  # type: ignore[union-attr]
+WATCH = TimeoutWatch(10.0, library.load("atv71").data.communication_fault.reactions[6], active=True)  # type: ignore[union-attr]
 LOST_WATCHED = {"raws": fakes.RUNNING, "age": 12.0, "error": "The line is lost."}
 SPECIAL: dict[str, tuple[dict[str, Any], LineState, float, bool]] = {
     "watched": ({"raws": fakes.RUNNING}, fakes.CONNECTED, 0.2, False),
@@ -93,7 +93,7 @@ def test_watched(snap_compare: Compare, state: str, size: tuple[int, int]) -> No
     console = fakes.console_of(snapshot, line)
     console.session.line.heard = fakes.NOW - age  # type: ignore[attr-defined]
     found = FoundDrive(fakes.ATV71, console)
-    app.fleet = fakes.StillFleet(found, keeper=fakes.FakeKeeper(WATCH), line=line)
+    app.fleet = fakes.StillFleet(found, line_watch=fakes.FakeLineWatch(WATCH), line=line)
     fakes.choose(app, console)
 
     async def show(pilot: Pilot[None]) -> None:
@@ -114,7 +114,7 @@ def found_drives(line: LineState = fakes.CONNECTED) -> fakes.StillFleet:
         FoundDrive(fakes.ATV71, fakes.console_of(None)),
         FoundDrive(unknown),
         FoundDrive(faulty, fakes.console_of(None)),
-        keeper=fakes.FakeKeeper(looks=looks),
+        line_watch=fakes.FakeLineWatch(looks=looks),
         line=line,
     )
 
@@ -205,9 +205,9 @@ def that_trip(shown: DriveConsole) -> fakes.StillFleet:
         console = fakes.console_of(None, device=device, family=family)
         rules = console.session.profile.data.communication_fault
         assert rules is not None
-        alone[device] = Watch(seconds, rules.reactions[chosen])
+        alone[device] = TimeoutWatch(seconds, rules.reactions[chosen])
         drives.append(FoundDrive(replace(fakes.ATV71, device=device), console))
-    return fakes.StillFleet(*drives, keeper=fakes.FakeKeeper(alone=alone))
+    return fakes.StillFleet(*drives, line_watch=fakes.FakeLineWatch(alone=alone))
 
 
 PALETTE = {"all": "", "elsewhere": "eeprom", "stop": "stop", "nothing": "xyz"}

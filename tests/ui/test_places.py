@@ -12,7 +12,7 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.frames.screen import frame_line
-from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, line_of, of_screen
+from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, of_screen
 from tui.screens.monitor.commands import order_keys
 from tui.screens.monitor.motor import motor_lines
 from tui.screens.monitor.state import (
@@ -20,12 +20,12 @@ from tui.screens.monitor.state import (
     history_lines,
     line_lines,
     message_lines,
+    panel_lines,
     state_lines,
-    status_lines,
 )
 from tui.screens.monitor.trends import stacked_trends, trend_lines
 from tui.screens.monitor.view import View
-from tui.screens.monitor.words import word_lines, word_pages
+from tui.screens.monitor.words import bit_lines, word_pages
 from tui.session.monitor.monitor import TrendPoint
 from tui.session.reading import Quality
 from tui.widgets.drawing import aligned, bar, key_line, trend
@@ -80,12 +80,12 @@ def all_lines(view: View, width: int) -> dict[str, list[Text]]:
         "state": state_lines(view, width),
         "motor": motor_lines(view, width, 30),
         "messages": message_lines(view, width),
-        "status": status_lines(view, width),
+        "status": panel_lines(view, width),
         "history": history_lines(view, width, 10),
         "line": line_lines(view, width, 10),
         "trend": trend_lines(view, width, 6),
         "stacked": stacked_trends(view, width, 12),
-        "words": [line for page in pages for line in word_lines(view, page, width)],
+        "words": [line for page in pages for line in bit_lines(view, page, width)],
     }
 
 
@@ -158,7 +158,7 @@ def test_a_trend_has_its_size_whatever_its_values(
 
 def keys_shown(screen: str, width: int, stops: str = "STOP") -> Text:
     """The line of keys of a screen, as it draws it; `stops` says whom the stop key stops."""
-    keys = line_of(screen, width, stops)
+    keys = keys_line(screen, width, stops)
     profile = library.load("atv71")
     return (
         order_keys(view_of(profile, fakes.RUNNING), keys) if screen == MONITOR else key_line(keys)

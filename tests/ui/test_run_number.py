@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.drive.profile import library
-from tui.screens.monitor.run_line import LONGEST, STEPS, RunLine, proposed, run_lines
+from tui.screens.monitor.run_line import DIGITS_MOST, STEPS, RunLine, proposed, run_lines
 
 from . import fakes
 
@@ -63,7 +63,7 @@ def test_arrows_step_within_the_limits(key: str, ends: str) -> None:
 def test_whatever_is_typed_is_short_and_has_one_point(text: str) -> None:
     found = typed(LINE, text)
     assert found is not None
-    assert len(found.text) <= LONGEST
+    assert len(found.text) <= DIGITS_MOST
     assert found.text.count(".") <= 1
 
 

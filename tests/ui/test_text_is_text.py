@@ -17,7 +17,7 @@ from rich.text import Text
 from textual.widgets import Input
 
 from tui.app import DrivePanelApp
-from tui.drive.settings.restore_plan import Item
+from tui.drive.settings.restore_plan import RestoreItem
 from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.dialogs.ask import Ask
@@ -208,7 +208,7 @@ async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written(
                 assert str(app.screen.query_one(place).render()) == as_shown
             app.screen.dismiss()
             await pilot.pause()
-            await app.push_screen(Skipped(1, text, [Item(text, "skip", text=text)]))
+            await app.push_screen(Skipped(1, text, [RestoreItem(text, "skip", text=text)]))
             await pilot.pause()
             assert as_shown in picture(app)
             app.screen.dismiss()

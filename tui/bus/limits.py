@@ -78,7 +78,7 @@ MAX_READ, MAX_WRITE, MAX_READ_23, MAX_WRITE_23 = 125, 123, 125, 121
 """The longest that Modbus itself allows, in words."""
 
 
-def refusal(request: Request, limits: Limits, *, read_only: bool = False) -> str:
+def send_refusal(request: Request, limits: Limits, *, read_only: bool = False) -> str:
     """Why a request must not be sent, as a sentence; empty when it may."""
     if not 0 <= request.device <= 255:
         return f"Device {request.device} does not exist; devices are 1 to 255."

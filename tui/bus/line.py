@@ -9,12 +9,12 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 from .errors import RequestRefused, WrongReply
-from .limits import Limits, refusal
+from .limits import Limits, send_refusal
 from .link import Link
 from .model import (
-    Counters,
     DeviceState,
-    Identification,
+    IdentificationObjects,
+    LineCounters,
     LineState,
     LineStatus,
     Priority,
@@ -38,15 +38,15 @@ from .schedule.engine import Engine
 from .schedule.pace import Pace
 from .schedule.patience import Devices
 from .schedule.queue import Answer, Job
-from .schedule.worker import Work, Worker
+from .schedule.worker import ThreadWork, Worker
 from .trace import Frame
 
 __all__ = [
-    "Counters",
     "DeviceState",
     "Frame",
-    "Identification",
+    "IdentificationObjects",
     "Line",
+    "LineCounters",
     "LineState",
     "LineStatus",
     "Priority",
@@ -106,7 +106,7 @@ class Line:
         return self._engine.state
 
     @property
-    def counters(self) -> Counters:
+    def counters(self) -> LineCounters:
         """What has happened on the line so far."""
         return self._engine.tally.frozen()
 
@@ -189,7 +189,7 @@ class Line:
 
     async def identify(
         self, device: int, *, priority: Priority = Priority.OPERATOR_READ
-    ) -> Identification:
+    ) -> IdentificationObjects:
         """Ask a device who it is by function 43/14, until nothing more follows."""
         found: dict[int, bytes] = {}
         first = 0
@@ -198,7 +198,7 @@ class Line:
             part = objects_of((await self._ask(request, priority)).pdu)
             found.update(part.objects)
             if part.next_object is None:
-                return Identification(part.conformity, found)
+                return IdentificationObjects(part.conformity, found)
             if part.next_object <= first:
                 raise WrongReply(device, request.function, 0, "its identification does not end")
             first = part.next_object
@@ -218,7 +218,7 @@ class Line:
         request = _write(BROADCAST, address, values, None, limits.broadcast_functions)
         return (await self._ask(request, priority, limits)).time
 
-    def spawn(self, work: Work, name: str) -> Worker:
+    def spawn(self, work: ThreadWork, name: str) -> Worker:
         """Run a coroutine in the line's own loop, where no screen can hold it up.
 
         The line must be open. It is cancelled when the line is closed. Raises LineClosed.
@@ -240,7 +240,7 @@ class Line:
     ) -> Answer:
         """Check a request, queue it, await its answer."""
         limits = limits or self._devices[request.device].limits
-        reason = refusal(request, limits, read_only=self.read_only)
+        reason = send_refusal(request, limits, read_only=self.read_only)
         if reason:
             raise RequestRefused(reason)
         job = Job(request, priority, limits, replaceable=replaceable, forbidden=forbidden)

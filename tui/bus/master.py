@@ -10,11 +10,11 @@ from typing import Protocol
 from .errors import LineLost
 from .expectation import Expectation
 from .model import Timing
-from .result import Piece, Verdict
+from .result import ExchangeResult, Piece
 from .tally import Tally
 from .trace import Trace
 
-Clock = Callable[[], float]
+MonotonicClock = Callable[[], float]
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,23 +33,23 @@ class Sending:
 
 
 @dataclass(frozen=True, slots=True)
-class Outcome:
+class Exchange:
     """How a request ended; `sent` when its last byte left, `end` when the last byte came."""
 
-    verdict: Verdict
+    verdict: ExchangeResult
     sent: float
     end: float
     turnaround: float = 0.0
 
 
 @dataclass(slots=True)
-class Surroundings:
+class LineContext:
     """What a master notes its doings in."""
 
     timing: Timing
     trace: Trace
     tally: Tally
-    clock: Clock
+    clock: MonotonicClock
     stray: Callable[[Piece, float], None]
     """Told of every whole frame that came when none was due."""
 
@@ -65,14 +65,14 @@ class Master(Protocol):
     async def quiet(self) -> None:
         """Wait until the next request may be sent. Raises LineLost."""
 
-    async def exchange(self, sending: Sending) -> Outcome:
+    async def exchange(self, sending: Sending) -> Exchange:
         """Send a request and await its end. Raises LineLost."""
 
     def close(self) -> None:
         """Give the line back."""
 
 
-def settle(future: asyncio.Future[Verdict] | None, verdict: Verdict) -> None:
+def settle(future: asyncio.Future[ExchangeResult] | None, verdict: ExchangeResult) -> None:
     """Give a verdict to whoever waits for it."""
     if future is not None and not future.done():
         future.set_result(verdict)

@@ -68,7 +68,7 @@ class Reply:
 
 
 @dataclass(frozen=True, slots=True)
-class Identification:
+class IdentificationObjects:
     """Objects of function 43/14; `conformity` as the device gives it."""
 
     conformity: int
@@ -76,7 +76,7 @@ class Identification:
 
 
 @dataclass(frozen=True, slots=True)
-class Counters:
+class LineCounters:
     """What happened on a line since it was opened."""
 
     requests: int = 0

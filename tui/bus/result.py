@@ -24,7 +24,7 @@ class Piece:
         return self.data[1:-2]
 
 
-class Kind(Enum):
+class ResultKind(Enum):
     """How an exchange ended."""
 
     REPLY = "reply"
@@ -37,10 +37,10 @@ class Kind(Enum):
 
 
 @dataclass(slots=True)
-class Verdict:
+class ExchangeResult:
     """The end of an exchange, with everything that was received."""
 
-    kind: Kind
+    kind: ResultKind
     pdu: bytes = b""
     exception: int = 0
     detail: str = ""

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .model import Counters
+from .model import LineCounters
 
 
 @dataclass(slots=True)
@@ -23,6 +23,6 @@ class Tally:
     bytes_in: int = 0
     busy_seconds: float = 0.0
 
-    def frozen(self) -> Counters:
+    def frozen(self) -> LineCounters:
         """The counts of this moment."""
-        return Counters(**{name: getattr(self, name) for name in Counters.__slots__})
+        return LineCounters(**{name: getattr(self, name) for name in LineCounters.__slots__})

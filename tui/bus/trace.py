@@ -6,7 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Literal
 
-Direction = Literal["out", "in"]
+FrameDirection = Literal["out", "in"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +14,7 @@ class Frame:
     """One frame, or bytes that form none; `time` is that of the line's clock."""
 
     time: float
-    direction: Direction
+    direction: FrameDirection
     data: bytes
     note: str = ""
     """What the frame is: empty for a request or its reply, else why it is out of the ordinary."""
@@ -26,7 +26,7 @@ class Trace:
     def __init__(self, length: int) -> None:
         self._frames: deque[Frame] = deque(maxlen=length)
 
-    def add(self, time: float, direction: Direction, data: bytes, note: str = "") -> None:
+    def add(self, time: float, direction: FrameDirection, data: bytes, note: str = "") -> None:
         """Keep a frame; the oldest gives way."""
         self._frames.append(Frame(time, direction, bytes(data), note))
 

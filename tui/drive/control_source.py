@@ -10,7 +10,7 @@ from .profile.schema import ControlSource, Parameter
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class SourceChange:
     """A word that a configuration needs, with what the drive holds in its place."""
 
     parameter: Parameter
@@ -39,10 +39,12 @@ def source_in_force(profile: Profile, raws: Mapping[str, int]) -> ControlSource 
     return max(fitting, key=lambda source: len(source.settings), default=None)
 
 
-def changes(profile: Profile, source: ControlSource, raws: Mapping[str, int]) -> list[Change]:
+def source_changes(
+    profile: Profile, source: ControlSource, raws: Mapping[str, int]
+) -> list[SourceChange]:
     """The words that differ from what a configuration needs, in the order of writing."""
     return [
-        Change(profile[setting.parameter], raws.get(setting.parameter), setting.value)
+        SourceChange(profile[setting.parameter], raws.get(setting.parameter), setting.value)
         for setting in source.settings
         if raws.get(setting.parameter) != setting.value
     ]

@@ -89,7 +89,7 @@ def stop_in_any(profile: Profile, raws: Mapping[str, int]) -> tuple[Chart, Order
                 if order.id != id or order.states or order.when:
                     continue
                 if all(
-                    _stops(profile, other, target(profile, chart, order), order.words)
+                    _stops(profile, other, order_target(profile, chart, order), order.words)
                     for other in charts
                 ):
                     return chart, order
@@ -111,7 +111,7 @@ def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int
         and not order.when
         and not order.states
         and list(order.words) == list(words)
-        and target(profile, chart, order) is where
+        and order_target(profile, chart, order) is where
         for order in chart.orders
     )
 
@@ -152,17 +152,17 @@ def _conditions(order: Order) -> str:
     )
 
 
-STOPS: frozenset[OrderId] = frozenset({"stop", "quick-stop", "freewheel", "emergency-stop"})
+STOP_ORDERS: frozenset[OrderId] = frozenset({"stop", "quick-stop", "freewheel", "emergency-stop"})
 """Orders that no interlock and no missing arming ever holds back."""
-MOVES: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking"})
+MOVING_ORDERS: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking"})
 
 
 def interlock(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
     """Why an order must not be sent now, with what to do; empty when it may."""
-    if id in STOPS:
+    if id in STOP_ORDERS:
         return ""
     for lock in chart.interlocks:
-        if id not in (lock.orders or MOVES):
+        if id not in (lock.orders or MOVING_ORDERS):
             continue
         if not all(raws.get(when.parameter) in when.values for when in lock.when):
             continue
@@ -195,7 +195,7 @@ def with_options(chart: Chart, order: Order, raws: Mapping[str, int]) -> list[in
     return [word & 0xFFFF | kept if word else 0 for word in order.words]
 
 
-def target(profile: Profile, chart: Chart, order: Order) -> Parameter:
+def order_target(profile: Profile, chart: Chart, order: Order) -> Parameter:
     """Where the words of an order go."""
     return profile[order.parameter or chart.command]
 

@@ -77,7 +77,7 @@ class ReadRequest:
 
 
 @dataclass(frozen=True, slots=True)
-class Check:
+class SlotCheck:
     """A read of slots after the block they govern, and what they must hold for it to count."""
 
     request: ReadRequest
@@ -92,7 +92,7 @@ class ReadPlan:
 
     requests: tuple[ReadRequest, ...]
     seconds: float
-    checks: tuple[Check, ...] = ()
+    checks: tuple[SlotCheck, ...] = ()
     """Sent after the requests; their time is in `seconds`."""
 
     @property
@@ -188,14 +188,14 @@ def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iter
 
 def _checks(
     profile: Profile, stretch: _Stretch, timing: WireTiming, unreadable: Collection[str]
-) -> list[Check]:
+) -> list[SlotCheck]:
     """The reads that prove after a stretch was used that its slots have not changed."""
     if not stretch.checked:
         return []
     slots = [profile[code] for code in stretch.slots]
     governs = tuple(place.code for place in stretch.request.places)
     return [
-        Check(request, {p.code: stretch.slots[p.code] for p in request.places}, governs)
+        SlotCheck(request, {p.code: stretch.slots[p.code] for p in request.places}, governs)
         for request in _runs(profile, slots, timing, unreadable)
     ]
 

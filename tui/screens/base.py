@@ -15,7 +15,7 @@ from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
 from .app_port import Panel
-from .keys.table import elsewhere, line_of
+from .keys.table import elsewhere, keys_line
 
 
 class PanelScreen(Screen[None]):
@@ -50,7 +50,7 @@ class PanelScreen(Screen[None]):
     def draw(self, width: int) -> None:
         """Put every line, here that of the keys; the screen is on top and has a size."""
         whom, typing = self.app.stops_whom, takes_space(self.focused)
-        self.put("keys", [key_line(line_of(self.name_of_screen, width, whom, typing=typing))])
+        self.put("keys", [key_line(keys_line(self.name_of_screen, width, whom, typing=typing))])
 
     @property
     def name_of_screen(self) -> str:

@@ -9,7 +9,7 @@ from .dialogs.palette import Palette
 
 if TYPE_CHECKING:
     from .app_port import Panel
-    from .keys.finding import Found
+    from .keys.finding import FoundAction
 
 
 def open_palette(app: Panel) -> None:
@@ -18,7 +18,7 @@ def open_palette(app: Panel) -> None:
     if not isinstance(below, PanelScreen):
         return  # a question, or the help: it ends by its own keys
 
-    def chosen(found: Found | None) -> None:
+    def chosen(found: FoundAction | None) -> None:
         if found is None or app.screen is not below:
             return
         if found.here:

@@ -14,7 +14,7 @@ from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.monitor.line_watch import Watch
+    from tui.session.monitor.line_watch import TimeoutWatch
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
@@ -47,15 +47,17 @@ class Leaving(Panel):
 
     def _motors(self) -> list[DriveSession]:
         """Drives commanded from here whose motors do not surely stand."""
-        return self.fleet.keeper.under_command() if self.fleet else []
+        return self.fleet.line_watch.under_command() if self.fleet else []
 
     def _left_running(self, sessions: list[DriveSession]) -> str:
         """Which motors run, and what each drive does when nobody asks it any more."""
         from tui.session.monitor.line_watch import left_alone_text
 
         assert self.fleet is not None
-        keeper = self.fleet.keeper
-        return "\n".join(left_alone_text(one, watch=keeper.watch(one.device)) for one in sessions)
+        line_watch = self.fleet.line_watch
+        return "\n".join(
+            left_alone_text(one, watch=line_watch.watch(one.device)) for one in sessions
+        )
 
     def _tripping(self, but: Sequence[DriveSession] = ()) -> list[str]:
         """Which drives act on their communication time-out once they are left, and when."""
@@ -64,16 +66,16 @@ class Leaving(Panel):
         from tui.session.monitor.line_watch import left_alone_text, names_of
 
         told = {session.device for session in but}
-        keeper = self.fleet.keeper
-        alike: dict[tuple[str, Watch], list[DriveSession]] = {}
+        line_watch = self.fleet.line_watch
+        alike: dict[tuple[str, TimeoutWatch], list[DriveSession]] = {}
         for console in self.fleet.consoles:
-            watch = keeper.left_alone().get(console.device)
+            watch = line_watch.left_alone().get(console.device)
             if watch is not None and console.device not in told:
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
         found = [left_alone_text(*same, watch=watch) for (_, watch), same in alike.items()]
         found += [
             f"{names_of([one])}: what it does left alone was not read yet."
-            for one in keeper.unread()
+            for one in line_watch.unread()
             if one.device not in told
         ]
         head = "Once nobody asks them any more, drives act on their time-out, at rest too:"
@@ -157,7 +159,7 @@ class Leaving(Panel):
             told.insert(0, always)
         if not told:
             return None
-        alone = self.fleet.keeper.left_alone() if self.fleet else {}
+        alone = self.fleet.line_watch.left_alone() if self.fleet else {}
         turning = {session.device for session in running} | alone.keys()
         sessions = self.fleet.sessions if self.fleet else []
         drives = [session for session in sessions if session.device in turning]

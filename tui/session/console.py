@@ -19,13 +19,13 @@ from .read.reader import Reader
 from .reading import Reading
 
 if TYPE_CHECKING:
-    from .blocks.editor import MappingDesk
+    from .blocks.editor import BlockEditor
     from .settings.editor import Editor
 
 
 @dataclass(eq=False)
 class DriveConsole:
-    """The one monitor, commander, editor, block desk and recorder of a drive."""
+    """The one monitor, commander, settings, blocks and recorder of a drive."""
 
     session: DriveSession
     journal: Journal
@@ -58,11 +58,11 @@ class DriveConsole:
         return Editor(self.session, self.journal, self._state)
 
     @cached_property
-    def blocks(self) -> MappingDesk:
+    def blocks(self) -> BlockEditor:
         """What is proposed and written of its blocks."""
-        from .blocks.editor import MappingDesk
+        from .blocks.editor import BlockEditor
 
-        return MappingDesk(self.session, self.monitor, self.journal)
+        return BlockEditor(self.session, self.monitor, self.journal)
 
     @property
     def begun_editor(self) -> Editor | None:

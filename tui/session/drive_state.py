@@ -12,6 +12,9 @@ from tui.drive.values import set_bits
 
 from .reading import Quality, Reading
 
+STATE_FRESH = 1.0
+"""Seconds for which a state counts as that of now; an older one is read anew."""
+
 
 @dataclass(frozen=True, slots=True)
 class DriveState:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from threading import Lock
 
-KEPT = 500
+EVENTS_KEPT = 500
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,7 +28,7 @@ class EventLog:
     def __init__(self, wall: Callable[[], float] = time.time) -> None:
         self._wall = wall
         self._lock = Lock()
-        self._events: deque[Event] = deque(maxlen=KEPT)
+        self._events: deque[Event] = deque(maxlen=EVENTS_KEPT)
 
     def add(self, kind: str, text: str, device: int | None = None) -> None:
         """Keep an event; the same again right behind itself is kept once."""

@@ -20,9 +20,9 @@ from .console import DriveConsole
 from .drive import DriveSession
 from .events import EventLog
 from .journal import Journal
-from .monitor.line_watch import Keeper
+from .monitor.line_watch import LineWatch
 from .starts.keeper import StartKeeper
-from .work import Kind, Outcome
+from .work import Outcome, OutcomeKind
 
 Stamp = Mapping[int, int]
 """The count of stops of each drive when something was typed."""
@@ -57,7 +57,7 @@ class Fleet:
         self.journal = journal
         self.starts = starts
         """Where starts of motors are put on record; None where none are."""
-        self.keeper = Keeper(line)
+        self.line_watch = LineWatch(line)
         self.events = events or EventLog()
         """What was said about the drives."""
         self.stopper = Stopper(line, journal, self.events)
@@ -106,7 +106,7 @@ class Fleet:
         self._put(FoundDrive(said, console, guessed))
         if before is not None:
             before.close()
-        self.keeper.keep(session, console.monitor)
+        self.line_watch.keep(session, console.monitor)
         if self.starts is not None:
             # reads files: in a thread that nobody waits for
             look = threading.Thread(target=self.starts.look, args=(session,), daemon=True)
@@ -114,7 +114,7 @@ class Fleet:
         return console
 
     def _note_outcome(self, device: int, outcome: Outcome) -> None:
-        if outcome.kind is not Kind.WORKING:
+        if outcome.kind is not OutcomeKind.WORKING:
             self.events.add(outcome.kind, outcome.text, device)
 
     def _put(self, drive: FoundDrive) -> None:
@@ -126,7 +126,7 @@ class Fleet:
         """Let every drive go; the line stays open."""
         with self._lock:
             before, self._found = self._found, MappingProxyType({})
-        self.keeper.stop()
+        self.line_watch.stop()
         for drive in before.values():
             if drive.console is not None:
                 drive.console.close()

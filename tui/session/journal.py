@@ -18,17 +18,17 @@ from pathlib import Path
 from .journal_file import JournalFile
 from .paths import state_folder
 
-SHOWN = 500
+ENTRIES_KEPT = 500
 """Entries kept at hand."""
-MOST = 10_000
+JOURNAL_BACKLOG = 10_000
 """Entries that wait for a disk which takes none; then the oldest of them is lost."""
-AGAIN = 1.0
+RETRY_DISK_AFTER = 1.0
 """Seconds after which a disk that took nothing is tried again."""
-IDLE = 10.0
+IDLE_ENDS_AFTER = 10.0
 """Seconds without an entry after which the thread ends; the next entry begins another."""
 SLOW = 5.0
 """Seconds in which a disk has to take an entry, else it counts as hanging."""
-PATIENCE = 3.0
+JOURNAL_PATIENCE = 3.0
 """Seconds that who reads or closes the journal waits for the disk."""
 
 log = logging.getLogger(__name__)
@@ -66,7 +66,7 @@ class Journal:
         self._file = JournalFile(folder or state_folder())
         self._changed = threading.Condition()
         """Guards all below; never held over disk work."""
-        self._recent: deque[Entry] = deque(maxlen=SHOWN)
+        self._recent: deque[Entry] = deque(maxlen=ENTRIES_KEPT)
         self._waiting: deque[Entry] = deque()
         self._begun: float | None = None
         """Since when an entry is being written, in monotonic time."""
@@ -119,7 +119,7 @@ class Journal:
             self._begin()
             self._changed.notify_all()
 
-    def flush(self, timeout: float = PATIENCE) -> bool:
+    def flush(self, timeout: float = JOURNAL_PATIENCE) -> bool:
         """Wait until all entries are on the disk, at most so many seconds; False if they are not.
 
         A disk that refuses is tried once more, and not waited for.
@@ -132,7 +132,7 @@ class Journal:
             self._changed.wait_for(lambda: self._is_done() or self._failures > failures, timeout)
             return self._is_done()
 
-    def close(self, timeout: float = PATIENCE) -> bool:
+    def close(self, timeout: float = JOURNAL_PATIENCE) -> bool:
         """Flush what is left, as flush() does; a disk that still refuses is tried no more."""
         with self._changed:
             self._closed = True
@@ -143,7 +143,7 @@ class Journal:
         return not self._waiting and self._begun is None
 
     def _drop(self) -> None:
-        while len(self._waiting) > MOST:
+        while len(self._waiting) > JOURNAL_BACKLOG:
             self._waiting.popleft()
             self._lost += 1
 
@@ -180,7 +180,7 @@ class Journal:
     def _next(self) -> Entry | None:
         """The entry to write; None where the thread is to end."""
         with self._changed:
-            self._changed.wait_for(lambda: self._waiting or self._closed, IDLE)
+            self._changed.wait_for(lambda: self._waiting or self._closed, IDLE_ENDS_AFTER)
             if not self._waiting:
                 self._thread = None
                 return None
@@ -193,7 +193,7 @@ class Journal:
             if self._closed:
                 self._thread = None
                 return False
-            self._changed.wait(AGAIN)
+            self._changed.wait(RETRY_DISK_AFTER)
             return True
 
     def _trouble_with(self, entry: Entry) -> str:

@@ -8,10 +8,10 @@ from pathlib import Path
 
 from .starts.files import sync_folder
 
-NAME = "journal.jsonl"
-LARGEST = 1_000_000
+JOURNAL_NAME = "journal.jsonl"
+LARGEST_FILE = 1_000_000
 """Bytes of one file; then the next one is begun."""
-KEPT = 9
+FILES_KEPT = 9
 """Older files beside the one that is written."""
 
 
@@ -19,14 +19,14 @@ class JournalFile:
     """Appends lines to the file of a folder; several programs may do so at a time."""
 
     def __init__(self, folder: Path) -> None:
-        self.path = folder / NAME
+        self.path = folder / JOURNAL_NAME
         self._tried = b""
         """The line that could not be written, or not flushed."""
 
     @property
     def all(self) -> list[Path]:
         """Every file that there may be, the oldest first."""
-        return [*(self._older(number) for number in range(KEPT, 0, -1)), self.path]
+        return [*(self._older(number) for number in range(FILES_KEPT, 0, -1)), self.path]
 
     def append(self, text: str) -> None:
         """Put a line down, flushed to the disk. Raises OSError; the line may stand there even so.
@@ -59,11 +59,11 @@ class JournalFile:
             os.fsync(file.fileno())
 
     def _older(self, number: int) -> Path:
-        return self.path.with_name(f"{NAME}.{number}")
+        return self.path.with_name(f"{JOURNAL_NAME}.{number}")
 
     def _rotate(self, length: int) -> None:
         size = self.path.stat().st_size if self.path.exists() else 0
-        if not size or size + length <= LARGEST:
+        if not size or size + length <= LARGEST_FILE:
             return
         for older, younger in pairwise(self.all):
             if younger.exists():

@@ -7,21 +7,21 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 
-from tui.drive.blocks.assignment import target
+from tui.drive.blocks.assignment import slot_target
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
-from tui.drive.settings.compare import compare, factory_side, side_of
+from tui.drive.settings.compare import compare_settings, factory_side, side_of
 from tui.drive.settings.parameter_set import ParameterSet, lacking
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, set_bits
 
 from .journal import Entry, Journal
 
-LONGEST = 200
+ENTRIES_SHOWN = 200
 """How many entries of the journal a report shows at most, the last ones."""
-CHANNELS: tuple[Quantity, ...] = ("command_channel", "reference_channel")
+CHANNEL_QUANTITIES: tuple[Quantity, ...] = ("command_channel", "reference_channel")
 
 
 def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
@@ -49,7 +49,7 @@ def _entries(file: Path) -> Iterator[Entry]:
             yield Entry(**told)
 
 
-def report(profile: Profile, values: ParameterSet, entries: Sequence[Entry]) -> str:
+def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]) -> str:
     """The whole report; `entries` are those of the journal about this drive, oldest first."""
     maker = _Report(profile, values, entries)
     parts = (
@@ -100,7 +100,7 @@ class _Report:
         sides = factory_side(self.profile), side_of("now", self.values)
         rows = [
             (row.code, row.name, row.a, row.b, before.get(row.code, ""))
-            for row in compare(self.profile, *sides)
+            for row in compare_settings(self.profile, *sides)
         ]
         known = len(sides[0].raws)
         return [
@@ -119,7 +119,7 @@ class _Report:
         lines = [f"- Configuration: {source.name if source else 'none of those in the manual'}"]
         if channel := read_chart(self.profile, raws).channel:
             lines.append(f"- Commanded by: {channel}")
-        for quantity in CHANNELS:
+        for quantity in CHANNEL_QUANTITIES:
             parameter = self.profile.quantity(quantity)
             if parameter is None or parameter.code not in raws:
                 continue
@@ -144,7 +144,7 @@ class _Report:
         raw = self.values.raws.get(slot)
         if raw is None:
             return NOT_AVAILABLE
-        if (parameter := target(self.profile, block, raw & 0xFFFF)) is not None:
+        if (parameter := slot_target(self.profile, block, raw & 0xFFFF)) is not None:
             return f"{parameter.code} {parameter.name}"
         return "nothing" if not raw else f"raw {raw}"
 
@@ -191,7 +191,7 @@ class _Report:
 
     def journal(self) -> list[str]:
         """What was written to this drive from this machine."""
-        last = self.entries[-LONGEST:]
+        last = self.entries[-ENTRIES_SHOWN:]
         left = len(self.entries) - len(last)
         rows = [
             (e.time[:19].replace("T", " "), e.code, e.old, e.new, e.answer, e.why) for e in last

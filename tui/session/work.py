@@ -36,7 +36,7 @@ class Stopped(OrderRefused):
         super().__init__(f"Not sent: a stop came after it{f' ({by})' if by else ''}.")
 
 
-class Kind(StrEnum):
+class OutcomeKind(StrEnum):
     """What an outcome is."""
 
     WORKING = "working"
@@ -48,7 +48,7 @@ class Kind(StrEnum):
 class Outcome:
     """What the last work on a drive has come to; `time` is time.monotonic()."""
 
-    kind: Kind
+    kind: OutcomeKind
     text: str
     time: float
     error: Exception | None = None
@@ -119,7 +119,7 @@ class WorkQueue:
 
     # Telling
 
-    def tell(self, kind: Kind, text: str, error: Exception | None = None) -> None:
+    def tell(self, kind: OutcomeKind, text: str, error: Exception | None = None) -> None:
         """Say what work on the drive has come to."""
         self.outcome = outcome = Outcome(kind, text, time.monotonic(), error)
         self.on_tell(outcome)
@@ -162,7 +162,7 @@ class WorkQueue:
             if len(self._waiting) >= MOST_WAITING:
                 raise OrderRefused("Earlier commands are still being carried out.")
             if task.working:
-                self.tell(Kind.WORKING, task.working)
+                self.tell(OutcomeKind.WORKING, task.working)
             self._waiting.append((task, permit))
             if not self.busy:
                 self._turn = turn = object()
@@ -181,7 +181,7 @@ class WorkQueue:
             worker.cancel()
         # a worker that had no time to begin would leave them to the next task
         if self.drop(BY_STOP):
-            self.tell(Kind.REFUSED, f"Not done: {BY_STOP}.", Stopped(by))
+            self.tell(OutcomeKind.REFUSED, f"Not done: {BY_STOP}.", Stopped(by))
 
     def drop(self, why: str) -> bool:
         """Forget the tasks that wait; True if there were any."""
@@ -190,7 +190,7 @@ class WorkQueue:
         for task, _ in waiting:
             _given_up(task)
         if waiting:
-            self.tell(Kind.REFUSED, f"Not done: {why}.")
+            self.tell(OutcomeKind.REFUSED, f"Not done: {why}.")
         return bool(waiting)
 
     async def _serve(self, turn: object) -> None:
@@ -216,7 +216,7 @@ class WorkQueue:
             if task.armed:
                 permit.check()
             if text := await task.carry_out(permit):
-                self.tell(Kind.DONE, text)
+                self.tell(OutcomeKind.DONE, text)
         except Superseded:
             return
         except (LineError, DriveError) as error:
@@ -226,7 +226,7 @@ class WorkQueue:
             self._fail(task, turn, error, f"It failed ({type(error).__name__}: {error}).")
         except asyncio.CancelledError:
             text = f"{BY_STOP[0].upper()}{BY_STOP[1:]}.{_given_up(task)}"
-            self.tell(Kind.REFUSED, text, Stopped(self.stopped_by))
+            self.tell(OutcomeKind.REFUSED, text, Stopped(self.stopped_by))
             raise
         finally:
             self.on_change()
@@ -235,7 +235,7 @@ class WorkQueue:
         # behind a stop wait tasks of another turn
         dropped = turn is self._turn and self.drop("a command before it was refused")
         rest = " The commands behind it were dropped." if dropped else ""
-        self.tell(Kind.REFUSED, f"{text}{rest}{_given_up(task)}", error)
+        self.tell(OutcomeKind.REFUSED, f"{text}{rest}{_given_up(task)}", error)
 
 
 def _given_up(task: Task) -> str:

@@ -8,7 +8,7 @@ from enum import Enum
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 
-from .plant.motor import MotorState, Rating, Stop
+from .plant.motor import MotorState, RatingPlate, Stop
 from .registers import Registers
 from .rules import Traits
 
@@ -37,7 +37,7 @@ class Body:
     profile: Profile
     traits: Traits
     registers: Registers
-    rating: Rating
+    rating: RatingPlate
     motor: MotorState = field(default_factory=MotorState)
     terminal_hz: float | None = None
     """Reference in Hz of a run order at the terminals; None: no order there."""

@@ -23,24 +23,24 @@ from .errors import SimulatorError
 from .plant.fault_history import FaultHistory, fault_raw
 from .plant.first_values import first_values
 from .plant.load import Load, Wanderer
-from .plant.memory import Memory
+from .plant.memory import SettingsMemory
 from .plant.models import model_words
 from .plant.monitoring import show_motor
-from .plant.motor import MotorState, Order, Stop, rating_of, step
-from .plant.watch import Consequence, Watch
+from .plant.motor import MotorDemand, MotorState, Stop, rating_of, step
+from .plant.watch import Consequence, SilenceWatch
 from .registers import Registers
-from .rules import Kind, traits_of
+from .rules import ChartKind, traits_of
 from .server.access import DriveWords
 from .server.cards import CardWords, card_word, card_words
 from .server.functions import Server, identity_of
 from .server.station import Station
 from .spec import DriveSpec, LineTiming
 
-REFERENCES = frozenset({"command_word", "command_frequency", "command_speed"})
+WATCH_STARTERS = frozenset({"command_word", "command_frequency", "command_speed"})
 """Orders that start the watch where it needs one."""
 
 
-class Chart(Protocol):
+class PlayedChart(Protocol):
     """What a family's state chart does for its drive."""
 
     def power_up(self) -> None: ...
@@ -48,13 +48,13 @@ class Chart(Protocol):
     def written(self, parameter: Parameter, /) -> None: ...
     def trip(self, stop: Stop, /) -> None: ...
     def reset_fault(self) -> None: ...
-    def order(self) -> Order: ...
+    def order(self) -> MotorDemand: ...
     def show(self) -> None: ...
     @property
     def running(self) -> bool: ...
 
 
-CHARTS: Mapping[Kind, Callable[[Body], Chart]] = {
+CHARTS: Mapping[ChartKind, Callable[[Body], PlayedChart]] = {
     "drivecom": DrivecomChart,
     "altivar21": Altivar21Chart,
     "leroy-somer": LeroySomerChart,
@@ -95,9 +95,9 @@ class SimulatedDrive:
             motor=MotorState(run_hours=hours, on_hours=1.6 * hours, energy=hours * rating.power),
         )
         self._chart = CHARTS[traits.kind](self._body)
-        self._watch = Watch(self._body)
+        self._watch = SilenceWatch(self._body)
         self._history = FaultHistory(self._body)
-        self._memory = Memory(self._body)
+        self._memory = SettingsMemory(self._body)
         self._load = Load(random)
         self._wanderer = Wanderer(random)
         functions = {f.code: f for f in profile.data.functions}
@@ -256,7 +256,7 @@ class SimulatedDrive:
         with self._lock:
             body = self._body
             if not self._powered:
-                body.motor = step(body.motor, body.rating, Order(), 0.0, 0.0, dt)
+                body.motor = step(body.motor, body.rating, MotorDemand(), 0.0, 0.0, dt)
                 return
             body.saving = max(0.0, body.saving - dt)
             if consequence := self._watch.step(dt):
@@ -368,7 +368,7 @@ class SimulatedDrive:
         return parameter.access == "rw-stopped" and self._chart.running
 
     def _written(self, parameter: Parameter) -> None:
-        if parameter.quantity in REFERENCES:
+        if parameter.quantity in WATCH_STARTERS:
             self._body.note_order(parameter)
         self._memory.written(parameter)
         self._chart.written(parameter)

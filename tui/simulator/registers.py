@@ -8,7 +8,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import from_words, to_words, type_range, word_count
 
-ORDERS = frozenset(
+UNKEPT_QUANTITIES = frozenset(
     {
         "command_word",
         "command_word_2",
@@ -143,7 +143,11 @@ class Registers:
 
 def is_volatile(parameter: Parameter) -> bool:
     """Whether a parameter lives in memory only: so declared, or an order of the line."""
-    return parameter.storage == "ram" or parameter.access == "w" or parameter.quantity in ORDERS
+    return (
+        parameter.storage == "ram"
+        or parameter.access == "w"
+        or parameter.quantity in UNKEPT_QUANTITIES
+    )
 
 
 def _addresses(parameter: Parameter) -> range:

@@ -12,7 +12,7 @@ from typing import Literal
 
 from tui.drive.profile.profile import Profile
 
-Kind = Literal["drivecom", "altivar21", "leroy-somer"]
+ChartKind = Literal["drivecom", "altivar21", "leroy-somer"]
 
 MODBUS_REFERENCE = 164
 MODBUS_COMMAND = 10
@@ -39,7 +39,7 @@ SILENT = Refusals(None, None, None, None, None, None)
 class Traits:
     """How a family differs from its sisters where the profile has no field for it."""
 
-    kind: Kind
+    kind: ChartKind
     refusals: Refusals
     limits_follow: bool = False
     """True where a value past another parameter's limit is cut to it instead of refused."""
@@ -93,7 +93,7 @@ TRAITS: Mapping[str, Traits] = {
     "proxidrive": Traits("leroy-somer", SILENT),
     "varmeca": Traits("leroy-somer", SILENT),
 }
-_BY_KIND: Mapping[Kind, Traits] = {
+_BY_KIND: Mapping[ChartKind, Traits] = {
     "drivecom": Traits("drivecom", ALTIVAR, limits_follow=True, first_values=_LINE_CONTROL),
     "altivar21": TRAITS["atv21"],
     "leroy-somer": TRAITS["powerdrive"],

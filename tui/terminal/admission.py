@@ -12,7 +12,7 @@ from textual.events import Key, Paste
 from .fields import takes_text
 from .stroke import Stroke, attach, stroke_of
 
-MOVES = frozenset(
+CURSOR_KEYS = frozenset(
     {"up", "down", "left", "right", "pageup", "pagedown", "home", "end", "tab", "shift+tab"}
 )
 """Keys that move a cursor, and that a piece may move it with."""
@@ -67,7 +67,7 @@ class Admission:
 
     def _harmless(self, event: Key) -> bool:
         """Whether a key of a piece can only write text or move a cursor."""
-        if event.key in MOVES:
+        if event.key in CURSOR_KEYS:
             return True
         typed = event.is_printable or event.key in EDITS
         return typed and (takes_text(self._app.focused) or takes_text(self._app.screen))

@@ -12,7 +12,7 @@ from itertools import pairwise
 from typing import Final
 
 from .dialects import APART
-from .tokens import Key, Paste
+from .tokens import KeyToken, Paste
 
 SHORTEST_REPEAT: Final = 0.005
 """Seconds between two keys below which no keyboard repeats."""
@@ -23,7 +23,7 @@ UNEVEN: Final = 0.02
 REPEATS: Final = 3
 """Keys at an even pace that make a held key."""
 
-LONGEST: Final = 0.15
+HELD_LONGEST: Final = 0.15
 """Seconds after which keys that are known not to be alone are held back no longer."""
 
 STEPPING: Final = frozenset({"up", "down", "left", "right", "pageup", "pagedown"})
@@ -34,7 +34,7 @@ STEPPING: Final = frozenset({"up", "down", "left", "right", "pageup", "pagedown"
 class Given:
     """A key, or a paste, and the company in which it came."""
 
-    what: Key | Paste
+    what: KeyToken | Paste
     alone: bool = False
     held: bool = False
     steps: bool = False
@@ -47,16 +47,16 @@ class Bursts:
     """Holds keys back until it is known whether they came alone."""
 
     def __init__(self) -> None:
-        self._waiting: list[Key] = []
+        self._waiting: list[KeyToken] = []
         self._last = float("-inf")
         self._members = 0
         self._names: set[str] = set()
-        self._reads: list[list[Key]] = []
+        self._reads: list[list[KeyToken]] = []
         self._repeating: str | None = None
         self._stepped = False
         self._given: list[Given] = []
 
-    def key(self, key: Key) -> None:
+    def key(self, key: KeyToken) -> None:
         """Take a key; `given` tells what becomes of it."""
         self._join(key.began, key.at)
         if not self._reads or self._reads[-1][-1].at != key.at:
@@ -65,7 +65,7 @@ class Bursts:
         self._names.add(key.name)
         self._waiting.append(key)
 
-    def stop(self, key: Key) -> None:
+    def stop(self, key: KeyToken) -> None:
         """A stop key was taken: whatever was typed before it and still waits is void."""
         self._waiting.clear()
         self._given = [given for given in self._given if isinstance(given.what, Paste)]
@@ -84,7 +84,7 @@ class Bursts:
         if not self._hangs_on(pending):
             if now - self._last > APART:
                 self._close()
-            elif self._members > 1 and self._waiting and now - self._waiting[0].at > LONGEST:
+            elif self._members > 1 and self._waiting and now - self._waiting[0].at > HELD_LONGEST:
                 self._give_parts()
         found, self._given = self._given, []
         return found
@@ -146,7 +146,7 @@ class Bursts:
         self._give_parts()
 
 
-def _even(reads: Sequence[Sequence[Key]]) -> bool:
+def _even(reads: Sequence[Sequence[KeyToken]]) -> bool:
     """Whether each of these reads is the same key, at an even pace."""
     names = {key.name for read in reads for key in read}
     if len(reads) < REPEATS or len(names) != 1 or not names <= STEPPING:

@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from .names import STOP_KEYS, Named, of_character, of_sequence, with_alt
-from .tokens import Key, Paste, Report, Token
+from .tokens import KeyToken, Paste, Report, Token
 
 ESCAPE_DELAY: Final = 0.1
 """Seconds after which ESC alone is the key Escape, unless Textual is told another time."""
@@ -121,10 +121,10 @@ class Tokenizer:
         name, character = named
         if self._alt and name not in STOP_KEYS:
             name, character = f"alt+{name.removeprefix('alt+')}", None
-        self._found.append(Key(name, character, self._began, self._now, self._mark))
+        self._found.append(KeyToken(name, character, self._began, self._now, self._mark))
 
     def _escape_key(self) -> None:
-        self._found.append(Key("escape", ESC, self._began, self._began, self._mark))
+        self._found.append(KeyToken("escape", ESC, self._began, self._began, self._mark))
 
     def _ground(self, character: str) -> None:
         """Nothing has begun: a key, or the first character of a sequence."""
@@ -274,7 +274,7 @@ class Tokenizer:
         named = SPACE_ALONE if text == " " else of_sequence(text[:LONGEST_KEY])
         if named is None or named[0] not in STOP_KEYS:
             return False
-        self._found.append(Key(*named, self._now, self._now, self._here))
+        self._found.append(KeyToken(*named, self._now, self._now, self._here))
         return True
 
     def _end_waiting(self, now: float) -> None:

@@ -18,7 +18,7 @@ from textual._xterm_parser import XTermParser
 from textual.driver import Driver
 from textual.message import Message
 
-from .reader import KeyReader, Pressed, Read, Stops
+from .reader import KeyReader, Pressed, Stops, TerminalInput
 from .stroke import attach
 from .tokens import Report
 
@@ -26,16 +26,16 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
     from selectors import BaseSelector
 
-LOOK = 0.1
+END_POLL_INTERVAL = 0.1
 """Seconds between two looks whether the panel is to end."""
 
-AT_ONCE = 4096
+READ_SIZE = 4096
 """Bytes that are read in one go."""
 
 POSIX = "LinuxDriver"
 """Textual's driver of every system that has pseudo-terminals."""
 
-FOCUS_REPORTS = "\x1b[?1004h"
+ASK_FOR_FOCUS = "\x1b[?1004h"
 NO_REPORTS = "\x1b[?1000l\x1b[?1002l\x1b[?1003l\x1b[?1006l\x1b[?1004l"
 """A program that died may have left the mouse reported: a click would be typed, a Space with it."""
 
@@ -68,7 +68,7 @@ def _quiet(driver: type[Driver]) -> type[Driver]:
         def write(self, data: str) -> None:
             if not self.wanted and data.startswith(UNASKED):
                 return
-            super().write(NO_REPORTS if data == FOCUS_REPORTS and not self.wanted else data)
+            super().write(NO_REPORTS if data == ASK_FOR_FOCUS and not self.wanted else data)
 
     return QuietDriver
 
@@ -96,25 +96,29 @@ def read_keys(driver: Any) -> None:
                 for message in _messages(one, reports):
                     driver.process_message(message)
         if selector.select(0):  # what is typed while the panel ends is for nobody
-            os.read(driver.fileno, AT_ONCE)
+            os.read(driver.fileno, READ_SIZE)
 
 
-def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[Read]:
+def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[TerminalInput]:
     """Wait for bytes, or until something is known without."""
     asked, deadline = time.monotonic(), keys.deadline
-    wait = LOOK if deadline is None else min(LOOK, max(0.0, deadline - asked))
+    wait = (
+        END_POLL_INTERVAL
+        if deadline is None
+        else min(END_POLL_INTERVAL, max(0.0, deadline - asked))
+    )
     if not selector.select(wait):
         return keys.tick(time.monotonic())
     # Where this thread was kept waiting, the bytes were there before now. The stamp comes before
     # the bytes: where a stop of somebody else falls between, it voids them.
     now, stamp = min(time.monotonic(), asked + wait), cast("Stops", driver._app).stop_stamp()
-    data = os.read(driver.fileno, AT_ONCE)
+    data = os.read(driver.fileno, READ_SIZE)
     if not data:
-        driver.exit_event.wait(LOOK)
+        driver.exit_event.wait(END_POLL_INTERVAL)
     return keys.read(data, now, stamp)
 
 
-def _messages(read: Read, reports: XTermParser) -> Iterator[Message]:
+def _messages(read: TerminalInput, reports: XTermParser) -> Iterator[Message]:
     """What Textual would make of it."""
     if isinstance(read, Pressed):
         event = events.Key(read.name, read.character)

@@ -23,7 +23,7 @@ from tui.drive.plain import commands
 Cell = tuple[str, str]
 """A character and its colours; none where the one to the left takes two cells."""
 
-MOVE = 8
+CURSOR_MOVE = 8
 """Bytes that moving the cursor takes: cells that stay the same between others are sent again."""
 
 
@@ -48,7 +48,7 @@ class Shown:
             row[x + place] = cell
             # the second half of a wide character is sent with the first
             first = place if cell[0] else max(0, place - 1)
-            if found and first - found[-1][1] < MOVE:
+            if found and first - found[-1][1] < CURSOR_MOVE:
                 found[-1] = (found[-1][0], place + 1)
             else:
                 found.append((first, place + 1))

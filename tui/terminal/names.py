@@ -33,10 +33,10 @@ SCO: Final = {
 ESC [ U was the end of the page on a Mach console; a stop there is the lesser evil.
 """
 
-FOCUS: Final = ("\x1b[I", "\x1b[O")
+FOCUS_REPORTS: Final = ("\x1b[I", "\x1b[O")
 """Reports that the terminal's window got or lost the focus; PgUp and F3 of SCO."""
 
-AMBIGUOUS: Final = frozenset({*FOCUS, "\x1b[P", "\x1b[Q", "\x1b[R", "\x1b[S"})
+AMBIGUOUS: Final = frozenset({*FOCUS_REPORTS, "\x1b[P", "\x1b[Q", "\x1b[R", "\x1b[S"})
 """F4 to F7 of SCO are F1 to F4 of the kitty protocol, and one is a Linux console's Pause."""
 
 _MODIFIED = re.compile(
@@ -80,7 +80,7 @@ def of_sequence(sequence: str, *, kitty: bool = False) -> Named | None:
 
     Only where the `kitty` protocol was asked for, ESC [ P to ESC [ S are its F1 to F4.
     """
-    if sequence in AMBIGUOUS and not (kitty and sequence not in FOCUS):
+    if sequence in AMBIGUOUS and not (kitty and sequence not in FOCUS_REPORTS):
         return None
     if name := VT100_PLUS.get(sequence) or SCO.get(sequence):
         return name, None

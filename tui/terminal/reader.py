@@ -14,7 +14,7 @@ from .bursts import Bursts, Given
 from .dialects import ESCAPE_DELAY, Tokenizer
 from .names import STOP_KEYS
 from .stroke import Stroke
-from .tokens import Key, Paste, Report, Token
+from .tokens import KeyToken, Paste, Report, Token
 
 EDITING = frozenset({"backspace", "delete", "left", "right", "home", "end"})
 """Keys that edit a text, besides those that write it; any other one may leave it."""
@@ -45,7 +45,7 @@ class Pressed:
     stroke: Stroke
 
 
-Read = Pressed | Paste | Report
+TerminalInput = Pressed | Paste | Report
 
 
 class KeyReader:
@@ -61,14 +61,14 @@ class KeyReader:
         self._bursts = Bursts()
         self._left_at: float | None = None
 
-    def read(self, data: bytes, now: float, stamp: object = None) -> list[Read]:
+    def read(self, data: bytes, now: float, stamp: object = None) -> list[TerminalInput]:
         """Bytes that were read at this time, when the app's stamp of stops was this."""
         tokens = self._tokens.feed(self._decode(data), now, stamp)
         if not tokens and self._tokens.pending is None and data.startswith(b"\x1b"):
             self._stops.sequence_swallowed(data)
         return self._sorted(tokens, now)
 
-    def tick(self, now: float) -> list[Read]:
+    def tick(self, now: float) -> list[TerminalInput]:
         """What is known by this time because nothing more was read."""
         return self._sorted(self._tokens.tick(now), now)
 
@@ -78,8 +78,8 @@ class KeyReader:
         found = [self._tokens.deadline, self._bursts.deadline(self._tokens.pending)]
         return min((time for time in found if time is not None), default=None)
 
-    def _sorted(self, tokens: list[Token], now: float) -> list[Read]:
-        reports: list[Read] = []
+    def _sorted(self, tokens: list[Token], now: float) -> list[TerminalInput]:
+        reports: list[TerminalInput] = []
         for token in tokens:
             if isinstance(token, Report):
                 reports.append(token)
@@ -94,11 +94,11 @@ class KeyReader:
         given = self._bursts.given(now, self._tokens.pending)
         return [*reports, *(_told(one) for one in given)]
 
-    def _stopped(self, key: Key) -> bool:
+    def _stopped(self, key: KeyToken) -> bool:
         """Whether a key was a stop."""
         return key.name in STOP_KEYS and self._stops.take_stop_key(key.name, self._left(key))
 
-    def _left(self, key: Key) -> float | None:
+    def _left(self, key: KeyToken) -> float | None:
         """When a key was read last, up to this one, that may leave a text."""
         writes = key.character is not None and key.character.isprintable()
         return self._left_at if writes or key.name in EDITING else key.began
@@ -106,7 +106,7 @@ class KeyReader:
 
 def _told(given: Given) -> Pressed | Paste:
     key = given.what
-    if not isinstance(key, Key):
+    if not isinstance(key, KeyToken):
         return key
     stroke = Stroke(
         read_at=key.began,

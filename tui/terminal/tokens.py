@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True, slots=True)
-class Key:
+class KeyToken:
     """A key: its name in Textual, what it types, when its first and its last character was read."""
 
     name: str
@@ -32,4 +32,4 @@ class Report:
     text: str
 
 
-Token = Key | Paste | Report
+Token = KeyToken | Paste | Report

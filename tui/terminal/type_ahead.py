@@ -20,7 +20,7 @@ from textual.message_pump import MessagePump
 
 from .stroke import Stroke, stroke_of
 
-LONGEST = 0.3
+WAIT_LONGEST = 0.3
 """Seconds that a key waits at most for the one before."""
 
 Typed = Key | Paste
@@ -66,7 +66,7 @@ class TypeAhead:
 
     async def _next(self) -> None:
         with suppress(TimeoutError):
-            async with asyncio.timeout(LONGEST):
+            async with asyncio.timeout(WAIT_LONGEST):
                 await self._worked_off()
         self._call_next()
 

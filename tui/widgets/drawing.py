@@ -139,11 +139,11 @@ def _column(level: int | None, row: int) -> str:
     return EIGHTHS_HIGH[max(0, min(8, level - row * 8))]
 
 
-Key = tuple[str, str, str]
+KeyLabel = tuple[str, str, str]
 """An action, its key and its label in the line of keys."""
 
 
-def fitting(keys: Sequence[Key], width: int, kept: Collection[str]) -> list[Key]:
+def fitting(keys: Sequence[KeyLabel], width: int, kept: Collection[str]) -> list[KeyLabel]:
     """The keys for which there is room; the last go first, those of the actions kept never."""
     left = list(keys)
     for key in reversed(keys):
@@ -160,7 +160,7 @@ def key_styles(action: str) -> tuple[Style, Style]:
 
 
 def key_line(
-    keys: Sequence[Key], styles: Callable[[str], tuple[Style, Style]] = key_styles
+    keys: Sequence[KeyLabel], styles: Callable[[str], tuple[Style, Style]] = key_styles
 ) -> Text:
     """Keys and what they do, on one line; `styles` of a key and its words, by the action."""
     text = Text(no_wrap=True)

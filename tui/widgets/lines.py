@@ -11,6 +11,7 @@ from textual.strip import Strip
 from textual.widget import Widget
 
 from tui.drive.plain import plain
+from tui.terminal.lean import CURSOR_MOVE
 
 
 class Lines(Widget):
@@ -100,15 +101,11 @@ def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
     for x in range(width):
         if old[x] == new[x]:
             continue
-        if found and x - found[-1][1] < MOVE:
+        if found and x - found[-1][1] < CURSOR_MOVE:
             found[-1] = (found[-1][0], x + 1)
         else:
             found.append((x, x + 1))
     return found
-
-
-MOVE = 8
-"""Bytes that moving the cursor takes."""
 
 
 def cells(strip: Strip) -> list[tuple[str, Style | None]]:

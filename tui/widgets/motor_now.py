@@ -14,7 +14,7 @@ from tui.session.reading import Quality
 from .drive_signs import STATE_SIGNS, STATE_STYLES, age_text
 from .palette import ALARM, FAINT, PLAIN, STALE, STRONG
 
-SHOWN: tuple[Quantity, ...] = ("output_frequency", "motor_current")
+QUANTITIES_NOW: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 """What is told beside the state."""
 NUMBER_WIDTH = 7
 HEADLINE_WIDTH = 18
@@ -37,7 +37,7 @@ def motor_now(
     if not heard or age > STALE_CYCLES * cycle or snapshot.state.kind == "unknown":
         return _not_known(snapshot.state.headline, age)
     text = _state(snapshot.state.headline, snapshot.state.kind)
-    for quantity in SHOWN:
+    for quantity in QUANTITIES_NOW:
         parameter = profile.quantity(quantity)
         reading = snapshot.readings.get(parameter.code) if parameter else None
         if reading is None:

@@ -4,17 +4,25 @@ from __future__ import annotations
 
 from rich.text import Text
 
-from tui.session.work import Kind, Outcome
+from tui.session.work import Outcome, OutcomeKind
 
 from .drawing import cut
 from .palette import ALARM, ATTENTION, STRONG
 
-OUTCOME_STYLES = {Kind.WORKING: ATTENTION, Kind.DONE: STRONG, Kind.REFUSED: ALARM}
+OUTCOME_STYLES = {
+    OutcomeKind.WORKING: ATTENTION,
+    OutcomeKind.DONE: STRONG,
+    OutcomeKind.REFUSED: ALARM,
+}
 
 
 def outcome_lines(outcome: Outcome, width: int) -> list[Text]:
     """What became of the last order, on at most two lines."""
-    head = {Kind.WORKING: "ORDERED ", Kind.DONE: "DONE ", Kind.REFUSED: "NOT DONE "}[outcome.kind]
+    head = {
+        OutcomeKind.WORKING: "ORDERED ",
+        OutcomeKind.DONE: "DONE ",
+        OutcomeKind.REFUSED: "NOT DONE ",
+    }[outcome.kind]
     text = head + outcome.text
     style = OUTCOME_STYLES[outcome.kind]
     if len(text) <= width:

@@ -6,7 +6,7 @@ Knows no clock and no port: fed with bytes, told of silence and of the time-out.
 from __future__ import annotations
 
 from ..expectation import Expectation
-from ..result import Kind, Piece, Verdict
+from ..result import ExchangeResult, Piece, ResultKind
 from .frames import Match, begins_reply, find_reply, pieces
 
 NOISE = 4
@@ -46,7 +46,7 @@ class RtuExchange:
         """Whether a reply is due at all."""
         return self._expectation is not None
 
-    def feed(self, data: bytes) -> Verdict | None:
+    def feed(self, data: bytes) -> ExchangeResult | None:
         """Take received bytes; the verdict once the reply is whole."""
         self.buffer += data
         if self._expectation is None:
@@ -59,7 +59,7 @@ class RtuExchange:
             return self._answered(match)
         return None
 
-    def pass_over(self, verdict: Verdict) -> Verdict | None:
+    def pass_over(self, verdict: ExchangeResult) -> ExchangeResult | None:
         """The reply just found cannot be that of this request; the next one, if it is there."""
         assert self._expectation is not None
         self._skipped_to = self.buffer.find(verdict.pdu, self._skipped_to) + len(verdict.pdu) + 2
@@ -78,7 +78,7 @@ class RtuExchange:
         copy = self.buffer.find(self.frame)
         return 0 if copy < 0 else copy + len(self.frame)
 
-    def _answered(self, match: Match) -> Verdict:
+    def _answered(self, match: Match) -> ExchangeResult:
         before = self._after_echo()
         if not self._mirrored:
             if before:
@@ -86,8 +86,8 @@ class RtuExchange:
             elif match.start == 0:
                 self.echo = False
         loose = self._loose(match)
-        return Verdict(
-            Kind.REPLY if match.exception is None else Kind.EXCEPTION,
+        return ExchangeResult(
+            ResultKind.REPLY if match.exception is None else ResultKind.EXCEPTION,
             pdu=match.pdu,
             exception=match.exception or 0,
             received=bytes(self.buffer),
@@ -109,7 +109,7 @@ class RtuExchange:
         parts.append(rest)
         return [piece for part in parts for piece in pieces(part)]
 
-    def silent(self) -> Verdict | None:
+    def silent(self) -> ExchangeResult | None:
         """The line has been silent for longer than a pause inside a frame; maybe all is clear.
 
         What is left of the reply ends the exchange; noise, or another device's frame, does not:
@@ -122,8 +122,8 @@ class RtuExchange:
             if piece.whole or self._begun_echo(piece.data):
                 continue
             if self._is_remnant(piece.data, self._expectation):
-                return Verdict(
-                    Kind.DAMAGED,
+                return ExchangeResult(
+                    ResultKind.DAMAGED,
                     received=bytes(self.buffer),
                     strays=[stray for stray in loose if stray.whole],
                     recognised=True,
@@ -139,7 +139,7 @@ class RtuExchange:
     def _begun_echo(self, data: bytes) -> bool:
         return self.echo is not False and self.frame.startswith(data)
 
-    def expired(self) -> Verdict:
+    def expired(self) -> ExchangeResult:
         """The time is up."""
         copied = self.frame in self.buffer
         if not self._mirrored:
@@ -150,8 +150,8 @@ class RtuExchange:
         elif not self.buffer:
             self.echo = False
         loose = self._loose()
-        verdict = Verdict(
-            Kind.NOTHING,
+        verdict = ExchangeResult(
+            ResultKind.NOTHING,
             received=bytes(self.buffer),
             strays=[piece for piece in loose if piece.whole],
         )
@@ -159,12 +159,12 @@ class RtuExchange:
             return verdict
         own = [piece for piece in verdict.strays if piece.device == self._device]
         if own:
-            verdict.kind = Kind.WRONG
+            verdict.kind = ResultKind.WRONG
             verdict.detail = self._expectation.mismatch(own[0].pdu)
         elif any(not piece.whole and len(piece.data) >= NOISE for piece in loose):
-            verdict.kind = Kind.DAMAGED
+            verdict.kind = ResultKind.DAMAGED
         elif self._mirrored and copied and self.echo is None:
-            verdict.kind = Kind.UNSURE
+            verdict.kind = ResultKind.UNSURE
         elif self._mirrored and copied:
             verdict.detail = "only the adapter's echo of it came back"
         return verdict

@@ -10,8 +10,8 @@ from tui.wire.frames import MAX_FRAME, frame
 
 from ..errors import LineLost
 from ..link import Link, RtuTcpLink, character_time, silence
-from ..master import Outcome, Sending, Surroundings, settle
-from ..result import Kind, Verdict
+from ..master import Exchange, LineContext, Sending, settle
+from ..result import ExchangeResult, ResultKind
 from ..transport.base import Transport
 from .exchange import RtuExchange
 from .frames import pieces
@@ -35,7 +35,7 @@ class RtuMaster:
         self,
         transport: Transport,
         link: Link,
-        around: Surroundings,
+        around: LineContext,
         ended: Callable[[], None],
     ) -> None:
         self.echo: bool | None = None
@@ -52,7 +52,7 @@ class RtuMaster:
         self._last = around.clock()
         self._hold = 0.0
         self._exchange: RtuExchange | None = None
-        self._done: asyncio.Future[Verdict] | None = None
+        self._done: asyncio.Future[ExchangeResult] | None = None
         self._timer: asyncio.TimerHandle | None = None
         self._sent = 0.0
         self._idle = bytearray()
@@ -83,12 +83,12 @@ class RtuMaster:
             # the echo of a long request may come in lumps while it is still being sent
             self._start_timer(max(time, self._sent) + self._gap - time, self._fell_silent)
 
-    def _came_too_early(self, verdict: Verdict, time: float) -> bool:
+    def _came_too_early(self, verdict: ExchangeResult, time: float) -> bool:
         """Whether a reply began before its request was over: then it is that of another one.
 
         Only where the line is known to keep the time of its baud: a pseudo-terminal does not.
         """
-        if verdict.kind not in (Kind.REPLY, Kind.EXCEPTION):
+        if verdict.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
             return False
         begun = time - (len(verdict.pdu) + 3) * self._character
         early = begun < self._sent - TOLERANCE
@@ -100,7 +100,7 @@ class RtuMaster:
         """The port went away: whoever waits is told at once."""
         self._stop_timer()
         self.failure = LineLost(f"The line was lost: {reason}.")
-        settle(self._done, Verdict(Kind.NOTHING))
+        settle(self._done, ExchangeResult(ResultKind.NOTHING))
         self._ended()
 
     async def quiet(self) -> None:
@@ -122,7 +122,7 @@ class RtuMaster:
             await self._transport.rest(min(until, give_up))
         raise self.failure
 
-    async def exchange(self, sending: Sending) -> Outcome:
+    async def exchange(self, sending: Sending) -> Exchange:
         """Send a request and await its reply, its remains, or the end of its time."""
         clock, tally = self._around.clock, self._around.tally
         data = frame(sending.device, sending.pdu)
@@ -146,12 +146,12 @@ class RtuMaster:
             self._exchange = self._done = None
             self._stop_timer()
         self.echo = exchange.echo
-        end = clock() if verdict.kind is Kind.NOTHING else self._last
+        end = clock() if verdict.kind is ResultKind.NOTHING else self._last
         tally.busy_seconds += clock() - begun
         tally.resyncs += verdict.resynchronised
         self._log(verdict, data, sending.device, end)
         reply = (len(verdict.pdu) + 3) * self._character
-        return Outcome(verdict, self._sent, end, max(0.0, end - self._sent - reply))
+        return Exchange(verdict, self._sent, end, max(0.0, end - self._sent - reply))
 
     async def _send(self, data: bytes) -> None:
         try:
@@ -162,7 +162,7 @@ class RtuMaster:
                 self.lost(str(error.strerror or error))
             raise self.failure or LineLost("The line was lost.") from error
 
-    async def _verdict(self, exchange: RtuExchange, sending: Sending) -> Verdict:
+    async def _verdict(self, exchange: RtuExchange, sending: Sending) -> ExchangeResult:
         """Wait for the verdict; while bytes are coming in, a little over the time-out."""
         assert self._done is not None
         clock, expectation = self._around.clock, sending.expectation
@@ -204,7 +204,7 @@ class RtuMaster:
                 self._around.tally.stale += 1
                 self._around.stray(piece, self._last)
 
-    def _log(self, verdict: Verdict, request: bytes, device: int, time: float) -> None:
+    def _log(self, verdict: ExchangeResult, request: bytes, device: int, time: float) -> None:
         trace = self._around.trace
         if not verdict.received:
             return
@@ -213,9 +213,9 @@ class RtuMaster:
             return
         for piece in pieces(verdict.received):
             if piece.data == request and piece.pdu != verdict.pdu:
-                note = "echo or answer" if verdict.kind is Kind.UNSURE else "echo"
+                note = "echo or answer" if verdict.kind is ResultKind.UNSURE else "echo"
             elif not piece.whole:
-                note = "damaged" if verdict.kind is Kind.DAMAGED else "noise"
+                note = "damaged" if verdict.kind is ResultKind.DAMAGED else "noise"
             elif piece.device != device:
                 note = f"of device {piece.device}"
             else:

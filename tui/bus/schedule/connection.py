@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from ..errors import LineError, LineLost
 from ..link import Link, RtuTcpLink, SerialLink, TcpLink, label
-from ..master import Master, Surroundings
+from ..master import LineContext, Master
 from ..model import LineState, LineStatus
 from ..rtu.master import RtuMaster
 from ..tcp.master import TcpMaster
@@ -37,7 +37,7 @@ def open_port(link: SerialLink) -> Transport:
     return PosixSerial(port, note) if os.name == "posix" else ThreadedSerial(port, note)
 
 
-async def connect(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
+async def connect_tcp(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
     """Connect to a server. Raises LineLost."""
     try:
         return await TcpTransport.connect(link.host, link.port, timeout)
@@ -58,7 +58,7 @@ class Connection:
     def __init__(
         self,
         link: Link,
-        around: Surroundings,
+        around: LineContext,
         dispatcher: Dispatcher,
         changed: Callable[[LineState, LineError | None], None],
     ) -> None:
@@ -107,7 +107,7 @@ class Connection:
             case SerialLink():
                 transport = open_port(link)
             case TcpLink() | RtuTcpLink():
-                transport = await connect(link, self._around.timing.connect_timeout)
+                transport = await connect_tcp(link, self._around.timing.connect_timeout)
         self._say(LineStatus.CONNECTED, transport.note)
         if isinstance(link, TcpLink):
             return TcpMaster(transport, self._around, wake)

@@ -16,10 +16,10 @@ from ..errors import (
     WrongReply,
 )
 from ..limits import STANDARD_EXCEPTIONS
-from ..master import Clock, Master, Outcome, Sending
+from ..master import Exchange, Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import BROADCAST, Read
-from ..result import Kind, Piece
+from ..result import Piece, ResultKind
 from ..tally import Tally
 from .patience import Devices
 from .queue import Answer, Job, JobQueue
@@ -34,7 +34,13 @@ class Dispatcher:
     """Serves one line; lives in its loop."""
 
     def __init__(
-        self, devices: Devices, tally: Tally, timing: Timing, clock: Clock, *, gateway: bool
+        self,
+        devices: Devices,
+        tally: Tally,
+        timing: Timing,
+        clock: MonotonicClock,
+        *,
+        gateway: bool,
     ) -> None:
         self._devices = devices
         self._tally = tally
@@ -123,7 +129,7 @@ class Dispatcher:
         begun = self._clock()
         try:
             outcome = await master.exchange(self._sending(job))
-            if outcome.verdict.kind is Kind.UNSURE:
+            if outcome.verdict.kind is ResultKind.UNSURE:
                 outcome = await self._resolve_echo(master, job, outcome)
             if self._is_repeat(job, outcome):
                 outcome = await self._ask_again(master, job, outcome)
@@ -156,7 +162,7 @@ class Dispatcher:
             skip,
         )
 
-    async def _resolve_echo(self, master: Master, job: Job, outcome: Outcome) -> Outcome:
+    async def _resolve_echo(self, master: Master, job: Job, outcome: Exchange) -> Exchange:
         """Tell an echo from an answer that repeats its request: see what a read comes back as."""
         request, verdict = job.request, outcome.verdict
         if Read.function in job.limits.functions:
@@ -167,20 +173,20 @@ class Dispatcher:
                 Sending(request.device, probe.pdu(), probe.expectation(), time_out)
             )
         if master.echo is False:
-            verdict.kind, verdict.pdu = Kind.REPLY, job.pdu
+            verdict.kind, verdict.pdu = ResultKind.REPLY, job.pdu
         else:
-            verdict.kind = Kind.NOTHING
+            verdict.kind = ResultKind.NOTHING
             verdict.detail = "only the adapter's echo of it came back"
         return outcome
 
-    def _is_repeat(self, job: Job, outcome: Outcome) -> bool:
+    def _is_repeat(self, job: Job, outcome: Exchange) -> bool:
         """Whether a reply may be a copy of the one before."""
         verdict = outcome.verdict
-        return verdict.kind is Kind.REPLY and self._devices.is_repeat(
+        return verdict.kind is ResultKind.REPLY and self._devices.is_repeat(
             job.request.device, job.pdu, verdict.pdu, outcome.turnaround
         )
 
-    async def _ask_again(self, master: Master, job: Job, doubted: Outcome) -> Outcome:
+    async def _ask_again(self, master: Master, job: Job, doubted: Exchange) -> Exchange:
         """The same once more: whichever of its two replies comes first, it is the right one."""
         await master.quiet()
         outcome = await master.exchange(self._sending(job))
@@ -191,45 +197,49 @@ class Dispatcher:
         self._note_strays(doubted.verdict.strays, doubted.end)
         return outcome
 
-    def _conclude(self, job: Job, outcome: Outcome) -> None:
+    def _conclude(self, job: Job, outcome: Exchange) -> None:
         """Note what became of a request, and hand it back or send it again."""
         request, verdict, now = job.request, outcome.verdict, self._clock()
         if job.expectation is None:
             self._note_strays(verdict.strays, outcome.end)
             job.finish(Answer(b"", outcome.sent))
             return
-        if verdict.kind is Kind.EXCEPTION and self._is_gateways(job, verdict.exception):
-            verdict.kind, verdict.detail = Kind.NOTHING, "the gateway heard nothing of it"
-        if verdict.kind in (Kind.REPLY, Kind.EXCEPTION):
+        if verdict.kind is ResultKind.EXCEPTION and self._is_gateways(job, verdict.exception):
+            verdict.kind, verdict.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
+        if verdict.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._tally.replies += 1
             exchanged = (job.pdu, verdict.pdu)
             self._devices.answered(
                 request.device, job.expectation, outcome.turnaround, now, exchanged
             )
         unexplained = self._note_strays(verdict.strays, outcome.end)
-        if verdict.kind is Kind.WRONG and verdict.strays and request.device not in unexplained:
-            verdict.kind = Kind.NOTHING
+        if (
+            verdict.kind is ResultKind.WRONG
+            and verdict.strays
+            and request.device not in unexplained
+        ):
+            verdict.kind = ResultKind.NOTHING
         match verdict.kind:
-            case Kind.REPLY:
+            case ResultKind.REPLY:
                 job.finish(Answer(verdict.pdu, outcome.end))
-            case Kind.EXCEPTION:
+            case ResultKind.EXCEPTION:
                 self._tally.exceptions += 1
                 job.fail(self._exception(job, verdict.exception))
             case _:
                 self._failed(job, outcome, now)
 
-    def _failed(self, job: Job, outcome: Outcome, now: float) -> None:
+    def _failed(self, job: Job, outcome: Exchange, now: float) -> None:
         request, verdict, expectation = job.request, outcome.verdict, job.expectation
         assert expectation is not None
         place = (request.device, request.function, request.register)
         error: LineError
         match verdict.kind:
-            case Kind.DAMAGED:
+            case ResultKind.DAMAGED:
                 self._tally.checksum += 1
                 if not verdict.recognised:
                     self._devices.may_come(request.device, expectation, outcome.sent, now)
                 error = ChecksumFault(*place, received=verdict.received)
-            case Kind.WRONG:
+            case ResultKind.WRONG:
                 self._tally.wrong += 1
                 self._devices.may_come(request.device, expectation, outcome.sent, now)
                 error = WrongReply(*place, verdict.detail, verdict.received)
@@ -244,14 +254,14 @@ class Dispatcher:
         else:
             job.fail(error)
 
-    def _is_repeated(self, job: Job, kind: Kind) -> bool:
+    def _is_repeated(self, job: Job, kind: ResultKind) -> bool:
         """Whether a request is sent again: never one that changes anything."""
         if job.request.changes or job.repeats >= self._timing.retries:
             return False
-        if kind is Kind.DAMAGED:
+        if kind is ResultKind.DAMAGED:
             return job.priority is not Priority.BACKGROUND
         known = self._devices[job.request.device].ever_answered
-        return kind is Kind.NOTHING and known and job.priority in REPEATED_WHEN_SILENT
+        return kind is ResultKind.NOTHING and known and job.priority in REPEATED_WHEN_SILENT
 
     def _note_strays(self, strays: Iterable[Piece], time: float) -> set[int]:
         """Pass on frames that came beside the reply; returns the devices of unexplained ones."""

@@ -10,7 +10,7 @@ from typing import TypeVar
 
 from ..errors import LineClosed, LineError, LineLost, PortBusy, PortMissing, PortRefused
 from ..link import Link, TcpLink, label
-from ..master import Clock, Surroundings
+from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
 from ..tally import Tally
 from ..trace import Trace
@@ -18,7 +18,7 @@ from .connection import Connection
 from .dispatcher import Dispatcher
 from .patience import Devices
 from .queue import Job
-from .worker import Work, Worker
+from .worker import ThreadWork, Worker
 
 T = TypeVar("T")
 
@@ -37,7 +37,7 @@ class Engine:
     request that its own thread is handing over.
     """
 
-    def __init__(self, link: Link, timing: Timing, clock: Clock) -> None:
+    def __init__(self, link: Link, timing: Timing, clock: MonotonicClock) -> None:
         self.trace = Trace(timing.trace_length)
         self.tally = Tally()
         self.devices = Devices(timing, mistakable=not isinstance(link, TcpLink))
@@ -57,7 +57,7 @@ class Engine:
         self._dispatcher = Dispatcher(
             self.devices, self.tally, timing, clock, gateway=isinstance(link, TcpLink)
         )
-        around = Surroundings(timing, self.trace, self.tally, clock, self._dispatcher.stray)
+        around = LineContext(timing, self.trace, self.tally, clock, self._dispatcher.stray)
         self._connection = Connection(link, around, self._dispatcher, self._changed)
 
     def start(self, wait: float | None) -> None:
@@ -127,7 +127,7 @@ class Engine:
         else:
             self._dispatcher.submit(job)
 
-    def spawn(self, work: Work, name: str) -> Worker:
+    def spawn(self, work: ThreadWork, name: str) -> Worker:
         """Start a worker in the loop. Raises LineClosed."""
         if self._loop is None:
             raise LineClosed

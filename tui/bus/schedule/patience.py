@@ -14,7 +14,7 @@ from ..requests import Read, WriteMany
 from ..result import Piece
 from .backoff import pause
 
-RECENT = 16
+TURNAROUNDS_KEPT = 16
 """Turnarounds remembered for each function."""
 MARGIN = 4
 """The time-out is so many times the worst recent turnaround."""
@@ -25,7 +25,7 @@ QUIET_SHARE = 0.3
 """Longest that the whole line keeps quiet for one late device, as a share of the time-out."""
 FORGET = 0.99
 """What is left of the worst lateness after each reply in time."""
-SHORT = 0.1
+SHORT_WAIT = 0.1
 """A wait between two like requests up to which a line that repeats replies is not soon trusted."""
 LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
 """Seconds without a repeated reply after which a short wait, and a longer one, is over."""
@@ -205,7 +205,7 @@ class Devices:
 
     def _settle_of(self, record: Device, now: float) -> float:
         """How long nothing like it is asked after a reply, where replies came twice."""
-        memory = LONG_MEMORY if record.settle <= SHORT else SHORT_MEMORY
+        memory = LONG_MEMORY if record.settle <= SHORT_WAIT else SHORT_MEMORY
         if now - record.repeated > memory:
             record.settle = 0.0
         if now - self._repeated > LONG_MEMORY:
@@ -256,7 +256,7 @@ class Devices:
             after = min(LATE_MARGIN * (now - record.last_time), self._timing.late_reply)
             record.settle = max(record.settle, after)
             record.repeated = now
-            if after <= SHORT:
+            if after <= SHORT_WAIT:
                 # what repeats frames quickly stands in the line, not in one drive
                 self._settle, self._repeated = max(self._settle, after), now
             again = Outstanding(record.last, record.last_time, now, now + record.settle)
@@ -272,6 +272,6 @@ def usual(recent: Mapping[int, Sequence[float]]) -> float | None:
 
 
 def _remember(record: Device, function: int, turnaround: float) -> None:
-    recent = record.recent.setdefault(function, deque(maxlen=RECENT))
+    recent = record.recent.setdefault(function, deque(maxlen=TURNAROUNDS_KEPT))
     recent.append(turnaround)
     record.turnaround = max(recent)

@@ -10,13 +10,13 @@ from typing import Any
 
 log = logging.getLogger(__name__)
 
-Work = Callable[[], Coroutine[Any, Any, object]]
+ThreadWork = Callable[[], Coroutine[Any, Any, object]]
 
 
 class Worker:
     """A coroutine at work in the line's loop; made by Line.spawn()."""
 
-    def __init__(self, work: Work, name: str, loop: asyncio.AbstractEventLoop) -> None:
+    def __init__(self, work: ThreadWork, name: str, loop: asyncio.AbstractEventLoop) -> None:
         self.name = name
         self.error: BaseException | None = None
         """What ended the work against its will."""

@@ -10,11 +10,11 @@ from pymodbus.pdu import DecodePDU
 
 from ..errors import LineLost
 from ..expectation import exception_code
-from ..master import Outcome, Sending, Surroundings, settle
-from ..result import Kind, Verdict
+from ..master import Exchange, LineContext, Sending, settle
+from ..result import ExchangeResult, ResultKind
 from ..transport.base import Transport
 
-HEADER = 7
+HEADER_LENGTH = 7
 """Transaction id, protocol id, length, unit id."""
 MAX_LENGTH = 254
 """Unit id and the longest function and data."""
@@ -24,7 +24,7 @@ class TcpMaster:
     """One Modbus TCP connection. `ended` is called once when it is lost."""
 
     def __init__(
-        self, transport: Transport, around: Surroundings, ended: Callable[[], None]
+        self, transport: Transport, around: LineContext, ended: Callable[[], None]
     ) -> None:
         self.echo: bool | None = False
         self.failure: LineLost | None = None
@@ -35,7 +35,7 @@ class TcpMaster:
         self._buffer = bytearray()
         self._transaction = 0
         self._sending: Sending | None = None
-        self._done: asyncio.Future[Verdict] | None = None
+        self._done: asyncio.Future[ExchangeResult] | None = None
         self._hold = 0.0
         self._last = 0.0
         transport.start(self)
@@ -49,7 +49,7 @@ class TcpMaster:
         self._last = time
         self._around.tally.bytes_in += len(data)
         self._buffer += data
-        while len(self._buffer) >= HEADER:
+        while len(self._buffer) >= HEADER_LENGTH:
             length = int.from_bytes(self._buffer[4:6], "big")
             if self._buffer[2:4] != b"\0\0" or not 2 <= length <= MAX_LENGTH:
                 self._around.trace.add(time, "in", bytes(self._buffer), "no Modbus TCP")
@@ -68,7 +68,7 @@ class TcpMaster:
             self._around.trace.add(time, "in", unit, "late or repeated")
             return
         verdict = _verdict(unit, sending)
-        note = "" if verdict.kind in (Kind.REPLY, Kind.EXCEPTION) else "not the reply"
+        note = "" if verdict.kind in (ResultKind.REPLY, ResultKind.EXCEPTION) else "not the reply"
         self._around.trace.add(time, "in", unit, note)
         settle(self._done, verdict)
 
@@ -86,7 +86,7 @@ class TcpMaster:
         if self.failure is not None:
             return
         self.failure = LineLost(f"The line was lost: {reason}.")
-        settle(self._done, Verdict(Kind.NOTHING))
+        settle(self._done, ExchangeResult(ResultKind.NOTHING))
         self._ended()
 
     async def quiet(self) -> None:
@@ -96,7 +96,7 @@ class TcpMaster:
         if self.failure is not None:
             raise self.failure
 
-    async def exchange(self, sending: Sending) -> Outcome:
+    async def exchange(self, sending: Sending) -> Exchange:
         """Send a request and await the reply of its transaction."""
         clock, tally = self._around.clock, self._around.tally
         self._transaction = self._transaction % 0xFFFF + 1
@@ -112,12 +112,12 @@ class TcpMaster:
             verdict = await self._verdict(sending)
         finally:
             self._sending = self._done = None
-        end = clock() if verdict.kind is Kind.NOTHING else self._last
+        end = clock() if verdict.kind is ResultKind.NOTHING else self._last
         tally.busy_seconds += clock() - begun
-        if verdict.kind is Kind.NOTHING and self._buffer:
+        if verdict.kind is ResultKind.NOTHING and self._buffer:
             # half a reply, or a length that is wrong: what follows could not be told apart
             self._reset("a reply broke off")
-        return Outcome(verdict, begun, end, max(0.0, end - begun))
+        return Exchange(verdict, begun, end, max(0.0, end - begun))
 
     async def _send(self, data: bytes) -> None:
         try:
@@ -126,27 +126,27 @@ class TcpMaster:
             self.lost(str(error.strerror or error))
             raise self.failure or LineLost("The line was lost.") from error
 
-    async def _verdict(self, sending: Sending) -> Verdict:
+    async def _verdict(self, sending: Sending) -> ExchangeResult:
         assert self._done is not None
         if sending.expectation is None:
             self._hold = self._around.clock() + self._around.timing.turnaround_delay
-            return Verdict(Kind.NOTHING)
+            return ExchangeResult(ResultKind.NOTHING)
         await asyncio.wait((self._done,), timeout=sending.time_out)
         if self.failure is not None:
             raise self.failure
-        return self._done.result() if self._done.done() else Verdict(Kind.NOTHING)
+        return self._done.result() if self._done.done() else ExchangeResult(ResultKind.NOTHING)
 
 
-def _verdict(unit: bytes, sending: Sending) -> Verdict:
+def _verdict(unit: bytes, sending: Sending) -> ExchangeResult:
     """What a reply with the right transaction id is."""
     expectation = sending.expectation
     assert expectation is not None
-    device, pdu = unit[6], unit[HEADER:]
+    device, pdu = unit[6], unit[HEADER_LENGTH:]
     if device != sending.device:
-        return Verdict(Kind.WRONG, detail=f"unit {device} answered", received=unit)
+        return ExchangeResult(ResultKind.WRONG, detail=f"unit {device} answered", received=unit)
     if expectation.fits(pdu):
-        return Verdict(Kind.REPLY, pdu=pdu, received=unit)
+        return ExchangeResult(ResultKind.REPLY, pdu=pdu, received=unit)
     code = exception_code(expectation.function, pdu)
     if code is not None:
-        return Verdict(Kind.EXCEPTION, pdu=pdu, exception=code, received=unit)
-    return Verdict(Kind.WRONG, detail=expectation.mismatch(pdu), received=unit)
+        return ExchangeResult(ResultKind.EXCEPTION, pdu=pdu, exception=code, received=unit)
+    return ExchangeResult(ResultKind.WRONG, detail=expectation.mismatch(pdu), received=unit)

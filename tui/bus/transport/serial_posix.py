@@ -12,7 +12,7 @@ import serial
 from .base import Receiver
 
 LUMP = 4096
-COARSE = 0.0025
+WAITED_ON_PORT = 0.0025
 """The loop wakes to the millisecond only; the last part of a pause is waited on the port."""
 SPIN = 0.00008
 """The system wakes a sleeper that much late; the very last part is waited in a short loop."""
@@ -91,8 +91,8 @@ class PosixSerial:
     async def rest(self, until: float) -> None:
         """Wait until `until`; returns early once bytes have been received."""
         left = until - time.monotonic()
-        if left > COARSE:
-            await asyncio.sleep(left - COARSE)
+        if left > WAITED_ON_PORT:
+            await asyncio.sleep(left - WAITED_ON_PORT)
         while self._fd is not None:
             left = until - time.monotonic()
             if left <= 0:

@@ -12,7 +12,7 @@ import serial
 from .base import Receiver
 
 READ_TIMEOUT = 0.05
-COARSE = 0.002
+COARSE_SLEEP = 0.002
 JOIN_TIMEOUT = 1.0
 
 
@@ -58,8 +58,8 @@ class ThreadedSerial:
     async def rest(self, until: float) -> None:
         """Wait until `until`."""
         left = until - time.monotonic()
-        if left > COARSE:
-            await asyncio.sleep(left - COARSE)
+        if left > COARSE_SLEEP:
+            await asyncio.sleep(left - COARSE_SLEEP)
         left = until - time.monotonic()
         if left > 0:
             # a loop wakes to the millisecond only, which is half of the silence due

@@ -30,11 +30,11 @@ def backup(target: Target, file: Path, force: bool) -> None:
     The file is TOML, made for a diff. To change a value by hand, write it into `value` and take
     `raw` out of that line.
     """
-    from tui.drive.settings.parameter_set import dumps
+    from tui.drive.settings.parameter_set import dump_set
 
     refuse_existing(file, force=force)
     session, values = set_of_drive(target)
-    write_down(file, dumps(session.profile, values), force=force)
+    write_down(file, dump_set(session.profile, values), force=force)
     say(f"{file}: {len(values.raws)} parameters of {session.profile.name}")
     for code, why in values.absent.items():
         say(f"drivepanel: {code} could not be read: {why}", err=True)

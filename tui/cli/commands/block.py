@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.block_output import show_blocks, show_neighbours
-from ..shared.errors import DONE, DRIVE_REFUSED, REFUSED_HERE, USAGE, Failure, told
+from ..shared.errors import DIFFERENT, DONE, DRIVE_REFUSED, REFUSED_HERE, USAGE, Failure, told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     json_option,
     line_argument,
     on_line,
@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
-DIFFERENT = 1
-"""Exit status of `verify` where a slot does not bring what it stands for."""
-ACTIONS = ("show", "verify", "set", "factory", "load", "save")
+BLOCK_COMMANDS = ("show", "verify", "set", "factory", "load", "save")
 WRITING = frozenset({"set", "factory", "load"})
 
 
@@ -47,7 +45,7 @@ class Wanted:
 
 @click.command()
 @line_argument
-@click.argument("action", type=click.Choice(ACTIONS), default="show")
+@click.argument("action", type=click.Choice(BLOCK_COMMANDS), default="show")
 @click.argument("words", nargs=-1, metavar="[SLOT=CODE... | FILE]")
 @dry_run_option
 @arm_option
@@ -84,7 +82,7 @@ def block(
         need_arming(arm, "this changes what the drive's blocks stand for")
 
     async def work(opened: OpenLine) -> int:
-        session = await connect(opened, target)
+        session = await connect_drive(opened, target)
         return await _carry_out(session, target.line_text, wanted)
 
     status = on_line(target.line_text, work, read_only=read_only or not writes)
@@ -139,9 +137,9 @@ async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
 
 def _status(views: list[BlockView]) -> int:
     """0 where every slot in use that can be compared brings what it stands for."""
-    from tui.session.read.verdict import Verdict
+    from tui.session.read.verdict import SlotMatch
 
-    wrong = (Verdict.DIFFERS, Verdict.CHANGED, Verdict.NONE)
+    wrong = (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE)
     for view in views:
         refused = view.block.direction == "read" and view.trouble
         if refused or any(
@@ -152,13 +150,13 @@ def _status(views: list[BlockView]) -> int:
 
 
 def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
-    from tui.drive.blocks.file import dumps
+    from tui.drive.blocks.file import dump_blocks
 
     plans = [plan for view in views if (plan := view.plan) is not None]
     if len(plans) != len(views):
         raise Failure("Not every slot could be read; nothing was saved.", DRIVE_REFUSED)
     note = f"{session.profile.name}, device {session.device}, {session.line_text}"
-    write_down(file, dumps(session.profile, plans, note))
+    write_down(file, dump_blocks(session.profile, plans, note))
     say(f"{file}: {sum(len(plan.raws) for plan in plans)} slots of {session.profile.name}")
     return DONE
 
@@ -168,7 +166,7 @@ def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
 
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.bus.errors import DeviceException
-    from tui.drive.blocks.assignment import changes, describe, problems, refusing
+    from tui.drive.blocks.assignment import assignment_problems, describe, refusing, slot_changes
     from tui.session.blocks.write import AssignmentRefused, write_assignment
     from tui.session.journal import Journal
     from tui.session.settings.write import NotTaken
@@ -176,14 +174,14 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     held, plans = await _plans(session, wanted)
     refused: list[str] = []
     for plan in plans:
-        found = problems(session.profile, plan)
+        found = assignment_problems(session.profile, plan)
         refused += [problem.text for problem in refusing(found)]
         for problem in found:
             if not problem.refuses:
                 say(problem.text, err=wanted.as_json)
         if not wanted.dry_run:
             continue
-        for change in changes(held, plan):
+        for change in slot_changes(held, plan):
             was, will = (describe(session.profile, plan.block, r) for r in (change.old, change.new))
             say(f"write  {change.slot}: {was} -> {will}")
     if refused:
@@ -243,13 +241,13 @@ async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int],
 
 def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
     from tui.drive.blocks.assignment import MappingError
-    from tui.drive.blocks.file import loads
+    from tui.drive.blocks.file import load_blocks
 
     if wanted.action != "load":
         return {}
     file = wanted.words[0]
     try:
-        return loads(Path(file).read_text(encoding="utf-8"), file, session.profile)
+        return load_blocks(Path(file).read_text(encoding="utf-8"), file, session.profile)
     except (OSError, UnicodeDecodeError) as error:
         raise Failure(f"{file} cannot be read: {error}.", USAGE) from error
     except MappingError as error:

@@ -7,17 +7,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import USAGE, Failure, told
+from ..shared.errors import DIFFERENT, USAGE, Failure, told
 from ..shared.options import Target, devices_option
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
 
 if TYPE_CHECKING:
-    from tui.drive.settings.compare import Format
+    from tui.drive.settings.compare import TableFormat
     from tui.drive.settings.parameter_set import ParameterSet
 
 FACTORY = "factory"
-DIFFERENT = 1
 
 
 @click.command()
@@ -39,7 +38,7 @@ def compare(
     a: str,
     b: str,
     all_rows: bool,
-    format_: Format,
+    format_: TableFormat,
     profile_id: str | None,
     devices: tuple[int, ...],
 ) -> None:
@@ -49,9 +48,9 @@ def compare(
     where some differ.
     """
     from tui.drive.profile import library
-    from tui.drive.settings.compare import compare as rows_of
+    from tui.drive.settings.compare import compare_settings as rows_of
     from tui.drive.settings.compare import factory_side, side_of
-    from tui.drive.settings.compare import told as table
+    from tui.drive.settings.compare import rows_text as table
 
     if len(devices) > 2:
         raise click.UsageError("-d is given once, or once for A and once for B.")

@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 @told
 def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> None:
     """Ask a drive who it is (function 43)."""
-    from tui.session.connect.identify import identify as ask
+    from tui.session.connect.identify import identify_drive as ask
 
     from ..shared.output import print_json
 

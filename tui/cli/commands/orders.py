@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tui.drive.orders import OrderRefused
-from tui.session.work import Kind, Outcome
+from tui.session.work import Outcome, OutcomeKind
 
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     drive_options,
     line_argument,
     on_line,
@@ -31,12 +31,12 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.monitor.line_watch import Watch
+    from tui.session.monitor.line_watch import TimeoutWatch
     from tui.session.monitor.monitor import Snapshot
     from tui.session.starts.keeper import StartKeeper
     from tui.session.work import Permit
 
-LOOK = 0.02
+COMMAND_POLL_INTERVAL = 0.02
 """Seconds between two looks at what the line's thread has come to."""
 PERIOD = 0.25
 """Wished time of a cycle of the monitor in seconds."""
@@ -89,7 +89,7 @@ async def watched(
 
     from .status import shown_codes
 
-    session = await connect(opened, target)
+    session = await connect_drive(opened, target)
     journal = Journal()
     # the motors of a simulated line end with it
     fleet = Fleet(opened.line, journal, None if opened.simulation else starts)
@@ -112,7 +112,7 @@ async def _first_look(console: DriveConsole) -> None:
             return
         if latest is not None and latest.cycle >= FIRST_TRIES:
             raise Failure(latest.error, LINE_TROUBLE)
-        await asyncio.sleep(LOOK)
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
 
 
 def permit_of(session: DriveSession) -> Permit:
@@ -145,7 +145,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     outcome = work.outcome if work.outcome is not before else None
     if outcome is None:
         raise Failure("The order was not sent: a newer one took its place.", REFUSED_HERE)
-    if outcome.kind is Kind.REFUSED:
+    if outcome.kind is OutcomeKind.REFUSED:
         raise Failure(outcome.text + _way_on(outcome.error), _status(outcome.error))
     return outcome
 
@@ -163,7 +163,7 @@ async def _until(holds: Callable[[], bool]) -> None:
     while True:
         if holds():
             return
-        await asyncio.sleep(LOOK)
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
 
 
 def _status(error: Exception | None) -> int:
@@ -180,7 +180,7 @@ def need_arming(arm: bool, does: str) -> None:
         )
 
 
-async def watch_of(fleet: Fleet, console: DriveConsole) -> Watch | None:
+async def watch_of(fleet: Fleet, console: DriveConsole) -> TimeoutWatch | None:
     """A kept drive's watch over the line; None where it has none, or it is off.
 
     Raises Failure where it could not be learnt.
@@ -193,10 +193,10 @@ async def watch_of(fleet: Fleet, console: DriveConsole) -> Watch | None:
     if raw is None or raw in (rules.off, 0):
         return None
     end = asyncio.get_running_loop().time() + LEARNT_WITHIN
-    while (watch := fleet.keeper.watch(console.device)) is None:
+    while (watch := fleet.line_watch.watch(console.device)) is None:
         if asyncio.get_running_loop().time() > end:
             raise Failure(f"{rules.timeout} is set and could not be learnt.", LINE_TROUBLE)
-        await asyncio.sleep(LOOK)
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
     return watch
 
 
@@ -268,7 +268,7 @@ async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
             return
         if latest.time > end:
             break
-        await asyncio.sleep(LOOK)
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
     if latest.error:
         raise Failure(latest.error, LINE_TROUBLE)
     raise Failure(

@@ -9,7 +9,7 @@ import click
 from ..shared.errors import DRIVE_REFUSED, told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     drive_options,
     json_option,
     line_argument,
@@ -47,7 +47,7 @@ def read(
     from ..shared.output import print_json, print_readings, readings_json
 
     async def work(opened: OpenLine) -> tuple[DriveSession, dict[str, Reading]]:
-        session = await connect(opened, target)
+        session = await connect_drive(opened, target)
         wanted = [session.profile.find(code).code for code in codes]
         return session, await Reader(session).read(wanted)
 

@@ -32,7 +32,7 @@ def report(target: Target, file: Path, force: bool) -> None:
     """
     from tui.session.journal import Journal
     from tui.session.report import entries_of
-    from tui.session.report import report as text_of
+    from tui.session.report import report_text as text_of
 
     refuse_existing(file, force=force)
     session, values = set_of_drive(target)

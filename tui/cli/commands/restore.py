@@ -11,7 +11,7 @@ import click
 from ..shared.errors import DONE, DRIVE_REFUSED, status_of, told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     devices_option,
     line_argument,
     on_line,
@@ -39,7 +39,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
-NAMED = 12
+CODES_NAMED = 12
 """How many codes are named for one reason; --dry-run names all."""
 
 
@@ -90,7 +90,7 @@ def restore(
     async def one(opened: OpenLine, device: int) -> int:
         from tui.drive.settings.restore_plan import Options
 
-        session = await connect(opened, Target(line_text, device, profile_id))
+        session = await connect_drive(opened, Target(line_text, device, profile_id))
         codes = codes_of(session, confirmed)
         options = Options(line_settings, rating, codes)
         if dry_run:
@@ -166,7 +166,7 @@ async def _restore(
     from tui.session.journal import Journal
     from tui.session.settings.eeprom import save_to_eeprom
     from tui.session.settings.restore import Mark
-    from tui.session.settings.restore import restore as bring_back
+    from tui.session.settings.restore import restore_set as bring_back
 
     source = library.load(values.head.profile)
     if told_before := Mark.of(session).interrupted:
@@ -201,5 +201,5 @@ def say_plan_left_out(plan: RestorePlan) -> None:
         if item.reason != "no setting":
             reasons.setdefault(item.reason, []).append(item.code)
     for reason, codes in reasons.items():
-        more = f" and {len(codes) - NAMED} more" if len(codes) > NAMED else ""
-        say(f"left out, {reason}: {', '.join(codes[:NAMED])}{more}")
+        more = f" and {len(codes) - CODES_NAMED} more" if len(codes) > CODES_NAMED else ""
+        say(f"left out, {reason}: {', '.join(codes[:CODES_NAMED])}{more}")

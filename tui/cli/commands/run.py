@@ -49,17 +49,17 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
-    from tui.session.monitor.line_watch import Watch
+    from tui.session.monitor.line_watch import TimeoutWatch
     from tui.session.monitor.monitor import Snapshot
 
 TOLD_EVERY = 1.0
 """Seconds between two lines about the motor."""
-LOOK = 0.05
-AT_REST = 2
+RUN_POLL_INTERVAL = 0.05
+CYCLES_AT_REST = 2
 """Cycles in a row that show a motor at rest before it counts as stopped by itself."""
-STOPS = 2
+STOPS_THAT_MAY_FAIL = 2
 """Stops that may fail on a line without trouble before it is told that the motor runs."""
-WAITING_LONGEST = 64
+LINES_WAITING = 64
 """Lines kept for a reader that is slower than they come; older ones are dropped."""
 HEARD_OUT = 2.0
 """Seconds that the reader has for the last lines."""
@@ -117,7 +117,7 @@ class Voice:
 
     def __init__(self, gone: Callable[[], None]) -> None:
         self._gone = gone
-        self._lines: queue.Queue[bytes] = queue.Queue(WAITING_LONGEST)
+        self._lines: queue.Queue[bytes] = queue.Queue(LINES_WAITING)
         self._out = sys.stdout.fileno()
         self._encoding = sys.stdout.encoding or "utf-8"
         threading.Thread(target=self._work, name="output", daemon=True).start()
@@ -137,7 +137,7 @@ class Voice:
         """Give the reader time for the last lines."""
         end = time.monotonic() + HEARD_OUT
         while self._lines.unfinished_tasks and time.monotonic() < end:
-            time.sleep(LOOK)
+            time.sleep(RUN_POLL_INTERVAL)
 
     def _work(self) -> None:
         broken = False
@@ -175,7 +175,7 @@ class Run:
     wish: Wish
     voice: Voice
     ending: Ending
-    watch: Watch | None = None
+    watch: TimeoutWatch | None = None
     trouble: float = 0.0
     """When the last cycle failed, time.monotonic()."""
     told: float = 0.0
@@ -235,7 +235,7 @@ class Run:
                 seen = latest.cycle
                 self._show(latest)
                 rest = rest + 1 if self._at_rest(latest) else 0
-            if rest >= AT_REST:
+            if rest >= CYCLES_AT_REST:
                 with suppress(LineError):
                     await self.console.read(self.console.session.followed)
                 text, status = self._stopped_by_itself(latest)
@@ -244,7 +244,7 @@ class Run:
             if self.wish.seconds is not None and time.monotonic() - begun >= self.wish.seconds:
                 self.ending.end(f"after {self.wish.seconds:g} s")
             with suppress(TimeoutError):
-                await asyncio.wait_for(self.ending.event.wait(), LOOK)
+                await asyncio.wait_for(self.ending.event.wait(), RUN_POLL_INTERVAL)
 
     def _at_rest(self, latest: Snapshot) -> bool:
         """Whether it is seen not to run; a drive may stay in its quick stop at 0 Hz."""
@@ -340,7 +340,7 @@ class Run:
             # a ramp may be longer than a stop is followed
             if not bad and latest_of(self.console).state.kind != "stopping":
                 failed += 1
-            if failed == STOPS:
+            if failed == STOPS_THAT_MAY_FAIL:
                 raise Failure(f"Device {session.device}: {report.text}", DRIVE_REFUSED)
 
     def _stands(self) -> bool:
@@ -364,7 +364,7 @@ class Run:
                     )
             elif not latest.error and latest.time > asked:
                 return bad
-            await asyncio.sleep(LOOK)
+            await asyncio.sleep(RUN_POLL_INTERVAL)
 
 
 async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:

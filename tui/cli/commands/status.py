@@ -13,7 +13,7 @@ from tui.drive.plain import plain
 from ..shared.errors import told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     drive_options,
     json_option,
     line_argument,
@@ -28,16 +28,16 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
-    from tui.session.monitor.line_watch import Watch
+    from tui.session.monitor.line_watch import TimeoutWatch
     from tui.session.reading import Reading
 
-SHOWN: dict[Quantity, str] = {
+SHOWN_QUANTITIES: dict[Quantity, str] = {
     "output_frequency": "Output frequency",
     "frequency_reference": "Reference",
     "motor_current": "Current",
 }
 """What tells how a motor turns, and how it is called here."""
-CHANNELS: dict[Quantity, str] = {
+CHANNEL_NAMES: dict[Quantity, str] = {
     "command_channel": "Commanded by",
     "reference_channel": "Reference from",
 }
@@ -53,19 +53,19 @@ class Status:
     channels: Mapping[str, str]
     refused: str
     """Why a run order from here would have no effect; empty where it would have one."""
-    watch: Watch | None
+    watch: TimeoutWatch | None
 
 
 def shown_codes(profile: Profile) -> list[str]:
     """Codes of what is SHOWN, as far as the profile has them."""
-    found = (profile.quantity(quantity) for quantity in SHOWN)
+    found = (profile.quantity(quantity) for quantity in SHOWN_QUANTITIES)
     return [parameter.code for parameter in found if parameter is not None]
 
 
 def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, str]:
     """What is SHOWN by its name, with units; `-----` where it was not read just now."""
     values = {}
-    for quantity, name in SHOWN.items():
+    for quantity, name in SHOWN_QUANTITIES.items():
         parameter = profile.quantity(quantity)
         if parameter is not None:
             values[name] = _text(readings.get(parameter.code))
@@ -108,7 +108,7 @@ def _codes(profile: Profile) -> list[str]:
     from tui.drive.chart import watched_codes
     from tui.drive.orders import deciding_codes, interlock_codes
 
-    channels = [profile.quantity(quantity) for quantity in CHANNELS]
+    channels = [profile.quantity(quantity) for quantity in CHANNEL_NAMES]
     codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
     codes += [parameter.code for parameter in channels if parameter is not None]
     codes += deciding_codes(profile)
@@ -123,7 +123,7 @@ def _channels(
     from tui.session.drive_state import channel_text
 
     found = {}
-    for quantity, name in CHANNELS.items():
+    for quantity, name in CHANNEL_NAMES.items():
         parameter = profile.quantity(quantity)
         found[name] = channel_text(parameter, readings.get(parameter.code)) if parameter else ""
     # some families tell who commands in their status word
@@ -166,7 +166,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
     }
 
 
-def watch_json(watch: Watch | None) -> dict[str, Any] | None:
+def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
     """A drive's watch over the line; null where it has none."""
     if watch is None:
         return None
@@ -183,14 +183,14 @@ def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, 
     from ..shared.output import reading_json
 
     values: dict[str, Any] = {}
-    for quantity in SHOWN:
+    for quantity in SHOWN_QUANTITIES:
         parameter = profile.quantity(quantity)
         reading = readings.get(parameter.code) if parameter else None
         values[quantity] = reading_json(reading) if reading is not None else None
     return values
 
 
-def status_lines(status: Status) -> list[tuple[str, str]]:
+def status_table(status: Status) -> list[tuple[str, str]]:
     """Titles and texts of `status` for a person."""
     state, profile = status.state, status.session.profile
     return [
@@ -230,11 +230,11 @@ def status(
     from ..shared.output import print_json
 
     async def work(opened: OpenLine) -> Status:
-        return await status_of_drive(await connect(opened, target), opened)
+        return await status_of_drive(await connect_drive(opened, target), opened)
 
     found = on_line(target.line_text, work, read_only=read_only)
     if as_json:
         print_json(status_json(target.line_text, found))
         return
-    for title, text in status_lines(found):
+    for title, text in status_table(found):
         say(f"{title:<17} {plain(text) or '-----'}")

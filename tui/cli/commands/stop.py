@@ -13,7 +13,7 @@ import click
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     drive_options,
     line_argument,
     on_line,
@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 USUAL_ADDRESSES = "1-10"
-LOOK = 0.05
+STOP_POLL_INTERVAL = 0.05
 
 
 @click.command()
@@ -96,33 +96,33 @@ async def ended(stopper: Stopper, device: int) -> StopReport:
         report = stopper.reports[device]
         if report.phase in (Phase.STOPPED, Phase.FAILED):
             return report
-        await asyncio.sleep(LOOK)
+        await asyncio.sleep(STOP_POLL_INTERVAL)
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class StoppableDrive:
     """A drive that can be stopped, and what it is called."""
 
     session: DriveSession
     name: str
 
 
-async def _wanted(opened: OpenLine, target: Target) -> Found:
+async def _wanted(opened: OpenLine, target: Target) -> StoppableDrive:
     """The wanted drive; raises UsageError where it is not known what stops it."""
     from tui.drive.profile import library
-    from tui.session.connect.identify import identify
+    from tui.session.connect.identify import identify_drive
 
     if target.profile_id is None:
-        identity = await identify(opened.line, target.device)
+        identity = await identify_drive(opened.line, target.device)
         found = await asyncio.to_thread(_session, opened, identity, None)
         if found is None:
             raise unidentified(identity)
         return found
-    session = await connect(opened, target)
-    return Found(session, library.load(target.profile_id).name)
+    session = await connect_drive(opened, target)
+    return StoppableDrive(session, library.load(target.profile_id).name)
 
 
-async def _stop_one(opened: OpenLine, found: Found, order: OrderId) -> int:
+async def _stop_one(opened: OpenLine, found: StoppableDrive, order: OrderId) -> int:
     from tui.session.command.stop import Stopper
     from tui.session.journal import Journal
 
@@ -139,7 +139,7 @@ async def _stop_one(opened: OpenLine, found: Found, order: OrderId) -> int:
         close_journal(journal)
 
 
-async def _seen_through(stopper: Stopper, found: Found, order: OrderId) -> int:
+async def _seen_through(stopper: Stopper, found: StoppableDrive, order: OrderId) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
     from tui.session.command.stop import Phase
 
@@ -213,18 +213,18 @@ async def _stop_all(
 
 async def _found(
     opened: OpenLine, device: int, profile_id: str | None, *, patient: bool
-) -> Found | None:
+) -> StoppableDrive | None:
     """The drive at an address; None where nobody answers yet.
 
     Raises Failure where it cannot be stopped, and why.
     """
     from tui.bus.errors import LineError, NoAnswer
     from tui.bus.line import Priority
-    from tui.session.connect.identify import identify
+    from tui.session.connect.identify import identify_drive
 
     priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
     try:
-        identity = await identify(opened.line, device, priority=priority)
+        identity = await identify_drive(opened.line, device, priority=priority)
     except NoAnswer:
         return None
     except LineError as error:
@@ -241,7 +241,9 @@ async def _found(
     )
 
 
-def _session(opened: OpenLine, identity: DriveIdentity, profile_id: str | None) -> Found | None:
+def _session(
+    opened: OpenLine, identity: DriveIdentity, profile_id: str | None
+) -> StoppableDrive | None:
     """A session with the drive; None where it is not known what stops it.
 
     A drive that does not say who it is may belong to several families: where the same words stop
@@ -256,4 +258,4 @@ def _session(opened: OpenLine, identity: DriveIdentity, profile_id: str | None) 
     if not stop_alike(profiles):
         return None
     session = DriveSession(opened.line, identity.device, profiles[0], identity)
-    return Found(session, " or ".join(profile.name for profile in profiles))
+    return StoppableDrive(session, " or ".join(profile.name for profile in profiles))

@@ -15,7 +15,7 @@ import click
 from ..shared.errors import LINE_TROUBLE, Failure, told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     drive_options,
     json_option,
     line_argument,
@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.monitor.monitor import Snapshot
 
-WAITING_LONGEST = 64
+SNAPSHOTS_WAITING = 64
 """Snapshots kept for an output that is slower than the line; older ones are dropped."""
 
 
@@ -73,7 +73,7 @@ def watch(
     async def work(opened: OpenLine) -> None:
         from tui.session.monitor.monitor import monitoring_codes
 
-        session = await connect(opened, target)
+        session = await connect_drive(opened, target)
         wanted = [session.profile.find(code).code for code in codes] or None
         shown = wanted or monitoring_codes(session.profile)
         with ExitStack() as stack:
@@ -105,7 +105,7 @@ async def _follow(
     from tui.session.monitor.monitor import Monitor
 
     loop = asyncio.get_running_loop()
-    cycles: asyncio.Queue[Snapshot] = asyncio.Queue(WAITING_LONGEST)
+    cycles: asyncio.Queue[Snapshot] = asyncio.Queue(SNAPSHOTS_WAITING)
 
     def put(snapshot: Snapshot) -> None:
         if cycles.full():

@@ -9,7 +9,7 @@ import click
 from ..shared.errors import DONE, told
 from ..shared.options import (
     Target,
-    connect,
+    connect_drive,
     line_argument,
     on_line,
     read_only_option,
@@ -62,7 +62,7 @@ def write(
         need_arming(arm, "this writes settings of the drive")
 
     async def work(opened: OpenLine) -> int:
-        session = await connect(opened, target)
+        session = await connect_drive(opened, target)
         edits = await _staged(session, typed)
         if dry_run:
             for edit in edits:
@@ -90,24 +90,24 @@ async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
     from tui.drive.errors import ValueRefused
     from tui.drive.settings.edits import Edits, consequences
     from tui.drive.shown import scale_sources
-    from tui.session.read.retrying_reader import Asker
+    from tui.session.read.retrying_reader import RetryingReader
 
     profile = session.profile
     pairs = [(profile.find(code).code, value) for code, value in typed]
     sources = scale_sources(profile)
     follow = [p.code for p in profile.parameters if p.scale_by and {c for c, _ in pairs} & sources]
-    asker = Asker(session)
-    await asker.ask_many([code for code, _ in pairs] + sorted(sources) + follow)
+    retrying = RetryingReader(session)
+    await retrying.ask_many([code for code, _ in pairs] + sorted(sources) + follow)
     edits = Edits()
     # scale sources first: what is typed for a ramp holds under the new scale
     for code, value in sorted(pairs, key=lambda pair: pair[0] not in sources):
         if profile[code].access == "r":
             raise ValueRefused(f"{code} can only be read.")
-        edits = edits.stage(profile, code, value, asker.raws, asker.lacking)
+        edits = edits.stage(profile, code, value, retrying.raws, retrying.lacking)
     for edit in edits.asked:
         if edit.remark:
             say(edit.remark)
-    for text in consequences(profile, edits, asker.raws, asker.lacking):
+    for text in consequences(profile, edits, retrying.raws, retrying.lacking):
         say(text)
     return edits
 

@@ -69,12 +69,12 @@ def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
 
 
 def _frame(session: DriveSession, view: BlockView) -> str:
-    from tui.drive.blocks.wire_cost import frame
+    from tui.drive.blocks.wire_cost import block_request
     from tui.wire.frames import hex_text
 
     inputs = view.plan if view.block.direction == "read" else None
     outputs = view.plan if view.block.direction == "write" else None
-    return hex_text(frame(session.profile, session.device, inputs, outputs))
+    return hex_text(block_request(session.profile, session.device, inputs, outputs))
 
 
 def view_json(session: DriveSession, view: BlockView) -> dict[str, Any]:

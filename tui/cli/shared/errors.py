@@ -14,7 +14,7 @@ import click
 
 from .say import say
 
-DONE, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE = 0, 2, 3, 4, 5
+DONE, DIFFERENT, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE = range(6)
 
 P = ParamSpec("P")
 R = TypeVar("R")

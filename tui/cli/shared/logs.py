@@ -15,9 +15,9 @@ from tui.session.paths import state_folder
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""
 LEVELS = (logging.INFO, logging.DEBUG)
-MOST = 10_000
+LOG_BACKLOG = 10_000
 """Entries that wait for a disk which takes none; later ones are lost."""
-PATIENCE = 2.0
+LOG_PATIENCE = 2.0
 """Seconds that who closes the log waits for the disk."""
 
 
@@ -25,7 +25,7 @@ class Later(QueueHandler):
     """Hands entries to a thread: a disk that hangs holds up no stop."""
 
     def __init__(self, to: logging.Handler) -> None:
-        self._entries: Queue[logging.LogRecord | None] = Queue(MOST)
+        self._entries: Queue[logging.LogRecord | None] = Queue(LOG_BACKLOG)
         super().__init__(self._entries)
         self._to = to
         self._thread = Thread(target=self._work, name="log", daemon=True)
@@ -42,7 +42,7 @@ class Later(QueueHandler):
         atexit.unregister(self.close)
         with suppress(Full):
             self._entries.put_nowait(None)
-        self._thread.join(PATIENCE)
+        self._thread.join(LOG_PATIENCE)
         super().close()
 
     def _work(self) -> None:

@@ -16,8 +16,8 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 T = TypeVar("T")
-Command = Callable[..., Any]
-Option = Callable[[Command], Command]
+CommandFunction = Callable[..., Any]
+Option = Callable[[CommandFunction], CommandFunction]
 
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
@@ -76,7 +76,7 @@ class Target:
 def _target_of(*options: Option) -> Option:
     """Options that, with the LINE of `line_argument`, reach the command as one `target`."""
 
-    def decorate(command: Command) -> Command:
+    def decorate(command: CommandFunction) -> CommandFunction:
         @functools.wraps(command)
         def handed_over(
             line_text: str,
@@ -87,7 +87,7 @@ def _target_of(*options: Option) -> Option:
         ) -> Any:
             return command(target=Target(line_text, device, profile_id, rated_current), **others)
 
-        decorated: Command = handed_over
+        decorated: CommandFunction = handed_over
         for option in reversed(options):
             decorated = option(decorated)
         return decorated
@@ -117,19 +117,19 @@ def on_line(
         opened.close()
 
 
-async def connect(opened: OpenLine, target: Target) -> DriveSession:
+async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     """The wanted drive with its profile, identified where none was named.
 
     Raises UnidentifiedDrive with what to type where the drive does not say who it is.
     """
     from tui.drive.profile import library
-    from tui.session.connect.identify import identify
+    from tui.session.connect.identify import identify_drive
     from tui.session.drive import DriveSession
 
     identity: DriveIdentity | None = None
     profile_id = target.profile_id
     if profile_id is None:
-        identity = await identify(opened.line, target.device)
+        identity = await identify_drive(opened.line, target.device)
         profile_id = identity.profile
         if profile_id is None:
             raise unidentified(identity)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 import click
 
 from .errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, USAGE, Failure
-from .options import Target, connect, on_line
+from .options import Target, connect_drive, on_line
 from .say import say, say_over
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 OUTAGE = 20.0
 """Seconds for which a read-out waits for a lost line to come back."""
-LOOK = 0.1
+SET_POLL_INTERVAL = 0.1
 
 file_argument = click.argument("file", type=click.Path(path_type=Path))
 force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
@@ -80,7 +80,7 @@ def set_of_drive(target: Target) -> tuple[DriveSession, ParameterSet]:
     """A drive and every readable parameter of it, read now on a line that is not written to."""
 
     async def work(opened: OpenLine) -> tuple[DriveSession, ParameterSet]:
-        session = await connect(opened, target)
+        session = await connect_drive(opened, target)
         return session, await take_set(session)
 
     return on_line(target.line_text, work, read_only=True)
@@ -89,12 +89,12 @@ def set_of_drive(target: Target) -> tuple[DriveSession, ParameterSet]:
 async def take_set(session: DriveSession) -> ParameterSet:
     """Every readable parameter of a drive, with who it is, as far as it says so."""
     from tui.bus.errors import ExchangeError
-    from tui.session.connect.identify import identify
+    from tui.session.connect.identify import identify_drive
     from tui.session.read.upload import Upload
 
     if session.identity is None and session.profile.function(43) is not None:
         try:
-            session.identity = await identify(session.line, session.device)
+            session.identity = await identify_drive(session.line, session.device)
         except ExchangeError:
             session.identity = None
     upload = Upload(session, progress=counter("Read"))
@@ -119,7 +119,7 @@ async def read_out(upload: Upload) -> None:
             while line.state.status is not LineStatus.CONNECTED:
                 if time.monotonic() > end:
                     raise
-                await asyncio.sleep(LOOK)
+                await asyncio.sleep(SET_POLL_INTERVAL)
 
 
 def counter(what: str) -> Callable[[int, int], None] | None:
@@ -141,15 +141,15 @@ def say_result(done: int, of: int, result: Result) -> None:
 
 def status_of_results(results: Iterable[Result]) -> int:
     """The exit status of a number of writes: the worst that has happened."""
-    from tui.session.settings.apply import Outcome
+    from tui.session.settings.apply import EditOutcome
 
     table = {
-        Outcome.DRIVE_REFUSED: DRIVE_REFUSED,
-        Outcome.NOT_TAKEN: DRIVE_REFUSED,
-        Outcome.REFUSED: REFUSED_HERE,
-        Outcome.CHANGED: REFUSED_HERE,
-        Outcome.UNKNOWN: LINE_TROUBLE,
-        Outcome.NOT_SENT: LINE_TROUBLE,
+        EditOutcome.DRIVE_REFUSED: DRIVE_REFUSED,
+        EditOutcome.NOT_TAKEN: DRIVE_REFUSED,
+        EditOutcome.REFUSED: REFUSED_HERE,
+        EditOutcome.CHANGED: REFUSED_HERE,
+        EditOutcome.UNKNOWN: LINE_TROUBLE,
+        EditOutcome.NOT_SENT: LINE_TROUBLE,
     }
     statuses = {table[r.outcome] for r in results if r.outcome in table}
     order = (LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE)

@@ -58,7 +58,7 @@ class Assignment:
 
 
 @dataclass(frozen=True, slots=True)
-class Change:
+class SlotChange:
     """One slot whose raw value differs between two assignments."""
 
     slot: str
@@ -99,7 +99,7 @@ def factory(profile: Profile, block: Block) -> Assignment:
     return Assignment(block, tuple(profile[slot].factory or UNUSED for slot in block.slots))
 
 
-def target(profile: Profile, block: Block, raw: int) -> Parameter | None:
+def slot_target(profile: Profile, block: Block, raw: int) -> Parameter | None:
     """The parameter that a slot's raw value stands for; None for unused and unknown ones."""
     if raw == UNUSED:
         return None
@@ -188,25 +188,25 @@ def choices(profile: Profile, block: Block, search: str = "") -> list[Parameter]
     return sorted(found, key=lambda p: not p.code.casefold().startswith(wanted[0]))
 
 
-def changes(before: Mapping[str, int], after: Assignment) -> list[Change]:
+def slot_changes(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
     """The slots that would be written, against raw values by slot as they are."""
     return [
-        Change(slot, before.get(slot), raw)
+        SlotChange(slot, before.get(slot), raw)
         for slot, raw in after.slots.items()
         if before.get(slot) != raw
     ]
 
 
-def steps(before: Mapping[str, int], after: Assignment) -> list[Change]:
+def steps(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
     """The writes that lead from one assignment to another, one slot at a time.
 
     A slot whose content goes to another slot is set to 0 first: at no moment do two slots
     stand for the same parameter, so an output is never taken from two places.
     """
-    found = changes(before, after)
+    found = slot_changes(before, after)
     wanted = {change.new for change in found} - {UNUSED}
     freed = [c for c in found if c.old not in (None, UNUSED) and c.old in wanted]
-    first = [Change(change.slot, change.old, UNUSED) for change in freed]
+    first = [SlotChange(change.slot, change.old, UNUSED) for change in freed]
     zeroed = {change.slot for change in first}
     rest = [
         replace(change, old=UNUSED) if change.slot in zeroed else change
@@ -217,7 +217,9 @@ def steps(before: Mapping[str, int], after: Assignment) -> list[Change]:
     return first + sorted(rest, key=lambda change: change.new != UNUSED)
 
 
-def problems(profile: Profile, plan: Assignment, unreadable: Collection[str] = ()) -> list[Problem]:
+def assignment_problems(
+    profile: Profile, plan: Assignment, unreadable: Collection[str] = ()
+) -> list[Problem]:
     """What is wrong with an assignment, or should be known of it, in the order of the slots.
 
     `unreadable` names parameters that this drive said it does not have.
@@ -245,7 +247,7 @@ def refusing(found: Iterable[Problem]) -> list[Problem]:
 def _of_slot(
     profile: Profile, block: Block, slot: str, raw: int, unreadable: Collection[str]
 ) -> list[Problem]:
-    parameter = target(profile, block, raw)
+    parameter = slot_target(profile, block, raw)
     if parameter is None:
         what = f"{raw} (16#{raw:04X})"
         if block.selects_by == "choice":
@@ -320,7 +322,7 @@ def _writes_block(block: Block) -> bool:
 
 
 def _name(profile: Profile, block: Block, raw: int) -> str:
-    parameter = target(profile, block, raw)
+    parameter = slot_target(profile, block, raw)
     return parameter.code if parameter else f"{raw} (16#{raw:04X})"
 
 

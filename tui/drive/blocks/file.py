@@ -12,28 +12,28 @@ import tomli
 from ..errors import DriveError
 from ..profile.profile import Profile
 from ..profile.schema import Block
-from .assignment import UNUSED, Assignment, MappingError, raw_named, target
+from .assignment import UNUSED, Assignment, MappingError, raw_named, slot_target
 
-FORMAT = 1
+BLOCK_FILE_FORMAT = 1
 HEAD = "mapping"
-END = "end"
+END_OF_BLOCKS = "end"
 _AT = re.compile(r"\(at line (\d+), column \d+\)|\(at end of document\)")
 _TABLE = re.compile(r"\s*\[\s*\"?([A-Za-z0-9_.-]+)\"?\s*\]")
 _KEY = re.compile(r"\s*(?:\"([^\"]*)\"|'([^']*)'|([A-Za-z0-9_-]+))\s*=")
 
 
-def dumps(profile: Profile, plans: Sequence[Assignment], note: str = "") -> str:
+def dump_blocks(profile: Profile, plans: Sequence[Assignment], note: str = "") -> str:
     """The text of a file with these assignments; `note` is put into its first lines."""
     lines = [f"# {line}" for line in note.splitlines()]
-    lines += [f"[{HEAD}]", f"format = {FORMAT}", f"profile = {json.dumps(profile.id)}"]
+    lines += [f"[{HEAD}]", f"format = {BLOCK_FILE_FORMAT}", f"profile = {json.dumps(profile.id)}"]
     for plan in plans:
         lines += ["", f"[{plan.block.id}]"]
         lines += [_line(profile, plan.block, slot, raw) for slot, raw in plan.slots.items()]
     count = sum(len(plan.raws) for plan in plans)
-    return "\n".join([*lines, "", f"[{END}]", f"slots = {count}", ""])
+    return "\n".join([*lines, "", f"[{END_OF_BLOCKS}]", f"slots = {count}", ""])
 
 
-def loads(text: str, file: str, profile: Profile) -> dict[str, Assignment]:
+def load_blocks(text: str, file: str, profile: Profile) -> dict[str, Assignment]:
     """The assignments in a text, by the id of their block.
 
     Raises MappingError with file and line for what is cut short, of another family, no slot of
@@ -48,7 +48,7 @@ def loads(text: str, file: str, profile: Profile) -> dict[str, Assignment]:
     blocks = {block.id: block for block in profile.data.blocks}
     found: dict[str, Assignment] = {}
     for name, table in tables.items():
-        if name in (HEAD, END):
+        if name in (HEAD, END_OF_BLOCKS):
             continue
         if name not in blocks or not isinstance(table, dict):
             known = ", ".join(blocks) or "none"
@@ -61,7 +61,7 @@ def loads(text: str, file: str, profile: Profile) -> dict[str, Assignment]:
 
 
 def _line(profile: Profile, block: Block, slot: str, raw: int) -> str:
-    parameter = target(profile, block, raw)
+    parameter = slot_target(profile, block, raw)
     if raw == UNUSED:
         return f'{slot} = "none"'
     if parameter is None:
@@ -101,7 +101,11 @@ def _raw(profile: Profile, block: Block, value: object) -> int:
         raise MappingError(f"{value!r} is neither a code nor a number.")
     if not 0 <= value <= 0xFFFF:
         raise MappingError(f"{value} is no word: 0 to 65535.")
-    if value != UNUSED and block.selects_by == "choice" and target(profile, block, value) is None:
+    if (
+        value != UNUSED
+        and block.selects_by == "choice"
+        and slot_target(profile, block, value) is None
+    ):
         raise MappingError(f"{value} is none of the {len(block.choices)} choices of the block.")
     return value
 
@@ -115,8 +119,9 @@ def _check_head(
     head = tables.get(HEAD)
     if not isinstance(head, dict) or "format" not in head:
         raise MappingError(f"{file}:1: this is no assignment: [{HEAD}] with format is missing.")
-    if head["format"] != FORMAT:
-        text = f"this assignment has format {head['format']}; this panel reads format {FORMAT}."
+    if head["format"] != BLOCK_FILE_FORMAT:
+        text = f"this assignment has format {head['format']};"
+        text += f" this panel reads format {BLOCK_FILE_FORMAT}."
         raise _fault(file, lines, HEAD, "format", text)
     if head.get("profile") != profile.id:
         text = f"this assignment is for {head.get('profile')!r}, the drive is {profile.id!r}."
@@ -131,13 +136,15 @@ def _check_end(
     count: int,
 ) -> None:
     """Raise MappingError unless the end tells the number of slots that are there."""
-    end = tables.get(END)
+    end = tables.get(END_OF_BLOCKS)
     if not isinstance(end, dict):
         last = text.count("\n") + 1
-        raise MappingError(f"{file}:{last}: the file is cut short: its [{END}] is missing.")
+        raise MappingError(
+            f"{file}:{last}: the file is cut short: its [{END_OF_BLOCKS}] is missing."
+        )
     if end.get("slots") != count:
-        told = f"[{END}] tells {end.get('slots')} slots, the file has {count}."
-        raise _fault(file, lines, END, "slots", told)
+        told = f"[{END_OF_BLOCKS}] tells {end.get('slots')} slots, the file has {count}."
+        raise _fault(file, lines, END_OF_BLOCKS, "slots", told)
 
 
 def _syntax(text: str, file: str, error: Exception) -> MappingError:

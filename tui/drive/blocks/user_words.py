@@ -15,8 +15,8 @@ from ..values import NOT_AVAILABLE
 from .assignment import NONE, MappingError
 
 COUNT = 4
-Format = Literal["hex", "signed", "unsigned"]
-FORMATS: tuple[Format, ...] = get_args(Format)
+WordFormat = Literal["hex", "signed", "unsigned"]
+FORMATS: tuple[WordFormat, ...] = get_args(WordFormat)
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,7 +24,7 @@ class UserWord:
     """One word: its wire address, 0 where none is assigned, and how it is written."""
 
     address: int = 0
-    format: Format = "hex"
+    format: WordFormat = "hex"
 
     def text(self, word: int | None) -> str:
         """The word as it is shown; dashes where there is none."""
@@ -39,7 +39,7 @@ class UserWord:
 UserWords = tuple[UserWord, ...]
 
 
-def word_named(profile: Profile, text: str, format: Format = "hex") -> UserWord:
+def word_named(profile: Profile, text: str, format: WordFormat = "hex") -> UserWord:
     """The word that a person names: a code, a number of the manual, any address, or `none`.
 
     An address that the profile does not know is allowed: the drive decides. Raises MappingError
@@ -58,7 +58,7 @@ def word_named(profile: Profile, text: str, format: Format = "hex") -> UserWord:
     return UserWord(parameter.address, format)
 
 
-def format_named(text: str) -> Format:
+def format_named(text: str) -> WordFormat:
     """The format of a name; raises MappingError."""
     for format in FORMATS:
         if format == text.strip().casefold():

@@ -15,7 +15,7 @@ from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..read_plan import ReadRequest, WireTiming, plan_reads, request_of, run_length
 from ..values import word_count
-from .assignment import Assignment, target
+from .assignment import Assignment, slot_target
 
 
 @dataclass(frozen=True, slots=True)
@@ -101,7 +101,7 @@ def reach(profile: Profile, plan: Assignment, codes: Collection[str]) -> range:
     named = [
         place
         for place, raw in enumerate(plan.raws)
-        if (parameter := target(profile, block, raw)) is not None and parameter.code in codes
+        if (parameter := slot_target(profile, block, raw)) is not None and parameter.code in codes
     ]
     if not named:
         return range(0)
@@ -119,7 +119,7 @@ def together(
     return (inputs, None) if direction == "read" else (None, outputs)
 
 
-def frame(
+def block_request(
     profile: Profile,
     device: int,
     inputs: Assignment | None,

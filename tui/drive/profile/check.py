@@ -6,18 +6,18 @@ from collections.abc import Callable, Iterator
 
 from ..errors import ProfileError
 from ..values import raw_range, type_range, word_count
-from .decode import line_of
+from .decode import source_line
 from .schema import Parameter, ProfileData
 
-Place = list[str | int]
-Finding = tuple[Place, str]
+SchemaPath = list[str | int]
+Finding = tuple[SchemaPath, str]
 
 
 def check(data: ProfileData, file: str, text: str) -> None:
     """Raise ProfileError with the first ten faults of a profile, each with its line."""
     findings = [finding for rule in RULES for finding in rule(data)]
     if findings:
-        lines = [f"{file}:{line_of(text, place)}: {fault}" for place, fault in findings[:10]]
+        lines = [f"{file}:{source_line(text, place)}: {fault}" for place, fault in findings[:10]]
         if len(findings) > 10:
             lines.append(f"... and {len(findings) - 10} more faults.")
         raise ProfileError("\n".join(lines))
@@ -100,7 +100,7 @@ def _references(data: ProfileData) -> Iterator[Finding]:
             yield place, f"{place[0]}: there is no parameter {code!r}."
 
 
-def _referred(data: ProfileData) -> Iterator[tuple[Place, str]]:
+def _referred(data: ProfileData) -> Iterator[tuple[SchemaPath, str]]:
     """Every place that names a parameter, with the code it names."""
     for index, parameter in enumerate(data.parameters):
         for code in _named_by(parameter):

@@ -49,7 +49,7 @@ def _describe(message: str, tables: dict[str, Any], text: str, file: str) -> str
         steps.append(step)
         node = _child(node, step)
     unknown = _UNKNOWN.match(fault)
-    line = line_of(text, [*steps, unknown[1]] if unknown else steps)
+    line = source_line(text, [*steps, unknown[1]] if unknown else steps)
     label = ".".join(str(s) if isinstance(s, str) else f"#{s + 1}" for s in steps) or "the file"
     owner = _owner(tables, steps)
     return f"{file}:{line}: {label}{owner}: {_in_words(fault)}."
@@ -81,7 +81,7 @@ def _owner(tables: dict[str, Any], steps: list[str | int]) -> str:
     return f" ({found})" if found else ""
 
 
-def line_of(text: str, steps: list[str | int]) -> int:
+def source_line(text: str, steps: list[str | int]) -> int:
     """The line, from 1, of a place such as ["parameters", 3, "scale"]; 1 if it is not found."""
     if not steps:
         return 1

@@ -124,7 +124,7 @@ def load_file(path: Path) -> Profile:
     return Profile(data)
 
 
-def identify(reference: str) -> list[str]:
+def matching_profiles(reference: str) -> list[str]:
     """Ids of the profiles whose reference beginnings fit an identification, best first.
 
     Reads only the line with `reference_prefixes` of each file.

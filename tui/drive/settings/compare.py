@@ -16,7 +16,7 @@ from ..values import Value
 from .parameter_set import ParameterSet, lacking
 from .writable import is_setting
 
-Format = Literal["text", "markdown", "csv"]
+TableFormat = Literal["text", "markdown", "csv"]
 NOTHING = "-"
 
 
@@ -33,7 +33,7 @@ class Side:
 
 
 @dataclass(frozen=True, slots=True)
-class Row:
+class ComparedRow:
     """One parameter on both sides."""
 
     code: str
@@ -61,7 +61,9 @@ def factory_side(profile: Profile) -> Side:
     )
 
 
-def compare(profile: Profile, a: Side, b: Side, *, all_rows: bool = False) -> list[Row]:
+def compare_settings(
+    profile: Profile, a: Side, b: Side, *, all_rows: bool = False
+) -> list[ComparedRow]:
     """Differences of the settings in the profile's order; every parameter with `all_rows`.
 
     Measurements, orders and counters never differ: they are no settings. A factory setting that
@@ -75,7 +77,7 @@ def compare(profile: Profile, a: Side, b: Side, *, all_rows: bool = False) -> li
     return [row for row in rows if row.differs or all_rows]
 
 
-def _row(profile: Profile, parameter: Parameter, a: Side, b: Side) -> Row:
+def _row(profile: Profile, parameter: Parameter, a: Side, b: Side) -> ComparedRow:
     code = parameter.code
     values = [_value(profile, parameter, side) for side in (a, b)]
     texts = [_text(parameter, side, value) for side, value in zip((a, b), values, strict=True)]
@@ -88,7 +90,7 @@ def _row(profile: Profile, parameter: Parameter, a: Side, b: Side) -> Row:
         differs = known
     else:
         differs = setting and not _same(*values)
-    return Row(
+    return ComparedRow(
         code, parameter.name, parameter.group, texts[0], texts[1],
         a.raws.get(code), b.raws.get(code), differs, note,
     )  # fmt: skip
@@ -127,14 +129,14 @@ def _plain(number: Decimal) -> Decimal:
 # As text
 
 
-def told(rows: Sequence[Row], labels: tuple[str, str], format_: Format) -> str:
+def rows_text(rows: Sequence[ComparedRow], labels: tuple[str, str], format_: TableFormat) -> str:
     """The rows as aligned text, as a Markdown table, or as CSV with raw values."""
     if format_ == "csv":
         return _csv(rows, labels)
     return _markdown(rows, labels) if format_ == "markdown" else _plain_text(rows, labels)
 
 
-def _plain_text(rows: Sequence[Row], labels: tuple[str, str]) -> str:
+def _plain_text(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
     if not rows:
         return f"No setting differs between {labels[0]} and {labels[1]}.\n"
     table = [("", "Code", "Name", *labels, ""), *(_cells(row) for row in rows)]
@@ -146,11 +148,11 @@ def _plain_text(rows: Sequence[Row], labels: tuple[str, str]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _cells(row: Row) -> tuple[str, str, str, str, str, str]:
+def _cells(row: ComparedRow) -> tuple[str, str, str, str, str, str]:
     return ("*" if row.differs else "", row.code, row.name, row.a, row.b, row.note)
 
 
-def _markdown(rows: Sequence[Row], labels: tuple[str, str]) -> str:
+def _markdown(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
     head = ("differs", "code", "name", *labels, "remark")
     lines = [_bar(head), "|" + "---|" * len(head)]
     lines += [_bar(("yes" if row.differs else "", *_cells(row)[1:])) for row in rows]
@@ -161,7 +163,7 @@ def _bar(cells: Iterable[str]) -> str:
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
-def _csv(rows: Sequence[Row], labels: tuple[str, str]) -> str:
+def _csv(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["code", "name", "group", *labels, "raw a", "raw b", "differs", "remark"])

@@ -195,7 +195,7 @@ def limit_pairs(profile: Profile) -> list[tuple[str, str]]:
     return [(low, high) for low, high in pairs if profile[low].unit == profile[high].unit]
 
 
-def problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, str]:
+def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, str]:
     """By code, why an edit cannot be applied with the values after all of them."""
     after = edits.after(raws)
     found: dict[str, str] = {}

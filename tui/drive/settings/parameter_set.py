@@ -17,9 +17,9 @@ from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import scale_sources, shown
 
-FORMAT = 1
-HEADER = "set"
-END = "end"
+SET_FORMAT = 1
+SET_HEADER = "set"
+END_OF_SET = "end"
 ABSENT = "absent"
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 
@@ -29,7 +29,7 @@ class SetError(DriveError):
 
 
 @dataclass(frozen=True, slots=True)
-class Head:
+class SetHead:
     """Where a parameter set comes from."""
 
     profile: str
@@ -49,7 +49,7 @@ class Head:
 class ParameterSet:
     """Raw values of one drive by code, with what could not be read."""
 
-    head: Head
+    head: SetHead
     raws: Mapping[str, int]
     absent: Mapping[str, str] = field(default_factory=dict)
     """Codes without a value, and why."""
@@ -61,7 +61,7 @@ class ParameterSet:
     """By code, what is to be known of a value that was edited by hand: its rounding."""
 
 
-def dumps(profile: Profile, values: ParameterSet) -> str:
+def dump_set(profile: Profile, values: ParameterSet) -> str:
     """The text of a parameter set; the same values give the same text but for time and line."""
     head = values.head
     known = [p for p in profile.parameters if p.code in values.raws]
@@ -70,8 +70,8 @@ def dumps(profile: Profile, values: ParameterSet) -> str:
         "# `raw` out of that line; to leave a parameter as it is in the drive, delete its line",
         "# and correct `parameters` at the top and at the end.",
         "",
-        f"[{HEADER}]",
-        f"format = {FORMAT}",
+        f"[{SET_HEADER}]",
+        f"format = {SET_FORMAT}",
         *(f"{key} = {_text(text)}" for key, text in _head_texts(head)),
         f"device = {head.device}",
         f"parameters = {len(known)}",
@@ -88,10 +88,10 @@ def dumps(profile: Profile, values: ParameterSet) -> str:
         lines += ["", f"[{ABSENT}]"]
         order = [p.code for p in profile.parameters if p.code in values.absent]
         lines += [f"{_key(code)} = {_text(values.absent[code])}" for code in order]
-    return "\n".join([*lines, "", f"[{END}]", f"parameters = {len(known)}", ""])
+    return "\n".join([*lines, "", f"[{END_OF_SET}]", f"parameters = {len(known)}", ""])
 
 
-def _head_texts(head: Head) -> list[tuple[str, str]]:
+def _head_texts(head: SetHead) -> list[tuple[str, str]]:
     return [
         ("panel", head.panel),
         ("profile", head.profile),

@@ -10,12 +10,12 @@ from ..errors import ValueRefused
 from ..profile.profile import Profile, is_verified
 from ..profile.schema import Parameter, Quantity
 from ..shown import number_of, scale_sources, shown
-from .edits import Edit, Edits, problems
+from .edits import Edit, Edits, edit_problems
 from .parameter_set import ParameterSet, lacking
 from .writable import CUTTING, is_setting, line_setting, needs_standstill
 
-Kind = Literal["write", "equal", "skip"]
-Reason = Literal[
+ItemKind = Literal["write", "equal", "skip"]
+SkipReason = Literal[
     "",
     "no setting",
     "forbidden",
@@ -78,7 +78,7 @@ class Options:
     """Codes of unverified parameters that the user has confirmed."""
 
 
-PLAIN = Options()
+NO_OPTIONS = Options()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +95,12 @@ class Held:
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class RestoreItem:
     """One parameter of the set with what becomes of it."""
 
     code: str
-    kind: Kind
-    reason: Reason = ""
+    kind: ItemKind
+    reason: SkipReason = ""
     text: str = ""
     """Why it is left out, or what is to be known of it."""
     old: str = ""
@@ -111,7 +111,7 @@ class Item:
 class RestorePlan:
     """What would be written, in `edits`, and every item with its reason."""
 
-    items: tuple[Item, ...]
+    items: tuple[RestoreItem, ...]
     edits: Edits
     same_rating: bool | None
     """None where one side does not tell its model."""
@@ -120,11 +120,11 @@ class RestorePlan:
     across: bool
     """Whether the set is of another family: only common quantities are carried over."""
 
-    def of_kind(self, kind: Kind) -> list[Item]:
+    def of_kind(self, kind: ItemKind) -> list[RestoreItem]:
         """The items of one kind."""
         return [item for item in self.items if item.kind == kind]
 
-    def count(self, kind: Kind) -> int:
+    def count(self, kind: ItemKind) -> int:
         """How many items are of one kind; what is no setting does not count."""
         return sum(1 for item in self.of_kind(kind) if item.reason != "no setting")
 
@@ -141,7 +141,7 @@ def plan_restore(
     held: Held,
     source: ParameterSet,
     source_profile: Profile,
-    options: Options = PLAIN,
+    options: Options = NO_OPTIONS,
 ) -> RestorePlan:
     """What it takes to make a drive hold a parameter set.
 
@@ -196,7 +196,7 @@ class _Planner:
         self.options = options
         self._across = across
         self.same_rating = same_rating(profile, held, source, across=across)
-        self.items: dict[str, Item] = {}
+        self.items: dict[str, RestoreItem] = {}
         self.edits = Edits()
         self._wanted: dict[str, Edit] = {}
 
@@ -258,7 +258,7 @@ class _Planner:
         if (reason := self._reason_against(parameter)) is not None:
             new = self._new_text(parameter, typed, raw)
             if reason[0] != "no setting" and self._holds(parameter, new):
-                self.items[code] = Item(code, "equal", "", "", new, new)
+                self.items[code] = RestoreItem(code, "equal", "", "", new, new)
             else:
                 self._skip(code, *reason, new)
             return
@@ -292,7 +292,7 @@ class _Planner:
             return False
         return shown(self.profile, parameter, raw, held.raws, held.lacking).display == text
 
-    def _reason_against(self, parameter: Parameter) -> tuple[Reason, str] | None:
+    def _reason_against(self, parameter: Parameter) -> tuple[SkipReason, str] | None:
         code, options = parameter.code, self.options
         if not is_setting(self.profile, parameter):
             return "no setting", "it is measured, counted or ordered"
@@ -315,7 +315,7 @@ class _Planner:
             self.edits = Edits().stage_many(
                 self.profile, self._wanted.values(), self.held.raws, self.held.lacking
             )
-            wrong = problems(self.profile, self.edits, self.held.raws)
+            wrong = edit_problems(self.profile, self.edits, self.held.raws)
             if not wrong:
                 break
             for code, text in wrong.items():
@@ -329,19 +329,19 @@ class _Planner:
 
     def _tell(self, edits: Iterable[Edit]) -> None:
         for edit in edits:
-            kind: Kind = "equal" if edit.new == edit.old else "write"
+            kind: ItemKind = "equal" if edit.new == edit.old else "write"
             note = "" if self._across else self.source.notes.get(edit.code, "")
             told = f"{note} {edit.remark}".strip()
-            self.items[edit.code] = Item(edit.code, kind, "", told, edit.old_text, edit.text)
+            self.items[edit.code] = RestoreItem(edit.code, kind, "", told, edit.old_text, edit.text)
 
-    def _skip(self, code: str, reason: Reason, text: str, new: str = "") -> None:
+    def _skip(self, code: str, reason: SkipReason, text: str, new: str = "") -> None:
         raw = self.held.raws.get(code)
         parameter = self.profile.get(code)
         old = ""
         if raw is not None and parameter is not None:
             raws = self.held.raws
             old = shown(self.profile, parameter, raw, raws, self.held.lacking).display
-        self.items[code] = Item(code, "skip", reason, text, old, new)
+        self.items[code] = RestoreItem(code, "skip", reason, text, old, new)
 
 
 def rated(parameter: Parameter) -> bool:

@@ -38,7 +38,7 @@ FILTERS: tuple[FilterId, ...] = (
 
 
 @dataclass(frozen=True, slots=True)
-class Facts:
+class FilterContext:
     """What a filter decides by."""
 
     profile: Profile
@@ -51,7 +51,7 @@ class Facts:
     """Raw values of the parameter set that the drive is compared with."""
 
 
-def rows(facts: Facts, chosen: FilterId, search: str = "") -> list[str]:
+def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
     """Codes of what is shown: the best matches first, then in the profile's order.
 
     Of the recent ones the last edited comes first.
@@ -69,7 +69,7 @@ def rows(facts: Facts, chosen: FilterId, search: str = "") -> list[str]:
     return [code for _, code in sorted(found, key=lambda pair: pair[0])]
 
 
-def passes(facts: Facts, chosen: FilterId, parameter: Parameter) -> bool:
+def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool:
     """Whether a parameter belongs to a filter."""
     code, profile = parameter.code, facts.profile
     raw = facts.raws.get(code)

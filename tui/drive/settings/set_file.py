@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..profile import library
 from .parameter_set import ParameterSet, SetError
-from .set_reading import loads
+from .set_reading import load_set
 
 
 class FileThere(SetError):
@@ -29,7 +29,7 @@ def read_set(path: Path, name: str = "") -> ParameterSet:
         raise SetError(
             f"{name}: byte {error.start} is not UTF-8 text: no parameter set."
         ) from error
-    return loads(text, name, library.load)
+    return load_set(text, name, library.load)
 
 
 def write_file(path: Path, text: str, *, force: bool = False) -> None:

@@ -15,7 +15,16 @@ from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import shown
 from ..values import encode, type_range
-from .parameter_set import ABSENT, END, FORMAT, HEADER, Head, ParameterSet, SetError, lacking
+from .parameter_set import (
+    ABSENT,
+    END_OF_SET,
+    SET_FORMAT,
+    SET_HEADER,
+    ParameterSet,
+    SetError,
+    SetHead,
+    lacking,
+)
 
 _AT = re.compile(r"\(at line (\d+), column \d+\)|\(at end of document\)")
 _KEY = re.compile(r"\s*(\"(?:[^\"\\]|\\.)*\"|'[^']*'|[A-Za-z0-9_-]+)\s*=")
@@ -41,7 +50,7 @@ class _Fault:
         return SetError(f"{self.file}:{line}: {text}")
 
 
-def loads(text: str, file: str, profile_of: Callable[[str], Profile]) -> ParameterSet:
+def load_set(text: str, file: str, profile_of: Callable[[str], Profile]) -> ParameterSet:
     """The parameter set in a text; `profile_of` gives a profile by its id.
 
     Raises SetError with file and line for what is cut short, foreign or contradicts itself,
@@ -86,22 +95,22 @@ def _table(tables: Mapping[str, Any], name: str) -> dict[str, Any]:
     return found if isinstance(found, dict) else {}
 
 
-def _head(tables: Mapping[str, Any], text: str, fault: _Fault) -> Head:
-    head = _table(tables, HEADER)
-    line = _line_of(text, HEADER)
+def _head(tables: Mapping[str, Any], text: str, fault: _Fault) -> SetHead:
+    head = _table(tables, SET_HEADER)
+    line = _line_of(text, SET_HEADER)
     if "format" not in head or not isinstance(head.get("profile"), str):
         raise fault(
-            line, f"this is no parameter set: [{HEADER}] with format and profile is missing."
+            line, f"this is no parameter set: [{SET_HEADER}] with format and profile is missing."
         )
-    if head["format"] != FORMAT:
+    if head["format"] != SET_FORMAT:
         raise fault(
             line,
-            f"this parameter set has format {head['format']}; this panel reads format {FORMAT}."
+            f"this parameter set has format {head['format']}; this panel reads format {SET_FORMAT}."
             " Read it with the panel that wrote it, or a newer one.",
         )
     device = head.get("device", 0)
     texts = {key: str(head.get(key, "")) for key in ("profile_version", "family", "time", "line")}
-    return Head(
+    return SetHead(
         profile=head["profile"],
         **texts,
         device=device if isinstance(device, int) else 0,
@@ -113,17 +122,18 @@ def _head(tables: Mapping[str, Any], text: str, fault: _Fault) -> Head:
 def _check_whole(tables: Mapping[str, Any], text: str, count: int, fault: _Fault) -> None:
     """Raise SetError unless header and end tell the number of parameters that are there."""
     last = text.count("\n") + 1
-    if END not in tables:
+    if END_OF_SET not in tables:
         raise fault(
-            last, f"the file is cut short: its [{END}] is missing after {count} parameters."
+            last, f"the file is cut short: its [{END_OF_SET}] is missing after {count} parameters."
         )
-    for name in (HEADER, END):
+    for name in (SET_HEADER, END_OF_SET):
         told = _table(tables, name).get("parameters")
         if told != count:
             raise fault(
                 _line_of(text, name),
                 f"[{name}] tells of {told} parameters, and {count} are here. If lines were taken"
-                f" out on purpose, write parameters = {count} in [{HEADER}] and in [{END}].",
+                f" out on purpose, write parameters = {count} in [{SET_HEADER}] and in"
+                f" [{END_OF_SET}].",
             )
 
 

@@ -9,9 +9,9 @@ from typing import Literal
 from ..profile.profile import Profile, is_verified
 from ..profile.schema import Block, LinkSetting, Parameter, Quantity, StateKind
 
-Reason = Literal["read-only", "forbidden", "order", "unverified", "running"]
+RefusalReason = Literal["read-only", "forbidden", "order", "unverified", "running"]
 
-ORDERS: frozenset[Quantity] = frozenset(
+ORDER_QUANTITIES: frozenset[Quantity] = frozenset(
     {
         "command_word",
         "command_word_2",
@@ -43,13 +43,17 @@ CUTTING = frozenset({"address", "baud", "format", "parity", "protocol"})
 class Refusal:
     """Why a parameter is not written, as a sentence, and as a word for decisions."""
 
-    reason: Reason
+    reason: RefusalReason
     text: str
 
 
 def is_order(profile: Profile, parameter: Parameter) -> bool:
     """Whether a word is an order (command, reference, output) rather than a setting."""
-    if parameter.access == "w" or parameter.storage == "ram" or parameter.quantity in ORDERS:
+    if (
+        parameter.access == "w"
+        or parameter.storage == "ram"
+        or parameter.quantity in ORDER_QUANTITIES
+    ):
         return True
     if parameter.group == COMMAND_GROUP and parameter.quantity != "command_channel":
         return True
@@ -81,7 +85,7 @@ def line_setting(profile: Profile, code: str) -> LinkSetting | None:
     return next((s for s in profile.data.link.settings if s.parameter == code), None)
 
 
-def refusal(
+def write_refusal(
     profile: Profile,
     parameter: Parameter,
     state: StateKind | None,

@@ -9,50 +9,52 @@ from pathlib import Path
 from tui.drive.blocks.assignment import no_blocks
 from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, word_named
 from tui.drive.errors import DriveError
-from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.editor import BlockEditor
 
-from ..command.arming import Arming
+from ..command.arming import ArmingKeys
 from ..dialogs.files import fault_of_new
 
 
-class BlockKeys(Arming):
-    """What these keys do; the desk does the work."""
+class BlockKeys(ArmingKeys):
+    """What these keys do; the block editor does the work."""
 
     @property
-    def desk(self) -> MappingDesk:
+    def block_editor(self) -> BlockEditor:
         """What is known and proposed."""
         return self.console.blocks
 
     def _try(self, work: Callable[[], None]) -> None:
-        self.passed = self.desk.said
+        self.passed = self.block_editor.said
         try:
             work()
         except DriveError as refused:
-            self.desk.refuse(str(refused))
+            self.block_editor.refuse(str(refused))
         self.look()
 
     def _refuse(self, text: str) -> None:
-        self.desk.refuse(text)
+        self.block_editor.refuse(text)
         self.look()
 
     def action_exchange(self) -> None:
         """Write values through the outputs."""
         from ..dialogs.ask import Ask
 
-        desk = self.desk
+        block_editor = self.block_editor
         if not self._armed():
             self._refuse("Not armed: a arms this drive.")
             return
 
         try:
-            about = f"CODE=VALUE for one or more output slots in use, as now {desk.example()}"
+            about = (
+                f"CODE=VALUE for one or more output slots in use, as now {block_editor.example()}"
+            )
         except DriveError as refused:
             self._refuse(str(refused))
             return
 
         def wrong(text: str) -> str:
             try:
-                desk.meant(text)
+                block_editor.meant(text)
             except DriveError as refused:
                 return str(refused)
             return ""
@@ -61,13 +63,13 @@ class BlockKeys(Arming):
             if not text:
                 return
             try:
-                agreed = desk.meant(text)
+                agreed = block_editor.meant(text)
             except DriveError as refused:
                 self._refuse(str(refused))
                 return
 
             question = "Write through the outputs?"
-            work = partial(desk.exchange, agreed)
+            work = partial(block_editor.exchange, agreed)
             self._ask(question, agreed.follows, "writes, read back", "writes nothing", work)
 
         asked = Ask("Write through the outputs", wrong, about=about, takes="goes on to a question")
@@ -79,7 +81,9 @@ class BlockKeys(Arming):
         """Ask for a file, and save what is proposed, else today's assignment."""
         from ..dialogs.ask import Ask
 
-        plans = [p for block in self.desk.blocks if (p := self.desk.proposed(block))]
+        plans = [
+            p for block in self.block_editor.blocks if (p := self.block_editor.proposed(block))
+        ]
         if not plans:
             self._refuse("Nothing was read yet that could be saved.")
             return
@@ -95,13 +99,13 @@ class BlockKeys(Arming):
         self.app.push_screen(asked, given)
 
     def _save(self, path: Path) -> None:
-        from tui.drive.blocks.file import dumps
+        from tui.drive.blocks.file import dump_blocks
         from tui.drive.settings.set_file import write_file
 
-        desk, profile = self.desk, self.session.profile
-        plans = [plan for block in desk.blocks if (plan := desk.proposed(block))]
+        block_editor, profile = self.block_editor, self.session.profile
+        plans = [plan for block in block_editor.blocks if (plan := block_editor.proposed(block))]
         note = f"{profile.name}, device {self.session.device}, {self.session.line_text}"
-        write_file(path, dumps(profile, plans, note))
+        write_file(path, dump_blocks(profile, plans, note))
         self.app.notify(f"Saved: {path}", timeout=5)
 
     def action_load_file(self) -> None:
@@ -110,7 +114,7 @@ class BlockKeys(Arming):
 
         from ..dialogs.pick_file import PickFile
 
-        if not self.desk.blocks:
+        if not self.block_editor.blocks:
             self._refuse(no_blocks(self.session.profile))
             return
 
@@ -123,14 +127,14 @@ class BlockKeys(Arming):
 
     def _load(self, path: Path) -> None:
         from tui.drive.blocks.assignment import MappingError
-        from tui.drive.blocks.file import loads
+        from tui.drive.blocks.file import load_blocks
 
         try:
             text = path.read_text(encoding="utf-8")
         except (OSError, UnicodeDecodeError) as error:
             raise MappingError(f"{path} cannot be read: {error}.") from error
-        for plan in loads(text, path.name, self.session.profile).values():
-            self.desk.propose(plan)
+        for plan in load_blocks(text, path.name, self.session.profile).values():
+            self.block_editor.propose(plan)
 
     def action_words(self) -> None:
         """Choose the four user words."""
@@ -147,7 +151,7 @@ class BlockKeys(Arming):
 
         def given(text: str | None) -> None:
             if text is not None:
-                self.desk.assign_words(self._words_typed(text))
+                self.block_editor.assign_words(self._words_typed(text))
                 self.look()
 
         def spelled(word: UserWord) -> str:
@@ -159,7 +163,7 @@ class BlockKeys(Arming):
             "Four, with commas between: a code or address and hex, signed or unsigned."
             " -----: not assigned, not known to the drive, or protected."
         )
-        text = ", ".join(spelled(word) for word in self.desk.words)
+        text = ", ".join(spelled(word) for word in self.block_editor.words)
         self.app.push_screen(Ask("User words", wrong, text=text, about=about), given)
 
     def _words_typed(self, text: str) -> UserWords:

@@ -20,10 +20,10 @@ from tui.widgets.plain import Plain, entry
 
 from ..dialogs.question import Question, hint
 
-MOST = 100
+LISTED_MOST = 100
 """Parameters that are listed at once; a search brings the others."""
 NAME_WIDTH = 30
-KEYS = hint(("Up, Down", "choose"), ("Enter", "proposes it"), ("Esc", "proposes nothing"))
+PICK_HINT = hint(("Up, Down", "choose"), ("Enter", "proposes it"), ("Esc", "proposes nothing"))
 
 
 class PickParameter(Question[str | None]):
@@ -46,7 +46,7 @@ class PickParameter(Question[str | None]):
             yield Field(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")
-            yield Plain(KEYS, id="hint")
+            yield Plain(PICK_HINT, id="hint")
 
     def on_mount(self) -> None:
         """Everything that the slot can stand for."""
@@ -60,14 +60,14 @@ class PickParameter(Question[str | None]):
 
     def _list(self, search: str) -> None:
         every = choices(self._profile, self._block, search)
-        self._found = every[:MOST]
+        self._found = every[:LISTED_MOST]
         options = self.query_one(OptionList)
         options.clear_options()
         lines = [self._line(parameter) for parameter in self._found]
         unused = [] if search else [Text(" none      the slot is unused", FAINT)]
         options.add_options([entry(line) for line in (*unused, *lines)])
         options.highlighted = 0 if options.option_count else None
-        more = f", the first {MOST} shown" if len(every) > MOST else ""
+        more = f", the first {LISTED_MOST} shown" if len(every) > LISTED_MOST else ""
         text = f"{len(every)} fit{more}" if every else "Nothing fits; clear some letters."
         self.query_one("#count", Plain).update(text)
 

@@ -11,12 +11,12 @@ from textual.containers import Horizontal
 from tui.drive.blocks.assignment import describe, no_blocks, refusing
 from tui.drive.profile.schema import Block
 from tui.screens.blocks.view import (
-    WIDE,
+    WIDE_SLOTS,
     cost_lines,
-    detail_lines,
+    slot_lines,
     stretch_lines,
     table_lines,
-    word_lines,
+    user_word_lines,
 )
 from tui.session.console import DriveConsole
 from tui.widgets.drawing import armed_text, rule, wrapped
@@ -27,12 +27,12 @@ from ..command.news import news
 from ..keys.table import BLOCKS, bindings
 from .block_keys import BlockKeys
 
-BELOW = 16
+LINES_BESIDE_SLOTS = 16
 """Lines that are no slots: title, headings, details, cost, words, message, keys."""
 
 
 class BlocksScreen(BlockKeys):
-    """Two tables side by side; the desk reads, and writes when it is told so."""
+    """Two tables side by side; the block editor reads, and writes when it is told so."""
 
     CSS_PATH = "blocks.tcss"
     BINDINGS: ClassVar = bindings(BLOCKS)
@@ -49,7 +49,7 @@ class BlocksScreen(BlockKeys):
 
     @property
     def _block(self) -> Block | None:
-        blocks = self.desk.blocks
+        blocks = self.block_editor.blocks
         return blocks[self._side % len(blocks)] if blocks else None
 
     def compose(self) -> ComposeResult:
@@ -66,44 +66,44 @@ class BlocksScreen(BlockKeys):
 
     def on_mount(self) -> None:
         """Begin to look."""
-        if not self.desk.blocks:
+        if not self.block_editor.blocks:
             for id in ("#second", "#detail", "#cost"):
                 self.query_one(id).display = False
-        self.desk.start()
+        self.block_editor.start()
 
     def on_unmount(self) -> None:
         """Look no more; what is proposed stays."""
-        self.desk.stop()
+        self.block_editor.stop()
 
     def draw(self, width: int) -> None:
-        """The desk's state, and what it has come to."""
+        """The block editor's state, and what it has come to."""
         super().draw(width)
         self.put("title", [self._title(width)])
-        self.put("words", word_lines(self.desk, self.desk.words, width))
+        self.put("words", user_word_lines(self.block_editor, self.block_editor.words, width))
         self.put("message", self._message(width))
-        if self.desk.blocks:
+        if self.block_editor.blocks:
             self._show_tables(width)
         else:
             self._show_neighbours(width - 1)  # the table's margin
 
     def _show_tables(self, width: int) -> None:
-        desk, block = self.desk, self._block
+        block_editor, block = self.block_editor, self._block
         assert block is not None
         each = (width - 1) // 2
-        most = max(len(b.slots) for b in desk.blocks)
-        double = width >= WIDE and self.size.height - BELOW >= 2 * most
-        for place, one in zip(("first", "second"), desk.blocks, strict=False):
+        most = max(len(b.slots) for b in block_editor.blocks)
+        double = width >= WIDE_SLOTS and self.size.height - LINES_BESIDE_SLOTS >= 2 * most
+        for place, one in zip(("first", "second"), block_editor.blocks, strict=False):
             at = self._at if one is block else None
-            self.put(place, table_lines(desk, one, each, at, double=double))
-        detail = [rule("Slot", width), *detail_lines(desk, block, self._at, width)]
+            self.put(place, table_lines(block_editor, one, each, at, double=double))
+        detail = [rule("Slot", width), *slot_lines(block_editor, block, self._at, width)]
         self.put("detail", detail)
-        self.put("cost", cost_lines(desk, block, desk.saving(), width))
+        self.put("cost", cost_lines(block_editor, block, block_editor.saving(), width))
 
     def _show_neighbours(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
         head = rule("Neighbours of the monitoring set, one request each", width)
         room = max(3, self.size.height - len(why) - 8)
-        found = stretch_lines(self.desk, self.desk.stretches(), width, room)
+        found = stretch_lines(self.block_editor, self.block_editor.stretches(), width, room)
         self.put("first", [*why, Text(""), head, *found])
 
     def _title(self, width: int) -> Text:
@@ -113,13 +113,13 @@ class BlocksScreen(BlockKeys):
         return title.append_text(armed_text(self.commander.armed_for))
 
     def _message(self, width: int) -> list[Text]:
-        desk, now = self.desk, self.app.clock.monotonic()
+        block_editor, now = self.block_editor, self.app.clock.monotonic()
         text, style = "", FAINT
-        if told := news(desk.said, now, busy=desk.busy, passed=self.passed):
+        if told := news(block_editor.said, now, busy=block_editor.busy, passed=self.passed):
             text, style = told
-        elif desk.trouble:
-            text, style = desk.trouble, ALARM
-        elif count := sum(len(desk.changes(block)) for block in desk.blocks):
+        elif block_editor.trouble:
+            text, style = block_editor.trouble, ALARM
+        elif count := sum(len(block_editor.changes(block)) for block in block_editor.blocks):
             text, style = f"{count} slots proposed otherwise: w writes them, u drops.", ATTENTION
         elif why := self.session.arming.why_disarmed:
             text = why
@@ -136,8 +136,8 @@ class BlocksScreen(BlockKeys):
 
     def action_other_table(self) -> None:
         """The other table."""
-        if self.desk.blocks:
-            self._side = (self._side + 1) % len(self.desk.blocks)
+        if self.block_editor.blocks:
+            self._side = (self._side + 1) % len(self.block_editor.blocks)
         self.action_move(0)
 
     # Keys that propose
@@ -153,7 +153,7 @@ class BlocksScreen(BlockKeys):
 
         def told(code: str | None) -> None:
             if code is not None:
-                self._try(lambda: self.desk.pick(block, place, code))
+                self._try(lambda: self.block_editor.pick(block, place, code))
 
         slot = block.slots[place]
         self.app.push_screen(PickParameter(self.session.profile, block, slot), told)
@@ -162,60 +162,60 @@ class BlocksScreen(BlockKeys):
         """Move the slot's content."""
         block, place = self._block, self._at
         if block is not None and 0 <= place + step < len(block.slots):
-            self._try(lambda: self.desk.move(block, place, step))
+            self._try(lambda: self.block_editor.move(block, place, step))
             self.action_move(step)
 
     def action_clear(self) -> None:
         """Propose the slot unused."""
         if (block := self._block) is not None:
-            self._try(lambda: self.desk.clear(block, self._at))
+            self._try(lambda: self.block_editor.clear(block, self._at))
 
     def action_factory(self) -> None:
         """Propose every slot as it left the factory."""
 
         def work() -> None:
-            for block in self.desk.blocks:
-                self.desk.factory(block)
+            for block in self.block_editor.blocks:
+                self.block_editor.factory(block)
 
         self._try(work)
 
     def action_undo(self) -> None:
         """Propose nothing."""
-        self.desk.drop()
+        self.block_editor.drop()
         self.look()
 
     # Keys that write
 
     def action_verify(self) -> None:
         """Compare every slot several times."""
-        if self.desk.blocks:
-            self.desk.verify()
+        if self.block_editor.blocks:
+            self.block_editor.verify()
         self.look()
 
     def action_write(self) -> None:
         """Say what follows, and write it."""
-        desk = self.desk
-        todo = {block.id: block for block in desk.blocks if desk.changes(block)}
+        block_editor = self.block_editor
+        todo = {block.id: block for block in block_editor.blocks if block_editor.changes(block)}
         if not todo:
             self._refuse("Nothing is proposed: Enter picks what the slot stands for.")
             return
-        wrong = [p.text for block in todo.values() for p in refusing(desk.problems(block))]
-        wrong += [text for block in todo.values() if (text := desk.not_now(block))]
+        wrong = [p.text for block in todo.values() for p in refusing(block_editor.problems(block))]
+        wrong += [text for block in todo.values() if (text := block_editor.not_now(block))]
         if wrong:
             self._refuse(wrong[0])
             return
         if not self._armed_or_told():
             return
 
-        count = sum(len(desk.changes(block)) for block in todo.values())
+        count = sum(len(block_editor.changes(block)) for block in todo.values())
         yes, no = "writes, each slot read back", "writes nothing"
-        self._ask(f"Write {count} slots?", self._follows(), yes, no, desk.write)
+        self._ask(f"Write {count} slots?", self._follows(), yes, no, block_editor.write)
 
     def _follows(self) -> str:
         """What would be written, and what that means for others."""
         profile, lines, told = self.session.profile, [], []
-        for block in self.desk.blocks:
-            found = self.desk.changes(block)
+        for block in self.block_editor.blocks:
+            found = self.block_editor.changes(block)
             lines += [
                 f"{c.slot}: {describe(profile, block, c.old)} → {describe(profile, block, c.new)}"
                 for c in found

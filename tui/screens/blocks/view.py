@@ -7,63 +7,69 @@ from collections.abc import Sequence
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.blocks.assignment import Assignment, describe, target
+from tui.drive.blocks.assignment import Assignment, describe, slot_target
 from tui.drive.blocks.user_words import UserWords
-from tui.drive.blocks.wire_cost import Saving, Stretch, frame, microseconds, together
+from tui.drive.blocks.wire_cost import Saving, Stretch, block_request, microseconds, together
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.blocks.editor import MappingDesk
+from tui.session.blocks.editor import BlockEditor
 from tui.session.blocks.mapping import BlockView, Force, Slot, wire_timing
-from tui.session.read.verdict import Verdict
+from tui.session.read.verdict import SlotMatch
 from tui.widgets.drawing import cut, rule, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, FAULT, PLAIN, STRONG
 from tui.wire.frames import hex_text
 
 BOTH = 50
 """Columns of a table from which the direct value stands in it too."""
-WIDE = 110
+WIDE_SLOTS = 110
 """Columns from which each slot takes two lines."""
 VERDICT_STYLES = {
-    Verdict.SAME: FAINT,
-    Verdict.MOVING: FAINT,
-    Verdict.DIFFERS: FAULT,
-    Verdict.CHANGED: ALARM,
-    Verdict.NONE: ALARM,
-    Verdict.UNUSED: FAINT,
-    Verdict.UNREAD: FAINT,
+    SlotMatch.SAME: FAINT,
+    SlotMatch.MOVING: FAINT,
+    SlotMatch.DIFFERS: FAULT,
+    SlotMatch.CHANGED: ALARM,
+    SlotMatch.NONE: ALARM,
+    SlotMatch.UNUSED: FAINT,
+    SlotMatch.UNREAD: FAINT,
 }
-SHORT = {
-    Verdict.CHANGED: "changed",
-    Verdict.NONE: "no val",
-    Verdict.UNREAD: "-",
-    Verdict.UNUSED: "",
+MATCH_WORDS = {
+    SlotMatch.CHANGED: "changed",
+    SlotMatch.NONE: "no val",
+    SlotMatch.UNREAD: "-",
+    SlotMatch.UNUSED: "",
 }
 """Verdicts in few characters."""
 
 
 def table_lines(
-    desk: MappingDesk, block: Block, width: int, at: int | None, *, double: bool
+    block_editor: BlockEditor, block: Block, width: int, at: int | None, *, double: bool
 ) -> list[Text]:
     """The slots of one block under its heading; `at` is the place of the cursor, if it is here."""
-    view = desk.views.get(block.id)
-    plan = desk.plans.get(block.id)
+    view = block_editor.views.get(block.id)
+    plan = block_editor.plans.get(block.id)
     through = "through the block" if block.direction == "read" else "last written"
     right = "proposed" if plan else f"{through} · direct" if width >= BOTH else ""
     lines = [rule(block.name, width, right)]
     for place, code in enumerate(block.slots):
         slot = view.slots[place] if view else Slot(code, None)
         raw = plan.raws[place] if plan else None
-        lines.append(_slot_line(desk, block, slot, raw, width, chosen=place == at))
+        lines.append(_slot_line(block_editor, block, slot, raw, width, chosen=place == at))
         if double:
-            lines.append(_second_line(desk, block, slot, raw, width))
+            lines.append(_second_line(block_editor, block, slot, raw, width))
     return lines
 
 
 def _slot_line(
-    desk: MappingDesk, block: Block, slot: Slot, proposed: int | None, width: int, *, chosen: bool
+    block_editor: BlockEditor,
+    block: Block,
+    slot: Slot,
+    proposed: int | None,
+    width: int,
+    *,
+    chosen: bool,
 ) -> Text:
-    profile = desk.session.profile
+    profile = block_editor.session.profile
     text = Text(no_wrap=True, style=CURSOR if chosen else Style())
     text.append("▸" if chosen else " ", STRONG)
     text.append(f"{slot.code:<5}", STRONG if chosen else PLAIN)
@@ -96,9 +102,9 @@ def _verdict(block: Block, slot: Slot) -> tuple[str, Style]:
     """The verdict in few characters; what was last written through an output is none."""
     if slot.force is Force.PENDING:
         return "pending", ALARM
-    if block.direction == "write" and slot.verdict not in (Verdict.CHANGED, Verdict.NONE):
+    if block.direction == "write" and slot.verdict not in (SlotMatch.CHANGED, SlotMatch.NONE):
         return "", FAINT
-    return SHORT.get(slot.verdict, str(slot.verdict)), VERDICT_STYLES[slot.verdict]
+    return MATCH_WORDS.get(slot.verdict, str(slot.verdict)), VERDICT_STYLES[slot.verdict]
 
 
 def _filled(text: Text, width: int) -> Text:
@@ -108,11 +114,11 @@ def _filled(text: Text, width: int) -> Text:
 
 
 def _second_line(
-    desk: MappingDesk, block: Block, slot: Slot, proposed: int | None, width: int
+    block_editor: BlockEditor, block: Block, slot: Slot, proposed: int | None, width: int
 ) -> Text:
     """The three notations and the name, dim, under a slot."""
     raw = slot.raw if proposed is None else proposed
-    parameter = target(desk.session.profile, block, raw) if raw else None
+    parameter = slot_target(block_editor.session.profile, block, raw) if raw else None
     text = Text("      ", no_wrap=True)
     if parameter is not None:
         text.append(f"{notation_text(parameter)}  {parameter.name}", FAINT)
@@ -127,22 +133,25 @@ def notation_text(parameter: Parameter) -> str:
     return f"{number}{hexadecimal}  {parameter.address}"
 
 
-def detail_lines(desk: MappingDesk, block: Block, place: int, width: int) -> list[Text]:
+def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) -> list[Text]:
     """The slot under the cursor, in four lines."""
-    view, plan = desk.views.get(block.id), desk.proposed(block)
+    view, plan = block_editor.views.get(block.id), block_editor.proposed(block)
     code = block.slots[place]
     if view is None or plan is None:
-        trouble = (view.trouble if view else "") or desk.trouble or "reading the slots"
-        return [Text(f" {trouble}", ALARM if view or desk.trouble else FAINT), *[Text("")] * 3]
+        trouble = (view.trouble if view else "") or block_editor.trouble or "reading the slots"
+        return [
+            Text(f" {trouble}", ALARM if view or block_editor.trouble else FAINT),
+            *[Text("")] * 3,
+        ]
     slot, raw = view.slots[place], plan.raws[place]
-    parameter = target(desk.session.profile, block, raw)
-    own = desk.session.profile[code]
+    parameter = slot_target(block_editor.session.profile, block, raw)
+    own = block_editor.session.profile[code]
     first = Text(f" {code}", STRONG)
     first.append(f"  {notation_text(own)}", FAINT)
     first.append("  stands for ", FAINT)
     if parameter is None:
-        first.append(describe(desk.session.profile, block, raw), PLAIN)
-        return [first, *_remarks(desk, view, slot, code, width), *[Text("")] * 3][:4]
+        first.append(describe(block_editor.session.profile, block, raw), PLAIN)
+        return [first, *_remarks(block_editor, view, slot, code, width), *[Text("")] * 3][:4]
     first.append(f"{parameter.code}{'' if is_verified(parameter) else '?'}", STRONG)
     first.append(f"  {parameter.name}", PLAIN)
     second = Text(f" {notation_text(parameter)}", PLAIN)
@@ -155,16 +164,21 @@ def detail_lines(desk: MappingDesk, block: Block, place: int, width: int) -> lis
         second.append(slot.direct_text, PLAIN)
     for line in (first, second):
         line.truncate(width, overflow="ellipsis")
-    rest = _remarks(desk, view, slot, code, width)
+    rest = _remarks(block_editor, view, slot, code, width)
     return [first, second, *rest, Text(""), Text("")][:4]
 
 
-def _remarks(desk: MappingDesk, view: BlockView, slot: Slot, code: str, width: int) -> list[Text]:
+def _remarks(
+    block_editor: BlockEditor, view: BlockView, slot: Slot, code: str, width: int
+) -> list[Text]:
     """Verdict, force and problems of a slot, each a sentence."""
-    found = [(p.text, ALARM) for p in desk.problems(view.block) if p.slot == code]
+    found = [(p.text, ALARM) for p in block_editor.problems(view.block) if p.slot == code]
     if view.block.effective == "after-reset" and slot.raw:
         found.append((_force_text(slot), ALARM if slot.force is Force.PENDING else FAINT))
-    elif view.block.direction == "read" and slot.verdict not in (Verdict.UNUSED, Verdict.UNREAD):
+    elif view.block.direction == "read" and slot.verdict not in (
+        SlotMatch.UNUSED,
+        SlotMatch.UNREAD,
+    ):
         found.append((f"Compared with direct reads: {slot.verdict}.", VERDICT_STYLES[slot.verdict]))
     if view.trouble:
         found.append((view.trouble, ALARM if view.block.direction == "read" else FAINT))
@@ -182,13 +196,15 @@ def _force_text(slot: Slot) -> str:
     return "Configured; whether it counts already cannot be read nor told by values of now."
 
 
-def cost_lines(desk: MappingDesk, block: Block, saving: Saving | None, width: int) -> list[Text]:
+def cost_lines(
+    block_editor: BlockEditor, block: Block, saving: Saving | None, width: int
+) -> list[Text]:
     """What a monitoring cycle costs before and after, and the frame of the block looked at.
 
     Always four lines.
     """
-    profile = desk.session.profile
-    inputs, outputs = together(profile, *_plans(desk), block.direction)
+    profile = block_editor.session.profile
+    inputs, outputs = together(profile, *_plans(block_editor), block.direction)
     lines = [rule("On the wire", width)]
     text = Text(" ", no_wrap=True)
     if saving is None:
@@ -196,17 +212,19 @@ def cost_lines(desk: MappingDesk, block: Block, saving: Saving | None, width: in
     else:
         text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
         text.append(f" in {saving.before.requests}", FAINT)
-        if desk.plans:
+        if block_editor.plans:
             text.append("  → proposed ", FAINT)
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
             text.append(f" in {saving.after.requests}", FAINT)
             text.append(f"  ({_ms(-saving.microseconds, sign=True)})", ATTENTION)
-        whole = microseconds(profile, wire_timing(desk.session), inputs, outputs)
+        whole = microseconds(profile, wire_timing(block_editor.session), inputs, outputs)
         told = f"   one exchange {_ms(whole)}"
         if whole and text.cell_len + len(told) <= width:
             text.append(told, FAINT)
     text.truncate(width, overflow="ellipsis")
-    sent = frame(profile, desk.session.device, inputs, outputs, _output_words(desk))
+    sent = block_request(
+        profile, block_editor.session.device, inputs, outputs, _output_words(block_editor)
+    )
     hexes = wrapped(hex_text(sent) or "none: no slot is in use", width - 8, 2)
     frames = [
         Text(f" {'frame' if not line else '':<6}{hexes[line] if line < len(hexes) else ''}", PLAIN)
@@ -215,18 +233,18 @@ def cost_lines(desk: MappingDesk, block: Block, saving: Saving | None, width: in
     return [*lines, text, *frames]
 
 
-def _output_words(desk: MappingDesk) -> list[int]:
+def _output_words(block_editor: BlockEditor) -> list[int]:
     """What the outputs hold now, for the frame; 0 where that is not known."""
-    for block in desk.blocks:
-        view = desk.views.get(block.id)
+    for block in block_editor.blocks:
+        view = block_editor.views.get(block.id)
         if block.direction == "write" and view is not None:
             held = [slot.direct.raw if slot.direct else None for slot in view.slots]
             return [(raw or 0) & 0xFFFF for raw in held]
     return []
 
 
-def _plans(desk: MappingDesk) -> tuple[Assignment | None, Assignment | None]:
-    found = {block.direction: desk.proposed(block) for block in desk.blocks}
+def _plans(block_editor: BlockEditor) -> tuple[Assignment | None, Assignment | None]:
+    found = {block.direction: block_editor.proposed(block) for block in block_editor.blocks}
     return found.get("read"), found.get("write")
 
 
@@ -235,12 +253,12 @@ def _ms(microseconds: int, *, sign: bool = False) -> str:
     return f"{number:+.1f} ms" if sign else f"{number:.1f} ms"
 
 
-def word_lines(desk: MappingDesk, words: UserWords, width: int) -> list[Text]:
+def user_word_lines(block_editor: BlockEditor, words: UserWords, width: int) -> list[Text]:
     """The four user words, two lines with their heading."""
     text = Text(" ", no_wrap=True)
     room = max(10, (width - 2) // max(1, len(words)))
-    for word, raw in zip(words, desk.word_raws, strict=False):
-        parameter = desk.session.profile.at(word.address) if word.address else None
+    for word, raw in zip(words, block_editor.word_raws, strict=False):
+        parameter = block_editor.session.profile.at(word.address) if word.address else None
         name = parameter.code if parameter else f"W{word.address}" if word.address else "none"
         shown = word.text(raw)
         text.append(f"{name} ", FAINT)
@@ -250,7 +268,9 @@ def word_lines(desk: MappingDesk, words: UserWords, width: int) -> list[Text]:
     return [rule("User words", width), text]
 
 
-def stretch_lines(desk: MappingDesk, found: Sequence[Stretch], width: int, room: int) -> list[Text]:
+def stretch_lines(
+    block_editor: BlockEditor, found: Sequence[Stretch], width: int, room: int
+) -> list[Text]:
     """For a family without blocks: which neighbours come best in one request."""
     lines: list[Text] = []
     for stretch in found:

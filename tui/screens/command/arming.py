@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 NOT_ARMED = "Not armed: a arms this drive."
 
 
-class Arming(PanelScreen):
+class ArmingKeys(PanelScreen):
     """Knows whether the drive is armed; where a refusal is told is up to the screen."""
 
     console: DriveConsole

@@ -10,10 +10,10 @@ from tui.drive.orders import OrderRefused, chart_in_force, interlock
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
 
-from .arming import Arming
+from .arming import ArmingKeys
 from .control import Control
 
-SHOWN = 8.0
+SHOWN_DONE = 8.0
 SHOWN_REFUSED = 20.0
 """Seconds for which it is shown what became of an order."""
 
@@ -33,7 +33,7 @@ STOPS_THAT_ASK = {
 """Question, what follows and the yes of the stops that need no arming but ask."""
 
 
-class OrderKeys(Arming):
+class OrderKeys(ArmingKeys):
     """The actions of the keys; everything else is the commander's."""
 
     _asked: Outcome | None = None
@@ -45,7 +45,7 @@ class OrderKeys(Arming):
         chart = chart_in_force(self.session.profile, raws)
         outcome = commander.outcome
         if outcome is not None:
-            shown = SHOWN_REFUSED if outcome.kind == "refused" else SHOWN
+            shown = SHOWN_REFUSED if outcome.kind == "refused" else SHOWN_DONE
             outcome = outcome if now - outcome.time < shown else None
         return Control(
             armed_for=commander.armed_for,

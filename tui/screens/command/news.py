@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from rich.style import Style
 
-from tui.session.work import Kind, Outcome
+from tui.session.work import Outcome, OutcomeKind
 from tui.widgets.outcome import OUTCOME_STYLES
 
-SAID_FOR = {Kind.WORKING: 60.0, Kind.DONE: 15.0, Kind.REFUSED: 60.0}
+NEWS_FOR = {OutcomeKind.WORKING: 60.0, OutcomeKind.DONE: 15.0, OutcomeKind.REFUSED: 60.0}
 """Seconds for which it is shown what the last work has come to."""
 
 
@@ -21,6 +21,6 @@ def news(
     if said is None or said is passed:
         return None
     kind = said.kind
-    if not busy and now - said.time >= SAID_FOR[kind]:
+    if not busy and now - said.time >= NEWS_FOR[kind]:
         return None
     return said.text, OUTCOME_STYLES[kind]

@@ -20,7 +20,7 @@ from ..dialogs.question import KeyQuestion, hint
 if TYPE_CHECKING:
     from ..dialogs.now import MotorsNow
 
-KEYS = hint(("Up, Down", "choose"), ("y", "writes it"), ("Esc or q", "writes nothing"))
+OPTION_HINT = hint(("Up, Down", "choose"), ("y", "writes it"), ("Esc or q", "writes nothing"))
 
 
 class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
@@ -36,7 +36,7 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
     ) -> None:
         super().__init__(now)
         self._choices = [
-            (option, choice.bits, choice_line(option, choice.bits, choice.name, raws))
+            (option, choice.bits, option_line(option, choice.bits, choice.name, raws))
             for option in options
             for choice in option.choices
         ]
@@ -51,12 +51,12 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
                 id="choices",
                 compact=True,
             )
-            yield Plain(KEYS, id="hint")
+            yield Plain(OPTION_HINT, id="hint")
 
     def on_option_list_option_selected(self) -> None:
         """Enter writes nothing: say which key does."""
         told = Text("Enter is no answer here.   ", ALARM)
-        self.query_one("#hint", Plain).update(told.append_text(KEYS))
+        self.query_one("#hint", Plain).update(told.append_text(OPTION_HINT))
 
     def action_yes(self) -> None:
         """Give the choice back."""
@@ -66,7 +66,7 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
             self.answer((option, bits))
 
 
-def choice_line(option: CommandOption, bits: int, name: str, raws: Mapping[str, int]) -> Text:
+def option_line(option: CommandOption, bits: int, name: str, raws: Mapping[str, int]) -> Text:
     """One choice, with a mark where the drive holds it now."""
     raw = raws.get(option.parameter)
     held = raw is not None and raw & option.mask == bits

@@ -18,7 +18,7 @@ LINE_FORMS = (
     "sim:atv71@2,atv21",
 )
 
-SIMULATED = (
+SIMULATED_LINES = (
     ("sim:atv21,atv31,atv312,atv71,powerdrive", "five drives on one line"),
     ("sim:atv71@2", "an Altivar 71 at address 2"),
 )
@@ -49,7 +49,7 @@ def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
     return [
         Group("Serial ports", serial, "none found: ^p, look again"),
         Group("Recent", lately, "none yet: n types a line"),
-        Group("Simulated", tuple(LineChoice(text, about) for text, about in SIMULATED)),
+        Group("Simulated", tuple(LineChoice(text, about) for text, about in SIMULATED_LINES)),
     ]
 
 

@@ -10,7 +10,7 @@ from textual.widgets import OptionList
 
 from tui.widgets.plain import entry
 
-from .found import State, drive_line
+from .found import FoundState, drive_line
 
 if TYPE_CHECKING:
     from tui.session.fleet import FoundDrive
@@ -35,7 +35,7 @@ class DriveList(OptionList):
     def fill(
         self,
         found: Mapping[int, FoundDrive],
-        states: Mapping[int, State],
+        states: Mapping[int, FoundState],
         *,
         sort: bool = True,
     ) -> None:

@@ -12,13 +12,13 @@ from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, RUNNING, STRONG
 if TYPE_CHECKING:
     from tui.session.fleet import FoundDrive
 
-STATE_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
+FOUND_STYLES = {"running": RUNNING, "fault": FAULT, "unknown": ALARM}
 WHO_WIDTH, VERSION_WIDTH, PROFILE_WIDTH = 16, 4, 13
 ROOM_FOR_PROFILE = 60
 """Columns of the list from which it names the profile beside the reference."""
 
 
-State = tuple[str, str]
+FoundState = tuple[str, str]
 """What a drive does in words, and the kind of that."""
 
 
@@ -51,7 +51,7 @@ def next_step(drive: FoundDrive) -> str:
     return "Enter watches it."
 
 
-def drive_line(drive: FoundDrive, state: State, width: int) -> Text:
+def drive_line(drive: FoundDrive, state: FoundState, width: int) -> Text:
     """A drive in one line: address, reference, version, name, profile, state."""
     identity = drive.identity
     text = Text(no_wrap=True, overflow="ellipsis")
@@ -66,5 +66,5 @@ def drive_line(drive: FoundDrive, state: State, width: int) -> Text:
         about += f"{cut(identity.version_text, VERSION_WIDTH)} "
     room = max(0, width - text.cell_len - len(about) - len(state[0]) - 1)
     text.append(about + (cut(name, room) if room > 1 else " " * room) + " ", FAINT)
-    text.append(state[0], STATE_STYLES.get(state[1], PLAIN))
+    text.append(state[0], FOUND_STYLES.get(state[1], PLAIN))
     return text

@@ -20,7 +20,7 @@ from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
 
 from ..base import PanelScreen
 from .drive_list import DriveList
-from .found import State
+from .found import FoundState
 from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
@@ -33,10 +33,10 @@ log = logging.getLogger(__name__)
 
 ERROR_KIND, ALARM_KIND = "error", "alarm"
 STATES = 0.5
-"""Seconds between two looks at the states that the keeper has seen."""
+"""Seconds between two looks at the states that the line watch has seen."""
 QUIET = 1.0
 """Seconds without a key after which drives go to their places in the list."""
-HEADS = 1.0
+LOOK_AT_LINE = 1.0
 """Seconds between two looks at the clock and the state of the line."""
 MESSAGE = 3
 """Lines for what happened and what to try next."""
@@ -95,7 +95,7 @@ class ConnectionView(PanelScreen):
         self.say("", "Choose a line and press Enter, or n to type one.")
         self.lines.look_for_lines()
         self._looking = [
-            self.set_interval(HEADS, self.show_heads),
+            self.set_interval(LOOK_AT_LINE, self.show_heads),
             self.set_interval(STATES, self.look),
         ]
 
@@ -131,7 +131,7 @@ class ConnectionView(PanelScreen):
     def show_drives(self) -> None:
         """The drives that answered, as they are now."""
         found = self.found
-        looks = self.app.fleet.keeper.looks if self.app.fleet else {}
+        looks = self.app.fleet.line_watch.looks if self.app.fleet else {}
         connected = self._connected()
         states = {d: _state(drive, looks.get(d), connected) for d, drive in found.items()}
         self.drives.fill(found, states, sort=self._hands_are_quiet())
@@ -208,11 +208,11 @@ class ConnectionView(PanelScreen):
     # The states of the drives
 
     def draw(self, width: int) -> None:
-        """The states that the keeper of the line has seen."""
+        """The states that the line watch of the line has seen."""
         super().draw(width)
         self.show_drives()
         if self.app.fleet is not None:
-            self._warn(self.app.fleet.keeper.looks)
+            self._warn(self.app.fleet.line_watch.looks)
 
     def _connected(self) -> bool:
         opened = self.app.opened
@@ -236,7 +236,7 @@ class ConnectionView(PanelScreen):
         )
 
 
-def _state(drive: FoundDrive, look: Look | None, connected: bool) -> State:
+def _state(drive: FoundDrive, look: Look | None, connected: bool) -> FoundState:
     """What a drive does, by the last look at it, and the kind of that."""
     if not connected:
         return "not known", "unknown"

@@ -10,7 +10,7 @@ from textual.app import ComposeResult
 from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
-from tui.drive.control_source import changes, source_codes, source_in_force
+from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
 from tui.screens.control.view import change_lines, diagram, note_lines
 from tui.session.console import DriveConsole
@@ -96,7 +96,7 @@ class ControlSourceScreen(OrderKeys):
     def draw(self, width: int) -> None:
         """Show the chosen configuration, and what became of the last order."""
         super().draw(width)
-        found = changes(self.session.profile, self._chosen, self._raws)
+        found = source_changes(self.session.profile, self._chosen, self._raws)
         lines = [rule("So it works", width), *diagram(self._chosen)]
         lines.append(rule("It would write", width))
         if self._raws:
@@ -130,7 +130,7 @@ class ControlSourceScreen(OrderKeys):
 
     def action_write_chosen(self) -> None:
         """Say what follows, and write it."""
-        found = changes(self.session.profile, self._chosen, self._raws)
+        found = source_changes(self.session.profile, self._chosen, self._raws)
         if self._armed_or_told() and found and self._raws:
             codes = ", ".join(change.parameter.code for change in found)
             follows = (

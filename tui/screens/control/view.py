@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from rich.text import Text
 
-from tui.drive.control_source import Change
+from tui.drive.control_source import SourceChange
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import ControlSource, Way
 from tui.drive.shown import shown
@@ -39,14 +39,14 @@ def _way(way: Way, goal: str) -> list[Text]:
     return [first, second]
 
 
-def change_lines(profile: Profile, found: Sequence[Change], width: int) -> list[Text]:
+def change_lines(profile: Profile, found: Sequence[SourceChange], width: int) -> list[Text]:
     """What would be written, word by word."""
     if not found:
         return [Text("   Nothing: the drive is set up so.", STRONG)]
     return [_change(profile, change, width) for change in found]
 
 
-def _change(profile: Profile, change: Change, width: int) -> Text:
+def _change(profile: Profile, change: SourceChange, width: int) -> Text:
     parameter = change.parameter
     text = Text(no_wrap=True)
     mark = "" if change.verified else "?"
@@ -58,14 +58,14 @@ def _change(profile: Profile, change: Change, width: int) -> Text:
     return text
 
 
-def _named(profile: Profile, change: Change, raw: int | None) -> str:
+def _named(profile: Profile, change: SourceChange, raw: int | None) -> str:
     if raw is None:
         return NOT_AVAILABLE
     text = shown(profile, change.parameter, raw, {}).display
     return text if str(raw) in text else f"{text} ({raw})"
 
 
-def note_lines(source: ControlSource, found: Sequence[Change], width: int) -> list[Text]:
+def note_lines(source: ControlSource, found: Sequence[SourceChange], width: int) -> list[Text]:
     """What else is to be known of a configuration."""
     lines = [Text(f"   {line}", FAINT) for line in wrapped(source.note, width - 4, 2)]
     unsure = [change.parameter.code for change in found if not change.verified]

@@ -17,7 +17,7 @@ from .question import Question, hint
 if TYPE_CHECKING:
     from .now import MotorsNow
 
-Check = Callable[[str], str]
+TextCheck = Callable[[str], str]
 """What is wrong with a text, or nothing."""
 
 
@@ -31,7 +31,7 @@ class Ask(Question[str | None]):
     def __init__(
         self,
         question: str,
-        check: Check,
+        check: TextCheck,
         *,
         text: str = "",
         about: str = "",

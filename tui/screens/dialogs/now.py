@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from tui.screens.app_port import Panel
     from tui.session.drive import DriveSession
 
-MOST = 4
+DRIVES_TOLD = 4
 """Drives that are told of; more are counted."""
 
 
@@ -34,10 +34,10 @@ class MotorsNow:
         from tui.widgets.motor_now import motor_now
 
         fleet = self._app.fleet
-        looks = fleet.keeper.looks if fleet else {}
+        looks = fleet.line_watch.looks if fleet else {}
         now = self._app.clock.monotonic()
         text = Text()
-        for session in self._sessions[:MOST]:
+        for session in self._sessions[:DRIVES_TOLD]:
             console = fleet.console(session.device) if fleet else None
             which = f"Now {session.device:<3} " if len(self._sessions) > 1 else "Now  "
             text.append(which if not text else f"\n{which}", FAINT)
@@ -45,6 +45,6 @@ class MotorsNow:
             latest = console.latest if console else None
             period = console.monitor.period if console else 0.0
             text.append_text(motor_now(session.profile, latest, period, look, now))
-        if (more := len(self._sessions) - MOST) > 0:
+        if (more := len(self._sessions) - DRIVES_TOLD) > 0:
             text.append(f"\nand {more} more", FAINT)
         return text

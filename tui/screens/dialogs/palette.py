@@ -10,7 +10,7 @@ from textual.binding import Binding
 from textual.containers import Vertical
 from textual.widgets import Input, OptionList
 
-from tui.screens.keys.finding import Found, find
+from tui.screens.keys.finding import FoundAction, find
 from tui.widgets.drawing import cut
 from tui.widgets.fields import Field
 from tui.widgets.palette import FAINT, KEY, PLAIN
@@ -25,7 +25,7 @@ NAME_WIDTH, PLACE_WIDTH, KEY_WIDTH = 48, 14, 5
 MORE = "Typed words find what other screens can do, too."
 
 
-class Palette(Question[Found | None]):
+class Palette(Question[FoundAction | None]):
     """Gives the chosen action back, or None.
 
     Nothing stands ready by itself: only what begins with each word that was typed.
@@ -39,7 +39,7 @@ class Palette(Question[Found | None]):
     def __init__(self, screen: str) -> None:
         super().__init__()
         self._of = screen
-        self._found: list[Found] = []
+        self._found: list[FoundAction] = []
 
     def compose(self) -> ComposeResult:
         """A field, and what fits what is typed there."""
@@ -73,7 +73,7 @@ class Palette(Question[Found | None]):
         self.query_one("#count", Plain).update(count)
         self._tell_keys()
 
-    def _line(self, found: Found) -> Text:
+    def _line(self, found: FoundAction) -> Text:
         text = Text(no_wrap=True)
         if found.here:
             text.append(cut(found.name, NAME_WIDTH + 1 + PLACE_WIDTH), PLAIN)

@@ -20,7 +20,7 @@ from tui.widgets.plain import Plain, entry
 
 from .question import KeyQuestion, hint
 
-MOST = 200
+FILES_LISTED = 200
 """Files that are listed at most, the newest."""
 WIDTH = 60
 SUFFIX = ".toml"
@@ -72,7 +72,7 @@ def files_in(folders: Iterable[Path]) -> list[Path]:
                     found[path] = path.stat().st_mtime
         except OSError:
             continue
-    return sorted(found, key=lambda path: -found[path])[:MOST]
+    return sorted(found, key=lambda path: -found[path])[:FILES_LISTED]
 
 
 def _line(path: Path) -> Text:

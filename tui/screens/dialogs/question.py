@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 T = TypeVar("T")
 
-STYLES = Path(__file__).with_name("dialogs.tcss")
+DIALOG_STYLES = Path(__file__).with_name("dialogs.tcss")
 """Absolute, as Textual looks beside the class that inherits it, which may be of another room."""
 
 NOW_EVERY = 0.5
@@ -36,7 +36,7 @@ class Question(ModalScreen[T]):
     """A dialog that gives an answer back; Esc is no, as is a stop of the drive meanwhile."""
 
     app: Panel
-    CSS_PATH = STYLES
+    CSS_PATH = DIALOG_STYLES
     SETTLED: ClassVar[float] = 0.3
     """Seconds that a question has stood before Enter and `y` are answers."""
     NO: ClassVar[Any] = None

@@ -16,8 +16,8 @@ from tui.session.reading import Reading
 from tui.widgets.drawing import cut, rule, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
 
-VALUE_WIDTH = 9
-TIME_WIDTH = 8
+RECORD_VALUE_WIDTH = 9
+FAULT_TIME_WIDTH = 8
 
 
 def fault_lines(fault: FaultCode | None, present: bool, width: int) -> list[Text]:
@@ -87,9 +87,9 @@ def record_lines(record: FaultRecord | None, width: int, height: int, offset: in
             Text(" No trip was seen since this drive is watched.", FAINT),
         ]
     title = f"Before the trip: {len(record.moments)} cycles, {len(record.writes)} writes from here"
-    head = Text(f" {'s':>{TIME_WIDTH - 1}}", FAINT, no_wrap=True)
+    head = Text(f" {'s':>{FAULT_TIME_WIDTH - 1}}", FAINT, no_wrap=True)
     for heading in record.headings[: _columns(width)]:
-        head.append(f"{heading[: VALUE_WIDTH - 1]:>{VALUE_WIDTH}}", FAINT)
+        head.append(f"{heading[: RECORD_VALUE_WIDTH - 1]:>{RECORD_VALUE_WIDTH}}", FAINT)
     rows = record_rows(record, width)
     return [rule(title, width), head, *rows[offset : offset + max(1, height - 2)]]
 
@@ -104,21 +104,21 @@ def record_rows(record: FaultRecord, width: int) -> list[Text]:
 
 
 def _columns(width: int) -> int:
-    return max(1, (width - TIME_WIDTH - 1) // VALUE_WIDTH)
+    return max(1, (width - FAULT_TIME_WIDTH - 1) // RECORD_VALUE_WIDTH)
 
 
 def _moment(moment: Moment, record: FaultRecord, width: int) -> Text:
     after = moment.wall - record.wall
-    text = Text(f" {after:>{TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
+    text = Text(f" {after:>{FAULT_TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
     for value in moment.texts[: _columns(width)]:
-        text.append(f"{value[: VALUE_WIDTH - 1]:>{VALUE_WIDTH}}", PLAIN)
+        text.append(f"{value[: RECORD_VALUE_WIDTH - 1]:>{RECORD_VALUE_WIDTH}}", PLAIN)
     if after >= 0:
-        text.stylize(ALARM, 0, TIME_WIDTH)
+        text.stylize(ALARM, 0, FAULT_TIME_WIDTH)
     return text
 
 
 def _write(entry: Entry, after: float, width: int) -> Text:
-    text = Text(f" {after:>{TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
+    text = Text(f" {after:>{FAULT_TIME_WIDTH - 1}.1f}", FAINT, no_wrap=True)
     text.append(f"  wrote {entry.code} {entry.new}", ATTENTION)
     text.append(f"  {entry.why}" + ("" if entry.answer == "ok" else f": {entry.answer}"), FAINT)
     text.truncate(width, overflow="ellipsis")

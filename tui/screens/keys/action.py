@@ -49,10 +49,10 @@ class Action:
         return KEY_NAMES.get(key, key.capitalize() if len(key) > 1 else key)
 
 
-Row = tuple[str, str, str, str]
+ActionRow = tuple[str, str, str, str]
 """An action as its table writes it: id, keys, label, help."""
 
 
-def on(screens: tuple[str, ...], *rows: Row) -> tuple[Action, ...]:
+def on(screens: tuple[str, ...], *rows: ActionRow) -> tuple[Action, ...]:
     """The actions of some screens, in the order of their rows."""
     return tuple(Action(*row, screens=screens) for row in rows)

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from .action import Action
 from .table import ACTIONS
 
-NAME = 3
+NAME_WORDS = 3
 """Words of an action's help that count as its name."""
 BY_NAME = {
     "stop": ("stop",),
@@ -34,7 +34,7 @@ _WORD = re.compile(r"[^\W_]+")
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FoundAction:
     """An action that fits what was typed."""
 
     action: Action
@@ -52,13 +52,13 @@ class Found:
         return self.action.help.removesuffix(".")
 
 
-def find(query: str, screen: str, actions: Sequence[Action] = ACTIONS) -> list[Found]:
+def find(query: str, screen: str, actions: Sequence[Action] = ACTIONS) -> list[FoundAction]:
     """The actions in which every word of the query occurs, best first; those of `screen` are here.
 
     Without a query what can be done here is listed, in the order of the table.
     """
     words = query.split()
-    found: dict[tuple[str, str], Found] = {}
+    found: dict[tuple[str, str], FoundAction] = {}
     for action in actions:
         here = screen in action.screens
         if _is_left_out(action, words, here=here):
@@ -66,7 +66,9 @@ def find(query: str, screen: str, actions: Sequence[Action] = ACTIONS) -> list[F
         marks = [_mark(action, screen, word, here=here) for word in words]
         if all(marks):
             ready = bool(marks) and min(marks) > 1 and _all_named(action, words)
-            one = Found(action, screen if here else action.screens[0], here, sum(marks), ready)
+            one = FoundAction(
+                action, screen if here else action.screens[0], here, sum(marks), ready
+            )
             found.setdefault((action.id, action.help), one)
     return sorted(found.values(), key=lambda one: (-one.score, not one.here))
 
@@ -90,7 +92,7 @@ def _mark(action: Action, screen: str, word: str, *, here: bool) -> int:
         return 6
     typed = word.casefold()
     said = _words(action.help)
-    name = {*said[:NAME], *_words(action.label), *_words(action.id)}
+    name = {*said[:NAME_WORDS], *_words(action.label), *_words(action.id)}
     places = () if here else _words(action.screens[0])
     every = {*said, *name, *places}
     if typed in every:

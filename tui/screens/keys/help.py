@@ -27,7 +27,7 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
 )
 WITHOUT_KEY = "^p"
 """Where an action without a key of its own is found: in the list of all."""
-STYLES = {"green": RUNNING, "red": FAULT, "amber": ALARM, "grey": FAINT, "white": PLAIN}
+HELP_STYLES = {"green": RUNNING, "red": FAULT, "amber": ALARM, "grey": FAINT, "white": PLAIN}
 
 
 class HelpScreen(ModalScreen[None]):
@@ -61,5 +61,5 @@ def help_text(screen: str) -> Table:
     table.add_row("", "")
     table.add_row("", Text("Signs", TITLE))
     for sign, colour, meaning in SIGNS:
-        table.add_row(Text(sign, STYLES[colour], no_wrap=True), Text(meaning, PLAIN))
+        table.add_row(Text(sign, HELP_STYLES[colour], no_wrap=True), Text(meaning, PLAIN))
     return table

@@ -9,7 +9,7 @@ from functools import partial
 
 from textual.binding import Binding, BindingType
 
-from tui.widgets.drawing import Key, fitting
+from tui.widgets.drawing import KeyLabel, fitting
 
 from .action import (
     BLOCKS,
@@ -135,7 +135,9 @@ def of_screen(screen: str) -> list[Action]:
     return [action for action in ACTIONS if screen in action.screens]
 
 
-def line_of(screen: str, width: int, stops: str = "STOP", *, typing: bool = False) -> list[Key]:
+def keys_line(
+    screen: str, width: int, stops: str = "STOP", *, typing: bool = False
+) -> list[KeyLabel]:
     """The line of keys of a screen, the stop first; where it is narrow, without the last ones.
 
     `stops` says whom the stop key stops; while a text is `typing`, that key is F12.
@@ -172,6 +174,6 @@ __all__ = [
     "SOURCES",
     "Action",
     "bindings",
-    "line_of",
+    "keys_line",
     "of_screen",
 ]

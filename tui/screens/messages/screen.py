@@ -16,9 +16,9 @@ from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
 from ..base import PanelScreen
 from ..keys.table import MESSAGES, bindings
 
-STYLES = {"failed": FAULT, "refused": ALARM, "error": FAULT, "stop": STRONG, "done": PLAIN}
-TIME_WIDTH = 10
-MOST = 6
+EVENT_STYLES = {"failed": FAULT, "refused": ALARM, "error": FAULT, "stop": STRONG, "done": PLAIN}
+EVENT_TIME_WIDTH = 10
+MESSAGE_LINES = 6
 """Lines of one message at most."""
 
 
@@ -61,11 +61,13 @@ class MessagesScreen(PanelScreen):
 def event_lines(event: Event, width: int) -> list[Text]:
     """A message with its time and its drive, on as many lines as it takes."""
     who = f"{event.device}: " if event.device is not None else ""
-    style = STYLES.get(event.kind, FAINT)
+    style = EVENT_STYLES.get(event.kind, FAINT)
     found = []
-    for number, part in enumerate(wrapped(who + event.text, width - TIME_WIDTH - 1, MOST)):
+    for number, part in enumerate(
+        wrapped(who + event.text, width - EVENT_TIME_WIDTH - 1, MESSAGE_LINES)
+    ):
         at = time.strftime("%H:%M:%S", time.localtime(event.wall)) if not number else ""
-        line = Text(f" {at:<{TIME_WIDTH - 1}}", FAINT, no_wrap=True)
+        line = Text(f" {at:<{EVENT_TIME_WIDTH - 1}}", FAINT, no_wrap=True)
         line.append(part, style)
         found.append(line)
     return found

@@ -7,13 +7,13 @@ from collections.abc import Sequence
 from rich.style import Style
 from rich.text import Text
 
-from tui.widgets.drawing import Key, key_line, key_styles
+from tui.widgets.drawing import KeyLabel, key_line, key_styles
 from tui.widgets.palette import ATTENTION, FAINT, STRONG
 
 from .view import View
 
 
-def order_keys(view: View, keys: Sequence[Key]) -> Text:
+def order_keys(view: View, keys: Sequence[KeyLabel]) -> Text:
     """The line of keys: stop first; orders that cannot work now are dim."""
 
     def styles(action: str) -> tuple[Style, Style]:

@@ -36,7 +36,7 @@ LABELS: dict[Quantity, str] = {
 }
 LABEL_WIDTH = 14
 WHOLE, DECIMALS, UNIT_WIDTH = 6, 2, 5
-NUMBER_WIDTH = WHOLE + DECIMALS + 1
+VALUE_COLUMNS = WHOLE + DECIMALS + 1
 
 
 def motor_lines(view: View, width: int, height: int) -> list[Text]:
@@ -44,7 +44,7 @@ def motor_lines(view: View, width: int, height: int) -> list[Text]:
     lines = [rule("Motor", width, "ends of the bars are the drive's" if width > 60 else "")]
     shown = [v for v in view.values if _is_measurement(view.profile, v)]
     barred = any(value.high for value in shown)
-    label = LABEL_WIDTH if barred else max(LABEL_WIDTH, width - NUMBER_WIDTH - UNIT_WIDTH - 3)
+    label = LABEL_WIDTH if barred else max(LABEL_WIDTH, width - VALUE_COLUMNS - UNIT_WIDTH - 3)
     lines += [_measurement(view, value, width, min(label, 40)) for value in shown]
     if len(lines) > (height := max(1, height)):
         hidden = len(lines) - height + 1
@@ -82,7 +82,7 @@ def _measurement(view: View, value: MonitoringValue, width: int, label_width: in
 
 def _append_value(text: Text, parameter: Parameter, reading: Reading | None, now: float) -> None:
     if reading is None or reading.raw is None:
-        text.append(f"{NOT_AVAILABLE:>{NUMBER_WIDTH}}", FAINT)
+        text.append(f"{NOT_AVAILABLE:>{VALUE_COLUMNS}}", FAINT)
         text.append(f" {cut(parameter.unit or 'raw', UNIT_WIDTH)}", FAINT)
         return
     shown, unit = reading.text, reading.unit or "raw"

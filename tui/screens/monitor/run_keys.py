@@ -18,7 +18,7 @@ from ..command.command_keys import OrderKeys
 from ..keys.monitor_actions import COMMAND_ACTIONS
 from .run_line import GIVEN, STEPS, Purpose, RunLine, limits, proposed, run_lines
 
-STOP_KEYS = frozenset(one.keys for one in COMMAND_ACTIONS if one.id.startswith("stop_as("))
+OTHER_STOP_KEYS = frozenset(one.keys for one in COMMAND_ACTIONS if one.id.startswith("stop_as("))
 """Keys that stop in a way of their own, at once."""
 
 
@@ -87,7 +87,7 @@ class RunKeys(OrderKeys):
             return
         line, key = self._line, event.key
         self._line = None
-        if key in STOP_KEYS:
+        if key in OTHER_STOP_KEYS:
             self.look()
             return  # never swallowed: what stops, stops here too
         event.stop()

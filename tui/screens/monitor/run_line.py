@@ -29,10 +29,10 @@ STEPS: Mapping[str, Decimal] = {
     "pagedown": Decimal(-5),
 }
 """By key, the step of a reference in Hz, or in tens of rpm."""
-LONGEST = 7
+DIGITS_MOST = 7
 GIVEN: tuple[tuple[Quantity, str], ...] = (("command_frequency", "Hz"), ("command_speed", "rpm"))
 """Where a reference is given, and in which unit; the first that a family has."""
-HEADS: Mapping[Purpose, str] = {
+RUN_HEADINGS: Mapping[Purpose, str] = {
     "forward": "RUN FORWARD",
     "reverse": "RUN REVERSE",
     "reference": "REFERENCE",
@@ -68,7 +68,7 @@ class RunLine:
             text = before if "." in before else f"{before}."
         else:
             return None
-        return replace(self, text=text[:LONGEST], fresh=False, fault="")
+        return replace(self, text=text[:DIGITS_MOST], fresh=False, fault="")
 
     def erased(self) -> RunLine:
         """With a character less; the whole proposal goes at once."""
@@ -149,10 +149,10 @@ def run_lines(
 ) -> list[Text]:
     """The line and its keys, as long as it is open."""
     first = Text(" ", no_wrap=True)
-    first.append(HEADS[line.purpose], STRONG)
+    first.append(RUN_HEADINGS[line.purpose], STRONG)
     if line.unit:
         first.append(" at ", STRONG)
-        first.append(f" {line.text:>{LONGEST}} ", "bold white on #101214")
+        first.append(f" {line.text:>{DIGITS_MOST}} ", "bold white on #101214")
         first.append(f" {line.unit}  ", PLAIN)
         first.append(_around(line, profile, readings), FAINT)
     else:

@@ -19,18 +19,18 @@ from tui.screens.monitor.state import (
     history_lines,
     line_lines,
     message_lines,
+    panel_lines,
     state_lines,
-    status_lines,
 )
 from tui.screens.monitor.trends import stacked_trends, trend_lines
 from tui.screens.monitor.view import SPANS, USUAL_SPAN, View
-from tui.screens.monitor.words import word_lines, word_pages
+from tui.screens.monitor.words import bit_lines, word_pages
 from tui.session.command.stop import Phase, StopReport
 from tui.session.console import DriveConsole
 from tui.session.reading import Rating
 from tui.widgets.lines import Lines
 
-from ..keys.table import MONITOR, bindings, line_of
+from ..keys.table import MONITOR, bindings, keys_line
 from .commands import order_keys
 from .run_keys import RunKeys
 
@@ -41,7 +41,7 @@ STILL_TOLD = 5.0
 """Seconds under a dialog after which it is told that the values below it stand still."""
 STOP_TOLD = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
 """Seconds for which the end of a stop is shown."""
-WIDE = (110, 36)
+WIDE_WORDS = (110, 36)
 """Columns and rows from which all words stand side by side."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 SMALL_LEFT = 32
@@ -102,7 +102,9 @@ class MonitorScreen(RunKeys):
 
     def on_resize(self, event: Resize) -> None:
         """More room, more words."""
-        self.set_class(event.size.width >= WIDE[0] and event.size.height >= WIDE[1], "wide")
+        self.set_class(
+            event.size.width >= WIDE_WORDS[0] and event.size.height >= WIDE_WORDS[1], "wide"
+        )
 
     def on_screen_suspend(self) -> None:
         """Stand still while another screen is on top.
@@ -165,7 +167,7 @@ class MonitorScreen(RunKeys):
             clock=self.app.clock.time_of_day(),
             read_only=self.app.read_only,
             low_bandwidth=self.app.low_bandwidth,
-            watch=self.app.fleet.keeper.watch(self.session.device) if self.app.fleet else None,
+            watch=self.app.fleet.line_watch.watch(self.session.device) if self.app.fleet else None,
             heard=self.session.line.device_state(self.session.device).heard,
             control=self.control(now),
             stop=self._stop(now),
@@ -208,8 +210,8 @@ class MonitorScreen(RunKeys):
             "header": header(view, width),
             "state": state_lines(view, left),
             "message": self.run_line_lines(view.now, width) or message_lines(view, width),
-            "status": status_lines(view, width),
-            "keys": [order_keys(view, line_of(MONITOR, width, self.app.stops_whom))],
+            "status": panel_lines(view, width),
+            "keys": [order_keys(view, keys_line(MONITOR, width, self.app.stops_whom))],
         }
         body = height - (WORDS_HEIGHT if self.wide else 0) - 5
         rest = body - len(parts["state"])
@@ -229,7 +231,7 @@ class MonitorScreen(RunKeys):
         """The chosen word; always as many lines, as a change of height lays all out anew."""
         pages = word_pages(self._words(), height - 1)
         page = pages[self._word % len(pages)] if pages else None
-        lines = word_lines(view, page, SMALL_LEFT) if page else []
+        lines = bit_lines(view, page, SMALL_LEFT) if page else []
         return {"word": lines + [Text("")] * (height - len(lines))}
 
     def _wide_words(self, view: View, height: int) -> dict[str, list[Text]]:
@@ -239,7 +241,7 @@ class MonitorScreen(RunKeys):
         for index in range(3):
             shown = index < len(pages)
             page = pages[(self._word + index) % len(pages)] if shown else None
-            parts[f"word{index}"] = word_lines(view, page, WORD_WIDTH - 1) if page else []
+            parts[f"word{index}"] = bit_lines(view, page, WORD_WIDTH - 1) if page else []
         parts["word3"] = line_lines(view, WORD_WIDTH - 1, height)
         return parts
 

@@ -10,7 +10,7 @@ from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.command.stop import Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
-from tui.session.monitor.line_watch import TOLD_AFTER
+from tui.session.monitor.line_watch import TOLD_SHARE
 from tui.session.reading import Quality
 from tui.widgets.drawing import armed_text, cut, pair, rule
 from tui.widgets.drive_signs import STATE_SIGNS, STATE_STYLES, age_text
@@ -215,7 +215,7 @@ def _is_hungry(view: View) -> bool:
     """Whether the drive was not asked for a good part of its time-out."""
     left = view.time_left
     return (
-        left is not None and view.watch is not None and left < (1 - TOLD_AFTER) * view.watch.timeout
+        left is not None and view.watch is not None and left < (1 - TOLD_SHARE) * view.watch.timeout
     )
 
 
@@ -229,7 +229,7 @@ def _countdown(view: View) -> str:
     return f" · {when}: {does}"
 
 
-def status_lines(view: View, width: int) -> list[Text]:
+def panel_lines(view: View, width: int) -> list[Text]:
     """What the panel itself does: monitoring, how fast, how well the line answers."""
     text = Text(no_wrap=True)
     text.append_text(armed_text(view.control.armed_for, lost=view.lost))

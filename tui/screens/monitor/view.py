@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.bus.line import Counters, LineState, LineStatus
+from tui.bus.line import LineCounters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import MonitoringValue
 from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop import StopReport
 from tui.session.connect.identify import DriveIdentity
-from tui.session.monitor.line_watch import Watch
+from tui.session.monitor.line_watch import TimeoutWatch
 from tui.session.monitor.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
 from tui.session.reading import Reading
 from tui.widgets.drive_signs import age_text
@@ -30,7 +30,7 @@ class View:
     line_label: str
     snapshot: Snapshot | None
     line: LineState
-    counters: Counters
+    counters: LineCounters
     load: float
     trend: tuple[TrendPoint, ...]
     period: float
@@ -39,7 +39,7 @@ class View:
     read_only: bool = False
     low_bandwidth: bool = False
     """Whether the trend is left out and the screen looked at less often."""
-    watch: Watch | None = None
+    watch: TimeoutWatch | None = None
     """The drive's watch over the line, where it has one that runs."""
     heard: float | None = None
     """When the drive last answered anybody on this line."""

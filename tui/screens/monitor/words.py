@@ -37,7 +37,7 @@ def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
     return pages
 
 
-def word_lines(view: View, page: WordPage, width: int) -> list[Text]:
+def bit_lines(view: View, page: WordPage, width: int) -> list[Text]:
     """Named bits of a word, each at its place, with the word itself."""
     parameter = page.parameter
     reading = view.reading(parameter.code)

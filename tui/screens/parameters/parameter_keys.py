@@ -7,11 +7,11 @@ from textual.widgets import Input
 from tui.session.console import DriveConsole
 from tui.session.settings.editor import Editor
 
-from ..command.arming import Arming
+from ..command.arming import ArmingKeys
 from .parameter_list import ParameterList
 
 
-class ParameterKeys(Arming):
+class ParameterKeys(ArmingKeys):
     """The base of the keys that stage, write and handle parameter sets."""
 
     def __init__(self, console: DriveConsole) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from tui.drive.settings.selection import FILTERS, Facts, FilterId, rows
-from tui.screens.parameters.view import Item, items_of
+from tui.drive.settings.selection import FILTERS, FilterContext, FilterId, rows
+from tui.screens.parameters.view import TableLine, items_of
 from tui.session.settings.editor import Editor
 
 USUAL: FilterId = "settings"
@@ -18,7 +18,7 @@ class ParameterList:
     """Lines of parameters and headings; the cursor is on a parameter, where there is one."""
 
     chosen: FilterId = USUAL
-    items: Sequence[Item] = field(default_factory=list)
+    items: Sequence[TableLine] = field(default_factory=list)
     at: int = 0
     """The line of the cursor."""
     top: int = 0
@@ -47,7 +47,7 @@ class ParameterList:
         """Forget the parameter under the cursor: the next filling chooses its first."""
         self.at = len(self.items)
 
-    def choose_next(self, facts: Facts, step: int) -> None:
+    def choose_next(self, facts: FilterContext, step: int) -> None:
         """The next or previous selection that shows anything."""
         at = FILTERS.index(self.chosen)
         for _ in FILTERS:
@@ -80,7 +80,7 @@ class ParameterList:
         if nearest:
             self.move_to((nearest[0] if step > 0 else nearest[-1]) + 1, 1)
 
-    def window(self, room: int) -> Sequence[Item]:
+    def window(self, room: int) -> Sequence[TableLine]:
         """The lines that fit, the cursor's among them, with the heading just above it."""
         first = self.at - 1 if self.at and self.items[self.at - 1].group else self.at
         self.top = min(max(self.top, self.at - room + 1), first) if self.items else 0

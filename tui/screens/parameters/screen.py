@@ -9,7 +9,13 @@ from textual.app import ComposeResult
 from textual.containers import Horizontal
 from textual.widgets import Input
 
-from tui.screens.parameters.view import detail_lines, head_line, news_lines, row_line, status_line
+from tui.screens.parameters.view import (
+    head_line,
+    news_lines,
+    parameter_lines,
+    row_line,
+    status_line,
+)
 from tui.widgets.drawing import rule
 from tui.widgets.fields import Field
 from tui.widgets.lines import Lines
@@ -22,7 +28,7 @@ from .set_keys import SetKeys
 from .stage_keys import StageKeys
 from .write_keys import WriteKeys
 
-BELOW = 9
+LINES_BELOW_TABLE = 9
 """Lines below the table: four of detail, three of news, the status and the keys."""
 ABOVE = 2
 
@@ -60,7 +66,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     @property
     def _room(self) -> int:
-        return max(3, self.size.height - ABOVE - BELOW)
+        return max(3, self.size.height - ABOVE - LINES_BELOW_TABLE)
 
     def draw(self, width: int) -> None:
         """The lines around the cursor, what is known of the one under it, and the news."""
@@ -78,7 +84,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         other = editor.other_label  # a file keeps its name as it is
         self.put("head", [head_line(width, "Factory" if other == "factory" else other)])
         code = self.listed.code
-        detail = detail_lines(editor, code, width) if code else []
+        detail = parameter_lines(editor, code, width) if code else []
         self.put("detail", [rule("", width), *detail])
         self.put("message", news_lines(editor, code, self._message(), width))
         self.put("status", [status_line(editor, self.commander.armed_for, width)])

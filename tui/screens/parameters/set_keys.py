@@ -25,19 +25,19 @@ class SetKeys(ParameterKeys):
 
     def action_save_file(self) -> None:
         """Ask for a file, read everything, write it."""
-        from tui.drive.settings.parameter_set import dumps
+        from tui.drive.settings.parameter_set import dump_set
 
         about = "Every readable parameter, in units and raw, one a line (TOML)."
         profile = self.session.profile
-        self._ask_for_file("Back up to", "toml", about, lambda values: dumps(profile, values))
+        self._ask_for_file("Back up to", "toml", about, lambda values: dump_set(profile, values))
 
     def action_report(self) -> None:
         """Ask for a file, read everything, write what a customer may be given."""
-        from tui.session.report import entries_of, report
+        from tui.session.report import entries_of, report_text
 
         def text(values: ParameterSet) -> str:
             entries = entries_of(self.editor.journal, self.session.line_text, self.session.device)
-            return report(self.session.profile, values, entries)
+            return report_text(self.session.profile, values, entries)
 
         about = (
             "Identity, line, changed settings, control source, reaction to a lost line, faults and"

@@ -13,20 +13,20 @@ from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 
 from tui.drive.plain import plain
-from tui.drive.settings.restore_plan import Item
+from tui.drive.settings.restore_plan import RestoreItem
 from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
 
-from ..dialogs.question import STYLES, hint
+from ..dialogs.question import DIALOG_STYLES, hint
 
 
 class Skipped(ModalScreen[None]):
     """A list to read through; scrolls."""
 
-    CSS_PATH = STYLES
+    CSS_PATH = DIALOG_STYLES
     BINDINGS: ClassVar = [Binding("escape,enter,q", "dismiss(None)", show=False)]
 
-    def __init__(self, staged: int, label: str, left: Sequence[Item]) -> None:
+    def __init__(self, staged: int, label: str, left: Sequence[RestoreItem]) -> None:
         super().__init__()
         self._head = f"{staged} staged from {label}; {len(left)} left out"
         self._left = left

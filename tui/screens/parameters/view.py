@@ -22,32 +22,32 @@ from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, LINE, PLAIN, ST
 CODE_WIDTH = 7
 VALUE_WIDTH = 13
 OTHER_WIDTH, OTHER_WIDE = 11, 13
-NUMBER_WIDTH = 9
+MANUAL_NUMBER_WIDTH = 9
 RANGE_WIDTH = 22
 NEWS = 3
 """Lines for what is said and what happened to a parameter last."""
-WIDE = 110
+WIDE_TABLE = 110
 """Columns from which the manual's number and the range have columns of their own."""
 
 
 @dataclass(frozen=True, slots=True)
-class Item:
+class TableLine:
     """A line of the table: a parameter, or the heading of a group."""
 
     code: str = ""
     group: str = ""
 
 
-def items_of(editor: Editor, codes: Sequence[str], *, headings: bool) -> list[Item]:
+def items_of(editor: Editor, codes: Sequence[str], *, headings: bool) -> list[TableLine]:
     """The lines of a list of parameters, a heading before each group."""
-    found: list[Item] = []
+    found: list[TableLine] = []
     last = ""
     for code in codes:
         group = editor.session.profile[code].group
         if headings and group != last:
-            found.append(Item(group=group))
+            found.append(TableLine(group=group))
             last = group
-        found.append(Item(code))
+        found.append(TableLine(code))
     return found
 
 
@@ -55,30 +55,30 @@ def head_line(width: int, other: str) -> Text:
     """The names of the columns."""
     text = Text(no_wrap=True)
     text.append(f"   {'Code':<{CODE_WIDTH}}", TITLE)
-    if width >= WIDE:
-        text.append(f"{'Number':<{NUMBER_WIDTH}}", TITLE)
+    if width >= WIDE_TABLE:
+        text.append(f"{'Number':<{MANUAL_NUMBER_WIDTH}}", TITLE)
     text.append(cut("Name", name_width(width)), TITLE)
     text.append(f"{'Value':>{VALUE_WIDTH}}   {'Staged':<{VALUE_WIDTH}}", TITLE)
     text.append(_other(other, width), TITLE)
-    if width >= WIDE:
+    if width >= WIDE_TABLE:
         text.append(f"  {'Range':<{RANGE_WIDTH}}", TITLE)
     return text
 
 
 def name_width(width: int) -> int:
     """The room for a name."""
-    more = NUMBER_WIDTH + RANGE_WIDTH + 2 if width >= WIDE else 0
+    more = MANUAL_NUMBER_WIDTH + RANGE_WIDTH + 2 if width >= WIDE_TABLE else 0
     other = len(_other("", width))
     return max(8, width - (3 + CODE_WIDTH + 2 * VALUE_WIDTH + 3 + other + 3 + more))
 
 
 def _other(text: str, width: int) -> str:
     """The column of the factory value, or of what the drive is compared with."""
-    columns = OTHER_WIDE if width >= WIDE else OTHER_WIDTH
+    columns = OTHER_WIDE if width >= WIDE_TABLE else OTHER_WIDTH
     return f"{short(text, columns - 1):>{columns}}"
 
 
-def row_line(editor: Editor, item: Item, width: int, *, chosen: bool) -> Text:
+def row_line(editor: Editor, item: TableLine, width: int, *, chosen: bool) -> Text:
     """One line of the table."""
     if item.group:
         text = Text(no_wrap=True)
@@ -100,8 +100,8 @@ def _row(editor: Editor, parameter: Parameter, width: int) -> Text:
     text.append(
         f"{code + ('' if sure else '?'):<{CODE_WIDTH}}"[:CODE_WIDTH], _code_style(parameter, sure)
     )
-    if width >= WIDE:
-        text.append(f"{parameter.number[: NUMBER_WIDTH - 1]:<{NUMBER_WIDTH}}", FAINT)
+    if width >= WIDE_TABLE:
+        text.append(f"{parameter.number[: MANUAL_NUMBER_WIDTH - 1]:<{MANUAL_NUMBER_WIDTH}}", FAINT)
     text.append(cut(parameter.name, name_width(width) - 1) + " ", FAINT)
     held = value_text(editor, code)
     changed = not_factory(editor.session.profile, parameter, editor.raws.get(code))
@@ -111,7 +111,7 @@ def _row(editor: Editor, parameter: Parameter, width: int) -> Text:
     text.append_text(_staged(editor, code))
     text.append(_other(other_text(editor, parameter), width), FAINT)
     text.append(_flags(editor, parameter), ALARM)
-    if width >= WIDE:
+    if width >= WIDE_TABLE:
         text.append(cut(range_text(editor, parameter), RANGE_WIDTH - 1), FAINT)
     return text
 
@@ -190,7 +190,7 @@ def range_text(editor: Editor, parameter: Parameter) -> str:
     return limits_text(editor.session.profile, parameter, editor.raws, editor.lacking)
 
 
-def detail_lines(editor: Editor, code: str, width: int) -> list[Text]:
+def parameter_lines(editor: Editor, code: str, width: int) -> list[Text]:
     """What one parameter is, on three lines."""
     parameter = editor.session.profile[code]
     return [
@@ -314,11 +314,11 @@ def status_line(editor: Editor, armed: float | None, width: int) -> Text:
 
 
 __all__ = [
-    "Item",
-    "detail_lines",
+    "TableLine",
     "head_line",
     "items_of",
     "news_lines",
+    "parameter_lines",
     "range_text",
     "row_line",
     "status_line",

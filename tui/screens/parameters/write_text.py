@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.drive.settings.edits import Edit, Edits, consequences, cuts_line, ordered, problems
+from tui.drive.settings.edits import Edit, Edits, consequences, cuts_line, edit_problems, ordered
 from tui.session.settings.editor import Editor
 
-SHOWN = 9
+EDITS_NAMED = 9
 """Edits that are named; the others are counted."""
 
 
@@ -16,10 +16,10 @@ def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
     profile, raws = editor.session.profile, editor.raws
     chosen = Edits(tuple(edits))
     order = ordered(profile, chosen, raws)
-    lines = [f"{e.code}  {e.old_text or '-----'} → {e.text}" for e in order[:SHOWN]]
-    if len(order) > SHOWN:
-        lines.append(f"and {len(order) - SHOWN} more")
-    told = list(problems(profile, chosen, raws).values())
+    lines = [f"{e.code}  {e.old_text or '-----'} → {e.text}" for e in order[:EDITS_NAMED]]
+    if len(order) > EDITS_NAMED:
+        lines.append(f"and {len(order) - EDITS_NAMED} more")
+    told = list(edit_problems(profile, chosen, raws).values())
     told += [r.text for e in order if (r := editor.refusal(e.code)) is not None]
     told += [edit.warning for edit in order if edit.warning]
     told += consequences(profile, chosen, raws, editor.lacking)

@@ -1,4 +1,4 @@
-"""The blocks of one drive at a desk: watched, an assignment proposed, written, compared.
+"""The blocks of one drive in an editor: watched, an assignment proposed, written, compared.
 
 The values come in through a worker of the line's loop, as long as somebody looks. What is
 proposed belongs to the thread of the screen and is kept until it is written or dropped.
@@ -16,14 +16,14 @@ from tui.bus.errors import LineError
 from tui.bus.line import Worker
 from tui.drive.blocks.assignment import (
     Assignment,
-    Change,
     MappingError,
     Problem,
+    SlotChange,
     assignment,
-    changes,
+    assignment_problems,
     factory,
     pick,
-    problems,
+    slot_changes,
     slots_of,
 )
 from tui.drive.blocks.user_words import UserWords
@@ -36,21 +36,21 @@ from tui.drive.settings.writable import AT_REST
 from ..drive import DriveSession
 from ..journal import Journal
 from ..monitor.monitor import Monitor, Snapshot, monitoring_codes, rates_of
-from ..read.verdict import Verdict
-from ..work import Kind, Outcome, Permit, Task
+from ..read.verdict import SlotMatch
+from ..work import Outcome, OutcomeKind, Permit, Task
 from .exchange import exchange
 from .mapping import BlockView, Force, Mapper, wire_timing
 from .outputs import Meant, example, meant, refuse_pending, values_text
 from .user_words import load_words, read_words, save_words
 from .write import at_rest_only, write_assignment
 
-AGAIN = 1.0
+LOOK_EVERY = 1.0
 """Seconds between two looks at the blocks."""
-AFTER_ERROR = 1.0
+LOOK_AFTER_ERROR = 1.0
 
 
 @dataclass(slots=True)
-class MappingDesk:
+class BlockEditor:
     """What is known of a drive's blocks, what is proposed, and the work on them."""
 
     session: DriveSession
@@ -107,7 +107,7 @@ class MappingDesk:
     def verify(self) -> None:
         """Compare every slot several times at the next look, and tell what came of it."""
         self._verify = True
-        self._say("Comparing each slot with direct reads", Kind.WORKING)
+        self._say("Comparing each slot with direct reads", OutcomeKind.WORKING)
 
     async def _watch(self) -> None:
         while True:
@@ -115,10 +115,10 @@ class MappingDesk:
                 await self._look()
             except (LineError, DriveError) as error:
                 self.trouble = str(error)
-                await asyncio.sleep(AFTER_ERROR)
+                await asyncio.sleep(LOOK_AFTER_ERROR)
             else:
                 self.trouble = ""
-                await asyncio.sleep(0.0 if self._verify else AGAIN)
+                await asyncio.sleep(0.0 if self._verify else LOOK_EVERY)
 
     async def _look(self) -> None:
         verify, self._verify = self._verify, False
@@ -129,7 +129,7 @@ class MappingDesk:
         self.word_raws = await read_words(self.session, self.words)
         if verify:
             text, good = _verdict(list(self.views.values()))
-            self._say(text, Kind.DONE if good else Kind.REFUSED)
+            self._say(text, OutcomeKind.DONE if good else OutcomeKind.REFUSED)
 
     def _wait_for_a_reset(self) -> None:
         """Note when the drive was silent or starts anew: what waits for a reset may count then."""
@@ -193,15 +193,15 @@ class MappingDesk:
             raise MappingError(f"{block.name} could not be read yet.")
         return plan
 
-    def changes(self, block: Block) -> list[Change]:
+    def changes(self, block: Block) -> list[SlotChange]:
         """What writing the proposal would change now."""
         plan, today = self.plans.get(block.id), self.today(block)
-        return changes(today.slots, plan) if plan and today else []
+        return slot_changes(today.slots, plan) if plan and today else []
 
     def problems(self, block: Block) -> list[Problem]:
         """What is wrong with the proposal, or with today's assignment where there is none."""
         plan = self.proposed(block)
-        return problems(self.session.profile, plan, self.mapper.lacking) if plan else []
+        return assignment_problems(self.session.profile, plan, self.mapper.lacking) if plan else []
 
     # What it costs
 
@@ -232,7 +232,7 @@ class MappingDesk:
         """Watch other words from now on, and keep them for this drive."""
         self.words, self.word_raws = words, [None] * len(words)
         if wrong := save_words(self.session, words):
-            self._say(wrong, Kind.REFUSED)
+            self._say(wrong, OutcomeKind.REFUSED)
 
     # Writing
 
@@ -321,7 +321,7 @@ class MappingDesk:
         """Do it as work on the drive: nothing before it, ended by a stop."""
         queue = self.session.work
         if queue.busy:
-            self._say("Another command is still being carried out.", Kind.REFUSED)
+            self._say("Another command is still being carried out.", OutcomeKind.REFUSED)
             return
         cut_short = False
 
@@ -340,7 +340,7 @@ class MappingDesk:
         try:
             queue.put(Task(carry_out, owner=self, working=doing, given_up=given_up), stamp)
         except OrderRefused as refused:
-            self._say(str(refused), Kind.REFUSED)
+            self._say(str(refused), OutcomeKind.REFUSED)
 
     def _look_again(self) -> None:
         """What was not done to its end: the person looks at what the drive holds now."""
@@ -357,9 +357,9 @@ class MappingDesk:
 
     def refuse(self, text: str) -> None:
         """Tell why something was not done."""
-        self._say(text, Kind.REFUSED)
+        self._say(text, OutcomeKind.REFUSED)
 
-    def _say(self, text: str, kind: Kind) -> None:
+    def _say(self, text: str, kind: OutcomeKind) -> None:
         self.session.work.tell(kind, text)
 
 
@@ -373,8 +373,8 @@ def _verdict(views: list[BlockView]) -> tuple[str, bool]:
         if view.trouble:
             wrong.append(view.trouble)
         for slot in view.slots:
-            counted += slot.verdict in (Verdict.SAME, Verdict.MOVING)
-            if slot.verdict in (Verdict.DIFFERS, Verdict.CHANGED, Verdict.NONE):
+            counted += slot.verdict in (SlotMatch.SAME, SlotMatch.MOVING)
+            if slot.verdict in (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE):
                 brings = f", brings {slot.brings}" if slot.brings else ""
                 waits = " until the next reset" if slot.force is Force.PENDING else ""
                 wrong.append(f"{slot.code} {slot.verdict}{brings}{waits}")

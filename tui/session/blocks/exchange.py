@@ -11,7 +11,14 @@ from dataclasses import dataclass, field
 
 from tui.bus.errors import LineError, RequestRefused
 from tui.bus.line import Priority
-from tui.drive.blocks.assignment import UNUSED, Assignment, describe, problems, refusing, target
+from tui.drive.blocks.assignment import (
+    UNUSED,
+    Assignment,
+    assignment_problems,
+    describe,
+    refusing,
+    slot_target,
+)
 from tui.drive.blocks.wire_cost import reach, span
 from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
 from tui.drive.profile.schema import Parameter
@@ -21,7 +28,7 @@ from tui.drive.values import check_raw, from_words, to_words
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
-from ..read.retrying_reader import Asker
+from ..read.retrying_reader import RetryingReader
 from ..settings.write import NotTaken, Writer
 from ..starts.keeper import record_start
 from ..work import Permit
@@ -66,7 +73,7 @@ async def exchange(
             " and nobody has confirmed it: nothing is written."
         )
     work = _Exchange(
-        session, Writer(session, journal, permit), Asker(session), outputs, inputs, wanted
+        session, Writer(session, journal, permit), RetryingReader(session), outputs, inputs, wanted
     )
     work.check_named()
     return await work.carry_out(permit)
@@ -76,7 +83,7 @@ async def exchange(
 class _Exchange:
     session: DriveSession
     writer: Writer
-    asker: Asker
+    retrying: RetryingReader
     outputs: Assignment
     inputs: Assignment | None
     wanted: Mapping[str, int]
@@ -87,7 +94,7 @@ class _Exchange:
     def __post_init__(self) -> None:
         profile, block = self.session.profile, self.outputs.block
         self.places = reach(profile, self.outputs, self.wanted)
-        found = [target(profile, block, self.outputs.raws[place]) for place in self.places]
+        found = [slot_target(profile, block, self.outputs.raws[place]) for place in self.places]
         self.targets = [parameter for parameter in found if parameter is not None]
 
     def check_named(self) -> None:
@@ -99,12 +106,12 @@ class _Exchange:
         if not self.wanted:
             raise AssignmentRefused("No output was named; nothing was written.")
         for place in self.places:
-            if target(profile, block, self.outputs.raws[place]) is None:
+            if slot_target(profile, block, self.outputs.raws[place]) is None:
                 stands = describe(profile, block, self.outputs.raws[place])
                 raise AssignmentRefused(
                     f"{block.slots[place]} is {stands}: nothing is written through it."
                 )
-        if wrong := refusing(problems(profile, self.outputs)):
+        if wrong := refusing(assignment_problems(profile, self.outputs)):
             raise AssignmentRefused(" ".join(problem.text for problem in wrong))
 
     async def carry_out(self, permit: Permit) -> Exchanged:
@@ -140,7 +147,7 @@ class _Exchange:
     async def _read_scales(self) -> None:
         """What scales and units depend on: errors and the journal tell engineering values."""
         sources = [code for parameter in self.targets for code in depends_on(parameter)]
-        await self.asker.ask_raws(dict.fromkeys(sources))
+        await self.retrying.ask_raws(dict.fromkeys(sources))
 
     async def _held(self) -> dict[str, int]:
         """What the outputs hold now, with all that an indirect block could stand for."""
@@ -148,26 +155,26 @@ class _Exchange:
         if self.outputs.block.effective == "after-reset":
             codes += [choice.parameter for choice in self.outputs.block.choices]
         profile = self.session.profile
-        return await self.asker.ask_raws(
+        return await self.retrying.ask_raws(
             code for code in dict.fromkeys(codes) if profile[code].access != "w"
         )
 
     async def _interlocks(self) -> None:
         """The interlocks of a run order where an output is an order; rest where one needs it."""
         profile = self.session.profile
-        state = await self.asker.ask_state()
+        state = await self.retrying.ask_state()
         stopped = [p.code for p in self.targets if p.access == "rw-stopped"]
         if stopped and state not in AT_REST:
             raise AssignmentRefused(
                 f"{', '.join(stopped)} are written with the motor stopped only; the drive is"
-                f" {self.asker.headline}."
+                f" {self.retrying.headline}."
             )
         if not any(is_order(profile, parameter) for parameter in self.targets):
             return
         codes = deciding_codes(profile)
         for chart in profile.data.charts:
             codes += interlock_codes(chart)
-        await self.asker.ask_raws(codes)
+        await self.retrying.ask_raws(codes)
         raws = self.session.image.raws
         found = chart_in_force(profile, raws)
         if found is None or not found.orders:
@@ -177,7 +184,7 @@ class _Exchange:
 
     def _check(self, parameter: Parameter, raw: int) -> None:
         profile = self.session.profile
-        scale = profile.scale(parameter, self.asker.raws, self.asker.lacking)
+        scale = profile.scale(parameter, self.retrying.raws, self.retrying.lacking)
         check_raw(parameter, raw, profile.names(parameter), scale)
 
     async def _send(
@@ -293,7 +300,7 @@ class _Exchange:
         unknown = self.session.profile.data.reading.unknown_word
         for raw, word in zip(self.inputs.raws if self.inputs else (), reply, strict=False):
             assert self.inputs is not None
-            parameter = target(self.session.profile, self.inputs.block, raw)
+            parameter = slot_target(self.session.profile, self.inputs.block, raw)
             if raw != UNUSED and parameter is not None and word != unknown:
                 found[parameter.code] = from_words(parameter, [word])
         return found
@@ -304,7 +311,7 @@ class _Exchange:
             if plan is None:
                 continue
             block = plan.block
-            held = await self.asker.ask_raws(block.slots)
+            held = await self.retrying.ask_raws(block.slots)
             changed = [slot for slot, raw in plan.slots.items() if held.get(slot) != raw]
             if not changed:
                 continue

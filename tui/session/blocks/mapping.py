@@ -15,7 +15,7 @@ from enum import StrEnum
 from tui.bus.errors import DeviceException
 from tui.bus.line import Priority
 from tui.bus.link import TcpLink, character_time, silence
-from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, target
+from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, slot_target
 from tui.drive.blocks.wire_cost import span
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.read_plan import WireTiming
@@ -23,14 +23,14 @@ from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from ..drive import DriveSession
-from ..read.proof import SURE, Proof
-from ..read.retrying_reader import Asker
-from ..read.verdict import Verdict
+from ..read.proof import SURE, SlotEvidence
+from ..read.reader import USUAL_TURNAROUND
+from ..read.retrying_reader import RetryingReader
+from ..read.verdict import SlotMatch
 from ..reading import Reading
 
-MOST = 2 * SURE
+COMPARISONS_MOST = 2 * SURE
 """Comparisons after which what is not proved stays so: values that are alike cannot be told."""
-USUAL_TURNAROUND = 0.005
 
 
 class Force(StrEnum):
@@ -56,7 +56,7 @@ class Slot:
     text: str = NOT_AVAILABLE
     """The same as a person reads it, with its unit."""
     direct: Reading | None = None
-    verdict: Verdict = Verdict.UNREAD
+    verdict: SlotMatch = SlotMatch.UNREAD
     force: Force = Force.NOTHING
     brings: str = ""
     """Code of what it brings in place of what was chosen, where that is sure."""
@@ -82,8 +82,8 @@ class BlockView:
         """Whether a slot does not seem to bring what it stands for."""
         read = self.slots if self.block.direction == "read" else ()
         return any(
-            slot.verdict is Verdict.DIFFERS
-            or (slot.verdict is Verdict.NONE and slot.force is Force.UNPROVED)
+            slot.verdict is SlotMatch.DIFFERS
+            or (slot.verdict is SlotMatch.NONE and slot.force is Force.UNPROVED)
             for slot in read
         )
 
@@ -122,10 +122,10 @@ class Mapper:
     priority: Priority = Priority.OPERATOR_READ
     written: dict[str, int] = field(default_factory=dict)
     """Slots written from here that count after a reset, which was not seen yet."""
-    _asker: Asker = field(init=False)
+    _asker: RetryingReader = field(init=False)
 
     def __post_init__(self) -> None:
-        self._asker = Asker(self.session, self.priority)
+        self._asker = RetryingReader(self.session, self.priority)
 
     @property
     def lacking(self) -> frozenset[str]:
@@ -147,8 +147,8 @@ class Mapper:
         if every one says that. Where a slot seems to differ, it is looked at again anyway; where
         all rounds were asked for, so is one that is not proved yet.
         """
-        proof, view = Proof(self.session.profile, block), BlockView(block, ())
-        for number in range(1, MOST + 1):
+        proof, view = SlotEvidence(self.session.profile, block), BlockView(block, ())
+        for number in range(1, COMPARISONS_MOST + 1):
             view = await self._round(proof, view)
             doubtful = view.is_doubtful if number < SURE else rounds >= SURE and view.is_unproved
             if number >= rounds and not doubtful:
@@ -159,7 +159,7 @@ class Mapper:
         """The same, compared several times."""
         return await self.look(block, rounds=SURE)
 
-    async def _round(self, proof: Proof, earlier: BlockView) -> BlockView:
+    async def _round(self, proof: SlotEvidence, earlier: BlockView) -> BlockView:
         """One comparison: direct, block, direct, and the slots again."""
         block, profile = proof.block, self.session.profile
         held = await self.slots(block)
@@ -167,7 +167,7 @@ class Mapper:
             # what was compared before says nothing of these slots
             proof.begin()
         chosen = {
-            slot: target(profile, block, held[slot]) if slot in held else None
+            slot: slot_target(profile, block, held[slot]) if slot in held else None
             for slot in block.slots
         }
         codes = self._to_ask(block, chosen.values())
@@ -181,7 +181,7 @@ class Mapper:
             # one slot was seen to change: others may have, there and back again
             proof.begin()
             changed = tuple(
-                Slot(slot, still.get(slot), verdict=Verdict.CHANGED) for slot in block.slots
+                Slot(slot, still.get(slot), verdict=SlotMatch.CHANGED) for slot in block.slots
             )
             return BlockView(block, changed, "The slots were changed while they were looked at.")
         proof.note(words, before, after)
@@ -227,37 +227,41 @@ class Mapper:
         return reply.words, ""
 
     def _slot(
-        self, proof: Proof, now: Slot, was: Slot | None, direct: Mapping[str, Reading]
+        self, proof: SlotEvidence, now: Slot, was: Slot | None, direct: Mapping[str, Reading]
     ) -> Slot:
         """A slot with its code, raw value, parameter and word, and what the words have told."""
         slot, raw, parameter, word = now.code, now.raw, now.parameter, now.word
         if was is not None and was.raw != raw:
-            return Slot(slot, raw, parameter, verdict=Verdict.CHANGED)
+            return Slot(slot, raw, parameter, verdict=SlotMatch.CHANGED)
         if raw == UNUSED:
-            return Slot(slot, raw, verdict=Verdict.UNUSED)
+            return Slot(slot, raw, verdict=SlotMatch.UNUSED)
         if raw is None or parameter is None:
-            return Slot(slot, raw, word=word, verdict=Verdict.NONE)
+            return Slot(slot, raw, word=word, verdict=SlotMatch.NONE)
         force, brings = self._force(proof, slot, raw)
         told = replace(now, direct=direct.get(parameter.code), force=force, brings=brings)
         if word is None or word_count(parameter) != 1:
             return replace(told, word=None)
         if word == self.session.profile.data.reading.unknown_word:
-            return replace(told, verdict=Verdict.NONE)
+            return replace(told, verdict=SlotMatch.NONE)
         verdict, through = proof.verdict(slot, parameter.code), from_words(parameter, [word])
-        if verdict is Verdict.MOVING and was is not None and not proof.fitted(slot, parameter.code):
+        if (
+            verdict is SlotMatch.MOVING
+            and was is not None
+            and not proof.fitted(slot, parameter.code)
+        ):
             # its value of the round in which it fitted
             return replace(was, verdict=verdict, force=force, brings=brings)
         text = self._text(parameter, through)
-        if verdict is Verdict.DIFFERS and proof.block.direction == "read":
+        if verdict is SlotMatch.DIFFERS and proof.block.direction == "read":
             # it is not this parameter's value: it gets neither its scale nor its unit
             text = f"raw {word}"
         return replace(told, word=through, text=text, verdict=verdict)
 
     def _text(self, parameter: Parameter, raw: int) -> str:
-        profile, asker = self.session.profile, self._asker
-        return shown(profile, parameter, raw, asker.raws, asker.lacking).display
+        profile, retrying = self.session.profile, self._asker
+        return shown(profile, parameter, raw, retrying.raws, retrying.lacking).display
 
-    def _force(self, proof: Proof, slot: str, raw: int) -> tuple[Force, str]:
+    def _force(self, proof: SlotEvidence, slot: str, raw: int) -> tuple[Force, str]:
         """Whether the slot is in force, and what it brings where that is something else."""
         # the monitor compares all the time, and may have proved it
         known = proof.block.effective == "at-once" or self.in_force().get(slot) == raw

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from tui.drive.blocks.assignment import Assignment, MappingError, describe, target
-from tui.drive.blocks.wire_cost import frame, reach, together
+from tui.drive.blocks.assignment import Assignment, MappingError, describe, slot_target
+from tui.drive.blocks.wire_cost import block_request, reach, together
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
@@ -14,7 +14,7 @@ from tui.drive.shown import shown_text, typed_text
 from tui.drive.values import encode, to_words
 from tui.wire.frames import hex_text
 
-REFERENCES = frozenset({"command_frequency", "command_speed"})
+REFERENCE_QUANTITIES = frozenset({"command_frequency", "command_speed"})
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +31,7 @@ class Meant:
 
 def output_codes(profile: Profile, outputs: Assignment) -> dict[str, Parameter]:
     """What the output slots stand for, by code."""
-    found = (target(profile, outputs.block, raw) for raw in outputs.raws)
+    found = (slot_target(profile, outputs.block, raw) for raw in outputs.raws)
     return {parameter.code: parameter for parameter in found if parameter is not None}
 
 
@@ -77,7 +77,9 @@ def meant(
     lines = [*_lines(profile, outputs, places, wanted, raws, absent)]
     words = [_word(profile, outputs, place, wanted, raws) for place in places]
     inputs, _ = together(profile, inputs, outputs, "write")
-    lines.append(f"Frame: {hex_text(frame(profile, device, inputs, outputs, words, places))}")
+    lines.append(
+        f"Frame: {hex_text(block_request(profile, device, inputs, outputs, words, places))}"
+    )
     return Meant(outputs, inputs, wanted, "\n".join(lines))
 
 
@@ -137,7 +139,7 @@ def _lines(
 def _moves(profile: Profile, code: str) -> bool:
     """Whether a word is a command or a reference of the line."""
     commands = {chart.command for chart in profile.data.charts}
-    return code in commands or profile[code].quantity in REFERENCES
+    return code in commands or profile[code].quantity in REFERENCE_QUANTITIES
 
 
 def _word(
@@ -148,7 +150,7 @@ def _word(
     raws: Mapping[str, int],
 ) -> int:
     """The word for a place, as far as it is known before the exchange."""
-    parameter = target(profile, outputs.block, outputs.raws[place])
+    parameter = slot_target(profile, outputs.block, outputs.raws[place])
     if parameter is None:
         return 0
     raw = wanted.get(parameter.code, raws.get(parameter.code, 0))

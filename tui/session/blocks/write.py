@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.drive.blocks.assignment import (
     Assignment,
-    Change,
     MappingError,
+    SlotChange,
+    assignment_problems,
     describe,
-    problems,
     refusing,
     steps,
 )
@@ -24,7 +24,7 @@ from tui.drive.settings.writable import AT_REST
 
 from ..drive import DriveSession
 from ..journal import Journal
-from ..read.retrying_reader import Asker
+from ..read.retrying_reader import RetryingReader
 from ..settings.refusals import device_refusal
 from ..settings.write import NotTaken, Writer
 from ..work import Permit
@@ -38,7 +38,7 @@ class AssignmentRefused(MappingError):
 class Written:
     """What was written, in order."""
 
-    changes: tuple[Change, ...]
+    changes: tuple[SlotChange, ...]
     after_reset: bool
     """True where it counts only once the drive was reset."""
     unsaved: bool
@@ -74,9 +74,9 @@ async def write_assignment(
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
-    if wrong := refusing(problems(session.profile, plan)):
+    if wrong := refusing(assignment_problems(session.profile, plan)):
         raise AssignmentRefused(" ".join(problem.text for problem in wrong))
-    work = _Writing(session, Writer(session, journal, permit), Asker(session), plan)
+    work = _Writing(session, Writer(session, journal, permit), RetryingReader(session), plan)
     return await work.carry_out(expected)
 
 
@@ -92,9 +92,9 @@ def at_rest_only(block: Block, headline: str) -> str:
 class _Writing:
     session: DriveSession
     writer: Writer
-    asker: Asker
+    retrying: RetryingReader
     plan: Assignment
-    done: tuple[Change, ...] = ()
+    done: tuple[SlotChange, ...] = ()
 
     async def carry_out(self, expected: Mapping[str, int] | None) -> Written:
         block = self.plan.block
@@ -119,10 +119,10 @@ class _Writing:
         return Written(self.done, block.effective == "after-reset", unsaved)
 
     async def _held(self) -> dict[str, int]:
-        held = await self.asker.ask_raws(self.plan.block.slots)
+        held = await self.retrying.ask_raws(self.plan.block.slots)
         missing = [slot for slot in self.plan.block.slots if slot not in held]
         if missing:
-            said = self.asker.why_absent(missing[0])
+            said = self.retrying.why_absent(missing[0])
             raise AssignmentRefused(self._so_far(f"{missing[0]} cannot be read: {said}"))
         return held
 
@@ -131,17 +131,17 @@ class _Writing:
         permit = self.writer.permit
         if permit is not None and (why := permit.refusal()):
             raise AssignmentRefused(self._so_far(why))
-        if await self.asker.ask_state() not in AT_REST:
-            text = at_rest_only(self.plan.block, self.asker.headline)
+        if await self.retrying.ask_state() not in AT_REST:
+            text = at_rest_only(self.plan.block, self.retrying.headline)
             raise AssignmentRefused(self._so_far(text))
 
-    async def _write(self, step: Change) -> None:
+    async def _write(self, step: SlotChange) -> None:
         profile = self.session.profile
         parameter = profile[step.slot]
         try:
             await self.writer.write(parameter, step.new, why=self.plan.block.name.lower())
         except DeviceException as error:
-            text = device_refusal(profile, parameter, error, self.asker.headline)
+            text = device_refusal(profile, parameter, error, self.retrying.headline)
             raise AssignmentRefused(self._so_far(text)) from error
         except NotTaken as error:
             raise AssignmentRefused(self._so_far(str(error))) from error

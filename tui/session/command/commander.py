@@ -23,7 +23,7 @@ from tui.drive.orders import (
     deciding_codes,
     interlock,
     interlock_codes,
-    target,
+    order_target,
     walk,
     with_options,
 )
@@ -32,27 +32,26 @@ from tui.drive.values import from_words
 
 from ..arming import ARMED_FOR
 from ..drive import DriveSession
+from ..drive_state import STATE_FRESH
 from ..journal import Journal
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
 from ..starts.keeper import NothingToTakeOver, record_start
-from ..work import Kind, Outcome, Permit, Task
+from ..work import Outcome, OutcomeKind, Permit, Task
 from .control_source import configure
 from .reference import Reference, parse_reference, reference_codes, within_limits
 
-FRESH = 1.0
-"""Seconds for which a state counts as that of now; an older one is read anew before arming."""
 STEP_TIME = 2.0
 """Seconds that a drive may take for one step of its chart."""
-LOOK = 0.05
+STATE_POLL_INTERVAL = 0.05
 LOOKS = 10
 """Looks within which the direction of a start must be the ordered one."""
 ENABLED = "enabled"
 """The state of the Drivecom charts in which the motor runs."""
 
 
-Work = Callable[["_Commands"], Coroutine[Any, Any, str]]
+CommandWork = Callable[["_Commands"], Coroutine[Any, Any, str]]
 """A command; it returns what was done."""
 
 
@@ -84,7 +83,7 @@ class Commander:
         Raises OrderRefused where the line is read-only or lost.
         """
         session = self.session
-        if session.line.read_only or session.state(FRESH).kind != "unknown":
+        if session.line.read_only or session.state(STATE_FRESH).kind != "unknown":
             session.arming.arm(seconds=seconds)
             return
         stamp = session.work.stops
@@ -93,7 +92,7 @@ class Commander:
             charts = session.profile.data.charts
             codes = [*deciding_codes(session.profile), *(chart.status for chart in charts)]
             await Reader(session).read(dict.fromkeys(codes))
-            if session.state(FRESH).kind == "unknown":
+            if session.state(STATE_FRESH).kind == "unknown":
                 raise OrderRefused("The state of the drive is not known; nothing is commanded.")
             if stamp == session.work.stops:
                 session.arming.arm(seconds=seconds)
@@ -193,7 +192,7 @@ class Commander:
 
     def refuse(self, text: str) -> None:
         """Tell why a command was not given."""
-        self.session.work.tell(Kind.REFUSED, text)
+        self.session.work.tell(OutcomeKind.REFUSED, text)
 
     def take_steps(self) -> Decimal:
         """The steps that were ordered and not yet given."""
@@ -201,7 +200,7 @@ class Commander:
             steps, self._steps, self._stepping = self._steps, Decimal(0), False
         return steps
 
-    def _begin(self, work: Work, stamp: int | None) -> None:
+    def _begin(self, work: CommandWork, stamp: int | None) -> None:
         """Carry out a command behind those before it."""
 
         async def carry_out(permit: Permit) -> str:
@@ -326,7 +325,7 @@ class _Commands:
         if turns is None or turns == id:
             return
         for _ in range(LOOKS):
-            await asyncio.sleep(LOOK)
+            await asyncio.sleep(STATE_POLL_INTERVAL)
             await self._read([chart.direction.parameter] if chart.direction else [])
             turns = read_chart(self.session.profile, self._raws()).direction
             if turns == id:
@@ -379,7 +378,7 @@ class _Commands:
             await self._write_command(chart, run.words[-1], run.name)
 
     async def _send(self, chart: Chart, order: Order) -> None:
-        parameter = target(self.session.profile, chart, order)
+        parameter = order_target(self.session.profile, chart, order)
         for word in with_options(chart, order, self._raws()):
             if parameter.code == chart.command:
                 await self._write_command(chart, word, order.name)
@@ -402,7 +401,7 @@ class _Commands:
         end = time.monotonic() + STEP_TIME
         state = await self._state(chart)
         while state.id not in goals and time.monotonic() < end:
-            await asyncio.sleep(LOOK)
+            await asyncio.sleep(STATE_POLL_INTERVAL)
             state = await self._state(chart)
         return state
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tui.bus.line import Priority
-from tui.drive.control_source import changes, source_codes
+from tui.drive.control_source import source_changes, source_codes
 from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import ControlSource
 from tui.drive.values import check_raw
@@ -28,14 +28,14 @@ async def configure(session: DriveSession, writer: Writer, source: ControlSource
         parameter = profile[setting.parameter]
         await _at_rest(session)
         raws = await _raws(session)
-        todo = {change.parameter.code for change in changes(profile, source, raws)}
+        todo = {change.parameter.code for change in source_changes(profile, source, raws)}
         if parameter.code not in todo:
             continue
         scale = profile.scale(parameter, raws)
         check_raw(parameter, setting.value, profile.names(parameter), scale)
         await writer.write(parameter, setting.value, why=f"control source: {source.name}")
         written.append(parameter.code)
-    left = changes(profile, source, await _raws(session))
+    left = source_changes(profile, source, await _raws(session))
     if left:
         codes = ", ".join(change.parameter.code for change in left)
         raise OrderRefused(f"{source.name}: {codes} went back to another value.")

@@ -25,9 +25,9 @@ from tui.drive.orders import (
     choose,
     last_word,
     nearest_stop,
+    order_target,
     stop_conditions,
     stop_in_any,
-    target,
     with_options,
 )
 from tui.drive.profile.schema import Chart, Order, OrderId
@@ -35,6 +35,7 @@ from tui.drive.values import from_words
 
 from ..connect.limits import limits_of
 from ..drive import DriveSession
+from ..drive_state import STATE_FRESH
 from ..events import EventLog
 from ..image import Raw
 from ..journal import Journal
@@ -46,12 +47,10 @@ log = logging.getLogger(__name__)
 STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
 """Kinds of state in which a motor at 0 Hz is stopped: nothing enables it."""
 
-FRESH = 1.0
-"""Seconds for which a state counts as that of now."""
-TRIES = 5
+STOP_TRIES = 5
 SEEN_FOR = 60.0
 """Seconds for which a stop is followed; a ramp may take that long."""
-LOOK = 0.15
+STANDSTILL_POLL_INTERVAL = 0.15
 TAKES_EFFECT = 1.5
 """Seconds within which a drive must show that it obeys."""
 
@@ -166,7 +165,7 @@ class Stopper:
             summary = StopSummary(reports)
             if (len(reports) == len(devices) and summary.ended) or time.monotonic() > end:
                 return summary
-            time.sleep(LOOK)
+            time.sleep(STANDSTILL_POLL_INTERVAL)
 
     def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
         before = self._reports.get(session.device)
@@ -192,7 +191,7 @@ class Stopper:
                 continue
             if chart is None or found is None or not found.broadcast:
                 continue
-            address = target(session.profile, chart, found).address
+            address = order_target(session.profile, chart, found).address
             for word in found.words:
                 if (address, word) not in sent:
                     sent.add((address, word))
@@ -203,7 +202,7 @@ class Stopper:
 
     async def _stop(self, one: _Stop) -> None:
         error = "it did not answer"
-        for _ in range(TRIES):
+        for _ in range(STOP_TRIES):
             try:
                 text = await one.carry_out()
             except RequestRefused as refused:
@@ -285,8 +284,8 @@ class _Stop:
     def _sure(self, codes: Iterable[str]) -> dict[str, int]:
         """What is surely held now: just read, or not to be changed since the motor has run."""
         session, image = self.session, self.session.image
-        fresh, trusted = image.fresh(FRESH), image.trusted
-        turns = session.state(FRESH).kind in ("running", "stopping")
+        fresh, trusted = image.fresh(STATE_FRESH), image.trusted
+        turns = session.state(STATE_FRESH).kind in ("running", "stopping")
         found = {}
         for code in codes:
             held = image.get(code)
@@ -299,7 +298,7 @@ class _Stop:
 
     async def _send(self, chart: Chart, order: Order) -> None:
         session = self.session
-        parameter = target(session.profile, chart, order)
+        parameter = order_target(session.profile, chart, order)
         if (held := session.image.get(parameter.code)) is not None:
             self.held[parameter.code] = held
         kept = {code: one.raw for code, one in self.held.items() if one.raw is not None}
@@ -334,7 +333,7 @@ class _Stop:
             speed = f", {hertz:g} Hz" if hertz else ""
             text = f"{order.name}{speed}{self._instead()}"
             self.say(self.session, Phase.STOPPING, text, self.ordered)
-            await asyncio.sleep(LOOK)
+            await asyncio.sleep(STANDSTILL_POLL_INTERVAL)
         return "it still turns after a minute."
 
     def _instead(self) -> str:
@@ -346,7 +345,7 @@ class _Stop:
 
     def _why_not(self, hertz: float | None) -> str:
         """What still enables a drive that does not obey."""
-        state = self.session.state(FRESH)
+        state = self.session.state(STATE_FRESH)
         who = "from its terminals or keypad" if state.local else state.channel
         if hertz == 0:
             by = who or "from elsewhere"

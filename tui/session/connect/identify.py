@@ -14,11 +14,11 @@ from tui.bus.errors import (
     NoAnswer,
     RequestRefused,
 )
-from tui.bus.line import Identification, Line, Priority
+from tui.bus.expectation import IDENTIFY
+from tui.bus.line import IdentificationObjects, Line, Priority
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 
-IDENTIFY = 43
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
 
 
@@ -53,7 +53,7 @@ class ScanResult:
     error: str = ""
 
 
-async def identify(
+async def identify_drive(
     line: Line, device: int, *, priority: Priority = Priority.OPERATOR_READ
 ) -> DriveIdentity:
     """Ask a drive who it is by function 43.
@@ -72,7 +72,7 @@ async def identify(
     return await asyncio.to_thread(_identity, device, answer)
 
 
-async def _ask(line: Line, device: int, priority: Priority) -> Identification:
+async def _ask(line: Line, device: int, priority: Priority) -> IdentificationObjects:
     """Function 43; a person's question is asked again once, a lost reply is no absent drive."""
     try:
         return await line.identify(device, priority=priority)
@@ -86,13 +86,13 @@ def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:
     return DriveIdentity(device, "", "", "", "", None, candidates)
 
 
-def _identity(device: int, answer: Identification) -> DriveIdentity:
+def _identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
     texts = {
         number: value.decode("ascii", errors="replace").strip("\0 ")
         for number, value in answer.objects.items()
     }
     reference = texts.get(REFERENCE, "")
-    candidates = tuple(library.identify(reference)) if reference else ()
+    candidates = tuple(library.matching_profiles(reference)) if reference else ()
     return DriveIdentity(
         device=device,
         vendor=texts.get(VENDOR, ""),
@@ -148,7 +148,7 @@ async def scan(line: Line, devices: Iterable[int], found: Callable[[ScanResult],
     """
     for device in devices:
         try:
-            identity = await identify(line, device, priority=Priority.BACKGROUND)
+            identity = await identify_drive(line, device, priority=Priority.BACKGROUND)
             result = ScanResult(device, identity)
         except NoAnswer:
             continue

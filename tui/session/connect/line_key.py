@@ -9,7 +9,7 @@ from ipaddress import ip_address
 from tui.bus.errors import LinkSyntaxError
 from tui.bus.link import RtuTcpLink, SerialLink, TcpLink, parse_link
 
-SIMULATED = "sim:"
+SIMULATED_PREFIX = "sim:"
 _LABEL_SETTINGS = re.compile(r"\s\d+(\s8[NEO][12](\stimeout=\S+)?)?$", re.IGNORECASE)
 """Settings behind a path as a screen shows them: `/dev/ttyUSB0 19200 8E1`."""
 _WINDOWS_PORT = re.compile(r"(?:\\\\\.\\)?(COM\d+)", re.IGNORECASE)
@@ -22,7 +22,7 @@ def line_key(text: str) -> str:
     they lead now; names of hosts are not looked up. A text that is no line is its own key.
     """
     text = text.strip()
-    if text.casefold().startswith(SIMULATED):
+    if text.casefold().startswith(SIMULATED_PREFIX):
         return _simulated(text)
     try:
         link = parse_link(text)
@@ -55,8 +55,8 @@ def _simulated(text: str) -> str:
     from tui.simulator import SimulatorError, parse_drives
 
     try:
-        drives = parse_drives(text[len(SIMULATED) :])
+        drives = parse_drives(text[len(SIMULATED_PREFIX) :])
     except SimulatorError:
         return text.casefold()
     in_order = sorted(drives, key=lambda drive: drive.address)
-    return SIMULATED + ",".join(f"{drive.profile}@{drive.address}" for drive in in_order)
+    return SIMULATED_PREFIX + ",".join(f"{drive.profile}@{drive.address}" for drive in in_order)

@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 from tui.bus.errors import LinkSyntaxError
 
+from .line_key import SIMULATED_PREFIX
+
 if TYPE_CHECKING:
     from tui.bus.line import Line
     from tui.bus.link import Link
     from tui.simulator import DriveSpec, Simulation
-
-SIMULATED = "sim:"
 
 
 @dataclass(slots=True)
@@ -39,7 +39,7 @@ class OpenLine:
 
             return label(self.line.link).removeprefix("serial:").replace(",", " ")
         count = len(self.devices)
-        return self.text if count == 1 else f"{SIMULATED}{count} drives"
+        return self.text if count == 1 else f"{SIMULATED_PREFIX}{count} drives"
 
     def close(self) -> None:
         """Close the line, then what it was connected to."""
@@ -54,11 +54,13 @@ def open_line(text: str, *, read_only: bool = False, wait: float | None = None) 
     With `wait` it returns connected, or raises the line's error after so many seconds;
     without, it connects by itself. Raises LinkSyntaxError, UnknownProfile, ProfileError.
     """
-    if text.casefold().startswith(SIMULATED):
+    if text.casefold().startswith(SIMULATED_PREFIX):
         from tui.simulator import parse_drives
 
         check_line(text)
-        return _simulated(parse_drives(text[len(SIMULATED) :]), read_only=read_only, wait=wait)
+        return _simulated(
+            parse_drives(text[len(SIMULATED_PREFIX) :]), read_only=read_only, wait=wait
+        )
     from tui.bus.line import Line
     from tui.bus.link import parse_link
 
@@ -67,11 +69,11 @@ def open_line(text: str, *, read_only: bool = False, wait: float | None = None) 
 
 def check_line(text: str) -> None:
     """Raise LinkSyntaxError, or the simulator's error, for a text that is no LINE."""
-    if text.casefold().startswith(SIMULATED):
+    if text.casefold().startswith(SIMULATED_PREFIX):
         from tui.simulator import SimulatorError, parse_drives
 
         try:
-            parse_drives(text[len(SIMULATED) :])
+            parse_drives(text[len(SIMULATED_PREFIX) :])
         except SimulatorError as error:
             raise LinkSyntaxError(str(error)) from error
     else:
@@ -110,7 +112,7 @@ def _simulated(
 
     simulation = Simulation(specs)
     line = Line(_serve(simulation), read_only=read_only)
-    text = SIMULATED + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
+    text = SIMULATED_PREFIX + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
     devices = tuple(spec.address for spec in specs)
     return _opened(OpenLine(text, line, simulation, devices), wait)
 

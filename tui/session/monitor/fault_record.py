@@ -19,7 +19,7 @@ from ..journal import Entry, Journal
 from ..reading import Quality, Reading
 from .monitor import Snapshot
 
-KEPT = 30.0
+SECONDS_KEPT = 30.0
 """Seconds before a trip that are kept."""
 
 
@@ -67,7 +67,7 @@ class Recorder:
         if snapshot.error or snapshot.state.kind == "unknown":
             return
         self._moments.append((snapshot, snapshot.time))
-        while self._moments[0][1] < snapshot.time - KEPT:
+        while self._moments[0][1] < snapshot.time - SECONDS_KEPT:
             self._moments.popleft()
         before, self._kind = self._kind, snapshot.state.kind
         if self._kind == "fault" and before not in ("fault", "unknown"):
@@ -78,7 +78,7 @@ class Recorder:
         codes = record_codes(self.session)
         profile = self.session.profile
         headings = tuple(f"{c} {profile[c].unit}".rstrip() for c in codes)
-        begin = datetime.fromtimestamp(now.wall - KEPT).astimezone()
+        begin = datetime.fromtimestamp(now.wall - SECONDS_KEPT).astimezone()
         writes = tuple(
             entry
             for entry in self.journal.recent
@@ -134,13 +134,13 @@ def record_text(
     if stored:
         lines += ["", "## Stored by the drive", "", "| code | name | value |", "|---|---|---|"]
         lines += [f"| {code} | {name} | {value} |" for code, name, value in stored]
-    lines += ["", f"## Values of the last {KEPT:g} s", ""]
+    lines += ["", f"## Values of the last {SECONDS_KEPT:g} s", ""]
     lines.append("| time | state | " + " | ".join(record.headings) + " |")
     lines.append("|---|---|" + "---:|" * len(record.headings))
     lines += [
         f"| {_clock(m.wall)} | {m.state} | " + " | ".join(m.texts) + " |" for m in record.moments
     ]
-    lines += ["", f"## Written from here in the last {KEPT:g} s", ""]
+    lines += ["", f"## Written from here in the last {SECONDS_KEPT:g} s", ""]
     if record.writes:
         lines += ["| time | code | old | new | answer | why |", "|---|---|---|---|---|---|"]
     lines += [

@@ -33,7 +33,7 @@ MAY_TURN = frozenset({"running", "unknown"})
 GLANCE = 3.0
 """Seconds between two looks at a drive that no monitor watches."""
 ASKED_PER_TIMEOUT = 4.0
-TOLD_AFTER = 0.5
+TOLD_SHARE = 0.5
 """Share of its time-out after which a drive that was not heard is told of."""
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
@@ -41,7 +41,7 @@ SHORTEST = 0.02
 
 
 @dataclass(frozen=True, slots=True)
-class Watch:
+class TimeoutWatch:
     """A drive's watch over the line: seconds to its time-out, and what it does then."""
 
     timeout: float
@@ -67,13 +67,13 @@ class Look:
 
 
 @dataclass(frozen=True, slots=True)
-class Hunger:
+class TimeoutWarning:
     """A drive that was not heard for a good part of its time-out; times in seconds."""
 
     device: int
     profile: Profile
     silent: float
-    watch: Watch
+    watch: TimeoutWatch
 
     @property
     def left(self) -> float:
@@ -87,12 +87,12 @@ class _Kept:
     monitor: Monitor
     reader: Reader
     since: float = field(default_factory=time.monotonic)
-    watch: Watch | None = None
+    watch: TimeoutWatch | None = None
     learned: float | None = None
     workers: tuple[Worker, ...] = ()
 
 
-class Keeper:
+class LineWatch:
     """Asks each kept drive often enough, in workers of the line's loop."""
 
     def __init__(self, line: Line) -> None:
@@ -105,12 +105,12 @@ class Keeper:
         """The last look at each drive, by device."""
         return dict(self._looks)
 
-    def watch(self, device: int) -> Watch | None:
+    def watch(self, device: int) -> TimeoutWatch | None:
         """A drive's watch over the line, once it is known and not off."""
         kept = self._kept.get(device)
         return self._watch(kept) if kept else None
 
-    def _watch(self, kept: _Kept) -> Watch | None:
+    def _watch(self, kept: _Kept) -> TimeoutWatch | None:
         rules, watch = kept.session.profile.data.communication_fault, kept.watch
         if watch is None or rules is None:
             return None
@@ -122,7 +122,7 @@ class Keeper:
         state, _ = self._last_seen(kept)
         return state is not None and state.kind == "running" and not state.local
 
-    def left_alone(self) -> dict[int, Watch]:
+    def left_alone(self) -> dict[int, TimeoutWatch]:
         """Drives that act on their communication time-out once nobody asks them, at rest too."""
         found = {device: self.watch(device) for device in self._kept}
         return {
@@ -168,7 +168,7 @@ class Keeper:
             return latest.state, latest.time
         return state, seen
 
-    def hungry(self) -> list[Hunger]:
+    def warnings(self) -> list[TimeoutWarning]:
         """Drives that are about to act on their time-out, or have, for want of an answer."""
         now = time.monotonic()
         found = []
@@ -177,8 +177,8 @@ class Keeper:
             if watch is None or not watch.active:
                 continue
             silent = now - self._heard(kept)
-            if silent > TOLD_AFTER * watch.timeout:
-                found.append(Hunger(device, kept.session.profile, silent, watch))
+            if silent > TOLD_SHARE * watch.timeout:
+                found.append(TimeoutWarning(device, kept.session.profile, silent, watch))
         return found
 
     def _heard(self, kept: _Kept) -> float:
@@ -193,7 +193,7 @@ class Keeper:
         self._kept = {**self._kept, device: kept}
         kept.workers = (
             self._line.spawn(lambda: self._again(kept, self._feed), f"feeder {device}"),
-            self._line.spawn(lambda: self._again(kept, self._glance), f"keeper {device}"),
+            self._line.spawn(lambda: self._again(kept, self._glance), f"line_watch {device}"),
         )
 
     def stop(self) -> None:
@@ -272,11 +272,11 @@ class Keeper:
         timeout = _seconds(readings[rules.timeout], rules.off)
         raw = readings[rules.reaction].raw if rules.reaction else None
         reaction = next((one for one in rules.reactions if one.raw == raw), None)
-        kept.watch = None if timeout is None else Watch(timeout, reaction)
+        kept.watch = None if timeout is None else TimeoutWatch(timeout, reaction)
         kept.learned = time.monotonic()
 
 
-def left_alone_text(*sessions: DriveSession, watch: Watch | None) -> str:
+def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
     """What drives of one family do when nobody asks them any more, in a sentence."""
     it = "it" if len(sessions) == 1 else "each"
     if watch is None:

@@ -25,7 +25,7 @@ from tui.drive.profile.schema import Quantity
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.reader import Reader
-from ..read.rotation import Due
+from ..read.rotation import Rotation
 from ..reading import Reading
 
 log = logging.getLogger(__name__)
@@ -215,7 +215,7 @@ class Monitor:
     async def _watch(self, rates: Rates) -> None:
         readings: dict[str, Reading] = {}
         begun: deque[float] = deque(maxlen=RATE_OVER)
-        due = Due(SLOW_FACTOR)
+        due = Rotation(SLOW_FACTOR)
         self._all_due = True
         cycle = failures = 0
         try:

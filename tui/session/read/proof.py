@@ -16,7 +16,7 @@ from tui.drive.profile.schema import Block, Parameter
 from tui.drive.values import from_words, word_count
 
 from ..reading import Reading
-from .verdict import Verdict
+from .verdict import SlotMatch
 
 SURE = 3
 """Comparisons that must speak for a parameter, and against each other one."""
@@ -27,7 +27,7 @@ LEAST = 3
 
 
 @dataclass(slots=True)
-class Proof:
+class SlotEvidence:
     """Evidence about one block; pure, and worthless after the drive's reset."""
 
     profile: Profile
@@ -58,14 +58,14 @@ class Proof:
                 raw = from_words(parameter, [word])
                 self._off[slot, code].append(_off(parameter, raw, first, second))
 
-    def verdict(self, slot: str, code: str) -> Verdict:
+    def verdict(self, slot: str, code: str) -> SlotMatch:
         """How a slot's words compare with a parameter: one that differs did so each time."""
         offs, seen = self._off[slot, code], self._seen[code]
         if not offs:
-            return Verdict.UNREAD
+            return SlotMatch.UNREAD
         if all(offs):
-            return Verdict.DIFFERS
-        return Verdict.MOVING if any(offs) or seen[::2] != seen[1::2] else Verdict.SAME
+            return SlotMatch.DIFFERS
+        return SlotMatch.MOVING if any(offs) or seen[::2] != seen[1::2] else SlotMatch.SAME
 
     def fitted(self, slot: str, code: str) -> bool:
         """Whether a slot's last word could be that of a parameter."""

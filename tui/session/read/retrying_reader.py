@@ -17,13 +17,13 @@ from ..drive_state import drive_state
 from ..reading import Reading
 from .reader import Reader
 
-TRIES = 3
+READ_TRIES = 3
 """How often a read is tried when its reply is lost or damaged."""
 LONGEST_REST = 3.0
 """Seconds that are waited at most for a drive that the line leaves alone for a while."""
 
 
-LARGEST = 60
+PLANNED_AT_ONCE = 60
 """How many parameters are planned at once: planning more would hold up the line's loop."""
 
 
@@ -34,7 +34,7 @@ def neighbours(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
     parts: list[list[str]] = []
     last = -1
     for parameter in sorted((profile[code] for code in codes), key=lambda p: p.address):
-        if not parts or parameter.address - last > longest or len(parts[-1]) >= LARGEST:
+        if not parts or parameter.address - last > longest or len(parts[-1]) >= PLANNED_AT_ONCE:
             parts.append([])
         parts[-1].append(parameter.code)
         last = parameter.address
@@ -42,7 +42,7 @@ def neighbours(profile: Profile, codes: Iterable[str]) -> list[list[str]]:
 
 
 @dataclass(slots=True)
-class Asker:
+class RetryingReader:
     """Reads of one drive into its image by a reader of its own, so that no other is disturbed."""
 
     session: DriveSession
@@ -72,11 +72,11 @@ class Asker:
     async def ask(self, codes: Iterable[str]) -> dict[str, Reading]:
         """Read, again where a reply was lost; raises the line's errors when that does not help."""
         wanted = list(dict.fromkeys(codes))
-        for tried in range(1, TRIES + 1):
+        for tried in range(1, READ_TRIES + 1):
             try:
                 readings = await self.reader.read(wanted, priority=self.priority)
             except (NoAnswer, ChecksumFault, WrongReply) as error:
-                if tried == TRIES:
+                if tried == READ_TRIES:
                     raise
                 # only behind everything else a drive that fell silent is left alone for a while
                 if self.priority >= Priority.POLL and isinstance(error, NoAnswer):

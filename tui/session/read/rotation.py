@@ -8,7 +8,7 @@ Groups = Callable[[Iterable[str]], Sequence[tuple[str, ...]]]
 """Codes in groups that come in one request each."""
 
 
-class Due:
+class Rotation:
     """Deals out the seldom values of one drive: a part of their requests in each cycle.
 
     `parts` is the number of cycles in which all of them have had their turn.

@@ -19,9 +19,9 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block
 
 from ..reading import Reading
-from .proof import SURE, Proof
+from .proof import SURE, SlotEvidence
 
-AT_ONCE = 2
+COMPARED_AT_ONCE = 2
 """Parameters compared between two cycles, so that no cycle waits long."""
 ROUNDS = SURE + 1
 """Comparisons of each parameter, until they rest."""
@@ -32,7 +32,7 @@ ASLEEP = 0.8
 CALM = 1.0
 """Seconds without doubt about a reset before anything is proved."""
 
-Ask = Callable[[Iterable[str]], Awaitable[Mapping[str, Reading]]]
+ReadCodes = Callable[[Iterable[str]], Awaitable[Mapping[str, Reading]]]
 
 
 @dataclass(slots=True)
@@ -40,7 +40,7 @@ class _Comparison:
     """One indirect block: what is chosen for it, what is proved, what is to be compared yet."""
 
     block: Block
-    proof: Proof
+    proof: SlotEvidence
     chosen: dict[str, int] = field(default_factory=dict)
     """The slots that hold one of the block's choices, as last read."""
     todo: deque[str] = field(default_factory=deque)
@@ -67,7 +67,7 @@ class _Comparison:
         """The parameters to compare now."""
         still_open = self.proof.open_codes(self.chosen)
         codes: list[str] = []
-        while self.todo and len(codes) < AT_ONCE:
+        while self.todo and len(codes) < COMPARED_AT_ONCE:
             if (code := self.todo.popleft()) in still_open and code not in codes:
                 codes.append(code)
         return codes
@@ -119,7 +119,7 @@ class Slots:
         for one in self._comparisons.values():
             one.next_time = 0.0
 
-    async def learn(self, ask: Ask) -> None:
+    async def learn(self, ask: ReadCodes) -> None:
         """Read the slots of every read block."""
         for block in self.profile.data.blocks:
             if block.direction != "read":
@@ -129,11 +129,11 @@ class Slots:
             if block.effective == "at-once":
                 self._known.update(raws)
             elif time.monotonic() - self._doubted > CALM:
-                fresh = _Comparison(block, Proof(self.profile, block))
+                fresh = _Comparison(block, SlotEvidence(self.profile, block))
                 self._comparisons.setdefault(block.id, fresh).choose(raws)
         self._conclude()
 
-    async def compare(self, ask: Ask) -> None:
+    async def compare(self, ask: ReadCodes) -> None:
         """Compare a few parameters with what the block brings, where that is not sure yet."""
         for one in list(self._comparisons.values()):
             codes = one.take() if one.length else []

@@ -9,15 +9,15 @@ from datetime import datetime
 import tui
 from tui.bus.line import Priority
 from tui.drive.profile.profile import Profile
-from tui.drive.settings.parameter_set import Head, ParameterSet
+from tui.drive.settings.parameter_set import ParameterSet, SetHead
 from tui.drive.settings.restore_plan import rating_codes
 from tui.drive.settings.writable import is_setting
 from tui.drive.shown import scale_sources
 
 from ..drive import DriveSession
-from .retrying_reader import Asker, neighbours
+from .retrying_reader import RetryingReader, neighbours
 
-Progress = Callable[[int, int], None]
+ReadProgress = Callable[[int, int], None]
 """Called with how many parameters were asked for, and how many there are."""
 
 
@@ -43,17 +43,17 @@ class Upload:
     session: DriveSession
     codes: list[str] = field(default_factory=list)
     """What is to be read; every readable parameter where empty."""
-    progress: Progress | None = None
+    progress: ReadProgress | None = None
     priority: Priority = Priority.BACKGROUND
     raws: dict[str, int] = field(default_factory=dict)
     """What was read so far."""
     absent: dict[str, str] = field(default_factory=dict)
     """What has no value, and what the drive or the line said instead."""
-    asker: Asker = field(init=False)
+    retrying: RetryingReader = field(init=False)
 
     def __post_init__(self) -> None:
         self.codes = self.codes or readable_codes(self.session.profile)
-        self.asker = Asker(self.session, self.priority)
+        self.retrying = RetryingReader(self.session, self.priority)
 
     @property
     def left(self) -> list[str]:
@@ -74,7 +74,7 @@ class Upload:
         sources = scale_sources(profile)
         first = [code for code in self.left if code in sources]
         for codes in (first, *neighbours(profile, self.left)):
-            for group in self.asker.reader.groups(codes):
+            for group in self.retrying.reader.groups(codes):
                 await self._ask(group)
             # what the drive refuses is in no group
             await self._ask(codes)
@@ -83,7 +83,7 @@ class Upload:
         wanted = [code for code in codes if code not in self.raws and code not in self.absent]
         if not wanted:
             return
-        for code, reading in (await self.asker.ask(wanted)).items():
+        for code, reading in (await self.retrying.ask(wanted)).items():
             if reading.raw is None:
                 self.absent[code] = reading.error
             else:
@@ -104,7 +104,7 @@ class Upload:
         )
 
 
-def head_of(session: DriveSession) -> Head:
+def head_of(session: DriveSession) -> SetHead:
     """Where a parameter set of this drive, read now, comes from."""
     profile, identity = session.profile, session.identity
     said = {}
@@ -115,7 +115,7 @@ def head_of(session: DriveSession) -> Head:
             "version": identity.version_text,
             "name": identity.name,
         }
-    return Head(
+    return SetHead(
         profile=profile.id,
         profile_version=profile.data.profile.version,
         family=profile.name,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from enum import StrEnum
 
 
-class Verdict(StrEnum):
+class SlotMatch(StrEnum):
     """How what a slot brings compares with the parameter read directly."""
 
     SAME = "same"

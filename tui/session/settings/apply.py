@@ -19,14 +19,14 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.drive.errors import DriveError
-from tui.drive.settings.edits import Edit, Edits, cuts_line, limit_pairs, ordered, problems
-from tui.drive.settings.writable import option_code, refusal, waits_for_reset
+from tui.drive.settings.edits import Edit, Edits, cuts_line, edit_problems, limit_pairs, ordered
+from tui.drive.settings.writable import option_code, waits_for_reset, write_refusal
 from tui.drive.shown import shown
 
 from ..arming import NotArmed
 from ..drive import DriveSession
 from ..journal import Journal
-from ..read.retrying_reader import Asker
+from ..read.retrying_reader import RetryingReader
 from ..work import Permit, Stopped
 from .link_change import LinkChange, link_change
 from .refusals import device_refusal
@@ -35,7 +35,7 @@ from .write import NotTaken, Writer
 LOST_ANSWERS = (NoAnswer, ChecksumFault, WrongReply)
 
 
-class Outcome(StrEnum):
+class EditOutcome(StrEnum):
     """What became of one edit."""
 
     DONE = "done"
@@ -53,14 +53,14 @@ class Result:
     """One edit with its outcome, a sentence for a person, and what the drive holds now."""
 
     edit: Edit
-    outcome: Outcome
+    outcome: EditOutcome
     text: str
     held: int | None = None
 
     @property
     def done(self) -> bool:
         """Whether the drive has the new value, as far as that can be seen."""
-        return self.outcome in (Outcome.DONE, Outcome.SENT)
+        return self.outcome in (EditOutcome.DONE, EditOutcome.SENT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class Applied:
         return tuple(result for result in self.results if result.done)
 
 
-Progress = Callable[[int, int, Result], None]
+WriteProgress = Callable[[int, int, Result], None]
 """Called after each edit with how many are done, how many there are, and the result."""
 
 
@@ -97,7 +97,7 @@ async def apply_edits(
     permit: Permit,
     confirmed: Collection[str] = (),
     why: str = "setting",
-    progress: Progress | None = None,
+    progress: WriteProgress | None = None,
 ) -> Applied:
     """Write staged edits one after another, in their order, as long as the permit holds.
 
@@ -107,15 +107,17 @@ async def apply_edits(
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
-    work = _Work(session, Writer(session, journal, permit), Asker(session), edits, confirmed, why)
+    work = _Work(
+        session, Writer(session, journal, permit), RetryingReader(session), edits, confirmed, why
+    )
     await work.look_at_all()
-    told = problems(session.profile, edits, work.asker.raws)
-    order = ordered(session.profile, edits, work.asker.raws)
+    told = edit_problems(session.profile, edits, work.retrying.raws)
+    order = ordered(session.profile, edits, work.retrying.raws)
     for number, edit in enumerate(order, start=1):
         if work.stopped:
-            result = Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {work.stopped}")
+            result = Result(edit, EditOutcome.NOT_SENT, f"{edit.code} was not sent: {work.stopped}")
         elif edit.code in told:
-            result = Result(edit, Outcome.REFUSED, told[edit.code], edit.old)
+            result = Result(edit, EditOutcome.REFUSED, told[edit.code], edit.old)
         else:
             result = await work.apply(edit)
         work.results.append(result)
@@ -128,7 +130,7 @@ async def apply_edits(
 class _Work:
     session: DriveSession
     writer: Writer
-    asker: Asker
+    retrying: RetryingReader
     edits: Edits
     confirmed: Collection[str]
     why: str
@@ -142,7 +144,7 @@ class _Work:
         for low, high in limit_pairs(self.session.profile):
             if {low, high} & codes:
                 codes |= {low, high}
-        await self.asker.ask_many(self._with_sources(codes))
+        await self.retrying.ask_many(self._with_sources(codes))
 
     def _with_sources(self, codes: Iterable[str]) -> list[str]:
         found = list(codes)
@@ -158,46 +160,50 @@ class _Work:
                 return reason
         except LineError as error:
             self.stopped = str(error)
-            return Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {error}")
+            return Result(edit, EditOutcome.NOT_SENT, f"{edit.code} was not sent: {error}")
         try:
             return await self._write(edit)
         except (Stopped, NotArmed) as error:
             self.stopped = str(error)
-            return Result(edit, Outcome.NOT_SENT, f"{edit.code} was not sent: {error}", edit.old)
+            return Result(
+                edit, EditOutcome.NOT_SENT, f"{edit.code} was not sent: {error}", edit.old
+            )
         except RequestRefused as error:
             if self.writer.permit is not None and self.writer.permit.refusal():
                 self.stopped = str(error)
-            return Result(edit, Outcome.REFUSED, str(error), edit.old)
+            return Result(edit, EditOutcome.REFUSED, str(error), edit.old)
         except LOST_ANSWERS as error:
             return await self._after_a_lost_answer(edit, error)
         except LineError as error:
             self.stopped = str(error)
-            return Result(edit, Outcome.UNKNOWN, f"Whether {edit.code} was written: {error}")
+            return Result(edit, EditOutcome.UNKNOWN, f"Whether {edit.code} was written: {error}")
 
     async def _reason_against(self, edit: Edit) -> Result | None:
         """Why the edit is not written now, with fresh values; None where it may be."""
-        profile, asker = self.session.profile, self.asker
+        profile, retrying = self.session.profile, self.retrying
         parameter = profile[edit.code]
-        state = await asker.ask_state()
-        if (against := refusal(profile, parameter, state, self.confirmed)) is not None:
-            return Result(edit, Outcome.REFUSED, against.text, edit.old)
+        state = await retrying.ask_state()
+        if (against := write_refusal(profile, parameter, state, self.confirmed)) is not None:
+            return Result(edit, EditOutcome.REFUSED, against.text, edit.old)
         option = option_code(profile, parameter)
         wanted = [edit.code, *([option.code] if option else [])]
-        raws = await asker.ask_raws(self._with_sources(wanted))
+        raws = await retrying.ask_raws(self._with_sources(wanted))
         if option is not None and raws.get(option.code) != option.factory:
             text = f"{edit.code} is not written: {option.code} does not read {option.factory}, so"
             text += " another option is fitted, to which it means something else."
-            return Result(edit, Outcome.REFUSED, text, edit.old)
+            return Result(edit, EditOutcome.REFUSED, text, edit.old)
         held = raws.get(edit.code)
         if held is None:
-            said = asker.why_absent(edit.code)
+            said = retrying.why_absent(edit.code)
             return Result(
-                edit, Outcome.REFUSED, f"{edit.code} cannot be read, so it is not written: {said}"
+                edit,
+                EditOutcome.REFUSED,
+                f"{edit.code} cannot be read, so it is not written: {said}",
             )
         if held == edit.new and self._means(edit):
-            return Result(edit, Outcome.DONE, f"{edit.code} holds {edit.text} already.", held)
+            return Result(edit, EditOutcome.DONE, f"{edit.code} holds {edit.text} already.", held)
         if not self._means(edit) or (edit.old is not None and held != edit.old):
-            return Result(edit, Outcome.CHANGED, self._changed_text(edit, held), held)
+            return Result(edit, EditOutcome.CHANGED, self._changed_text(edit, held), held)
         return None
 
     def _means(self, edit: Edit) -> bool:
@@ -205,13 +211,15 @@ class _Work:
         parameter = self.session.profile[edit.code]
         if parameter.scale_by is None:
             return True
-        asker = self.asker
-        now = shown(self.session.profile, parameter, edit.new, asker.raws, asker.lacking)
+        retrying = self.retrying
+        now = shown(self.session.profile, parameter, edit.new, retrying.raws, retrying.lacking)
         return now.display == edit.text
 
     def _changed_text(self, edit: Edit, held: int) -> str:
         parameter = self.session.profile[edit.code]
-        now = shown(self.session.profile, parameter, held, self.asker.raws, self.asker.lacking)
+        now = shown(
+            self.session.profile, parameter, held, self.retrying.raws, self.retrying.lacking
+        )
         if parameter.scale_by is not None and not self._means(edit):
             source = parameter.scale_by.parameter
             return f"{edit.code} was not written: its scale {source} was changed meanwhile."
@@ -228,11 +236,11 @@ class _Work:
         try:
             await self.writer.write(parameter, edit.new, why=self.why, read_back=not cut)
         except DeviceException as error:
-            text = device_refusal(profile, parameter, error, self.asker.headline)
-            return Result(edit, Outcome.DRIVE_REFUSED, text, edit.old)
+            text = device_refusal(profile, parameter, error, self.retrying.headline)
+            return Result(edit, EditOutcome.DRIVE_REFUSED, text, edit.old)
         except NotTaken as error:
-            held = (await self.asker.ask_raws([edit.code])).get(edit.code)
-            return Result(edit, Outcome.NOT_TAKEN, str(error), held)
+            held = (await self.retrying.ask_raws([edit.code])).get(edit.code)
+            return Result(edit, EditOutcome.NOT_TAKEN, str(error), held)
         except LOST_ANSWERS:
             if not cut:
                 raise
@@ -241,22 +249,24 @@ class _Work:
             self.links.append(change)
         if cut and change is not None:
             self.stopped = change.text
-            return Result(edit, Outcome.SENT, f"{edit.code} was sent. {change.text}")
-        return Result(edit, Outcome.DONE, f"{edit.code}: {edit.old_text} -> {edit.text}", edit.new)
+            return Result(edit, EditOutcome.SENT, f"{edit.code} was sent. {change.text}")
+        return Result(
+            edit, EditOutcome.DONE, f"{edit.code}: {edit.old_text} -> {edit.text}", edit.new
+        )
 
     async def _after_a_lost_answer(self, edit: Edit, error: LineError) -> Result:
         """A write is sent once; what became of it is found by reading."""
         try:
-            held = (await self.asker.ask_raws([edit.code])).get(edit.code)
+            held = (await self.retrying.ask_raws([edit.code])).get(edit.code)
         except LineError as later:
             self.stopped = str(later)
-            return Result(edit, Outcome.UNKNOWN, f"Whether {edit.code} was written: {later}")
+            return Result(edit, EditOutcome.UNKNOWN, f"Whether {edit.code} was written: {later}")
         if held == edit.new:
             text = f"{edit.code}: {edit.old_text} -> {edit.text} (its answer was lost)"
-            return Result(edit, Outcome.DONE, text, held)
+            return Result(edit, EditOutcome.DONE, text, held)
         silent = " This family refuses by silence." if not self._refuses_aloud else ""
-        text = f"{edit.code} was not taken: {error}{silent} The drive is {self.asker.headline}."
-        return Result(edit, Outcome.NOT_TAKEN, text, held)
+        text = f"{edit.code} was not taken: {error}{silent} The drive is {self.retrying.headline}."
+        return Result(edit, EditOutcome.NOT_TAKEN, text, held)
 
     @property
     def _refuses_aloud(self) -> bool:
@@ -280,9 +290,9 @@ class _Work:
         """What is staged yet, against what the drive holds now."""
         left = Edits(tuple(edit for edit in self.edits.asked if edit.code not in done))
         held = {r.edit.code: r.held for r in self.results if r.held is not None}
-        raws = {**self.asker.raws, **held}
+        raws = {**self.retrying.raws, **held}
         try:
-            return left.now(self.session.profile, raws, self.asker.lacking)
+            return left.now(self.session.profile, raws, self.retrying.lacking)
         except DriveError:
             # under the scales of now a value has no place: it stays as it was typed
             return Edits(tuple(replace(e, old=raws.get(e.code, e.old)) for e in left.asked))

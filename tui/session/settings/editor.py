@@ -22,27 +22,27 @@ from tui.drive.profile.schema import Parameter, StateKind
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.parameter_set import ParameterSet
 from tui.drive.settings.restore_plan import RestorePlan
-from tui.drive.settings.selection import Facts
-from tui.drive.settings.writable import Refusal, refusal
+from tui.drive.settings.selection import FilterContext
+from tui.drive.settings.writable import Refusal, write_refusal
 from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
 
 from ..drive import DriveSession
 from ..drive_state import DriveState
 from ..journal import Journal
-from ..read.retrying_reader import Asker, neighbours
+from ..read.retrying_reader import RetryingReader, neighbours
 from ..read.upload import readable_codes
-from ..work import Kind, Outcome, Permit, Task
+from ..work import Outcome, OutcomeKind, Permit, Task
 from .apply import Applied, Result, apply_edits
 from .eeprom import factory_reset, save_to_eeprom
 from .favourites import Marks, load_marks, save_marks
 from .link_change import LinkChange
 
-LOOK = 0.1
+IDLE_POLL_INTERVAL = 0.1
 """Seconds between two turns of the reader that has nothing to do."""
-AGAIN = 1.0
+REREAD_AFTER = 1.0
 """Seconds after which what is looked at is read again."""
-AFTER_ERROR = 1.0
+REREAD_AFTER_ERROR = 1.0
 WAS_OFF = 3.0
 """Seconds of silence after which a drive that answers again was switched off, not disturbed."""
 
@@ -117,9 +117,9 @@ class Editor:
         return self.session.work.outcome
 
     @property
-    def facts(self) -> Facts:
+    def facts(self) -> FilterContext:
         """What filters decide by."""
-        return Facts(
+        return FilterContext(
             self.session.profile,
             self.raws,
             self.edits,
@@ -158,7 +158,7 @@ class Editor:
     def refusal(self, code: str) -> Refusal | None:
         """Why a parameter cannot be written now."""
         profile = self.session.profile
-        return refusal(profile, profile[code], self.state, self.marks.confirmed)
+        return write_refusal(profile, profile[code], self.state, self.marks.confirmed)
 
     # Reading
 
@@ -175,8 +175,8 @@ class Editor:
 
     async def _read(self) -> None:
         profile = self.session.profile
-        first = Asker(self.session)
-        later = Asker(self.session, Priority.BACKGROUND)
+        first = RetryingReader(self.session)
+        later = RetryingReader(self.session, Priority.BACKGROUND)
         rest = [*sorted(scale_sources(profile)), *readable_codes(profile)]
         parts = iter(neighbours(profile, dict.fromkeys(rest)))
         waiting: list[tuple[str, ...]] = []
@@ -195,7 +195,7 @@ class Editor:
                     left = [c for c in part if c not in known and c not in absent]
                     waiting = [tuple(group) for group in later.reader.groups(left)]
                 else:
-                    await asyncio.sleep(LOOK)
+                    await asyncio.sleep(IDLE_POLL_INTERVAL)
                 self.trouble = ""
                 self._look_for_a_reset()
             except LineError as error:
@@ -203,7 +203,7 @@ class Editor:
                     self._silent = time.monotonic()
                 self.trouble = str(error)
                 self.version += 1
-                await asyncio.sleep(AFTER_ERROR)
+                await asyncio.sleep(REREAD_AFTER_ERROR)
 
     def _look_for_a_reset(self) -> None:
         """A drive that was silent, or starts, was switched off: what waited for that is over."""
@@ -215,7 +215,7 @@ class Editor:
         if self.waits_for_reset or self.unsaved:
             lost = ", ".join(sorted(self.unsaved))
             gone = f" Not saved before, so look at: {lost}." if lost else ""
-            self._say(f"The drive was reset or switched off.{gone}", Kind.DONE)
+            self._say(f"The drive was reset or switched off.{gone}", OutcomeKind.DONE)
         self.waits_for_reset, self.unsaved = set(), set()
         # everything may be another value now
         self._asked = {}
@@ -223,7 +223,7 @@ class Editor:
 
     def _due(self) -> list[str]:
         """What is looked at and was not read lately."""
-        oldest = time.monotonic() - AGAIN
+        oldest = time.monotonic() - REREAD_AFTER
         due = [code for code in self.visible if self._asked.get(code, 0.0) < oldest]
         if not due:
             return []
@@ -344,7 +344,7 @@ class Editor:
 
     def _progress(self, done: int, count: int, result: Result) -> None:
         self.results = {**self.results, result.edit.code: result}
-        self._say(f"{done} of {count}: {result.edit.code} {result.outcome}", Kind.WORKING)
+        self._say(f"{done} of {count}: {result.edit.code} {result.outcome}", OutcomeKind.WORKING)
 
     def _applied(self, applied: Applied, left: Edits) -> None:
         self.edits = left
@@ -370,7 +370,7 @@ class Editor:
     async def _see_what_is_held(self) -> None:
         """Of the edit that a stop cut short it is not known whether the drive took it: look."""
         with suppress(LineError, DriveError):
-            await Asker(self.session).ask([edit.code for edit in self.edits])
+            await RetryingReader(self.session).ask([edit.code for edit in self.edits])
             raws = self.raws
             self.edits = Edits(tuple(e for e in self.edits.asked if raws.get(e.code) != e.new))
             self.version += 1
@@ -406,15 +406,15 @@ class Editor:
         """Do it as work on the drive; what speaks against it is told."""
         queue = self.session.work
         if queue.busy:
-            self._say("Another command is still being carried out.", Kind.REFUSED)
+            self._say("Another command is still being carried out.", OutcomeKind.REFUSED)
             return
         try:
             queue.put(Task(work, owner=self, given_up=given_up), stamp)
         except OrderRefused as refused:
-            self._say(str(refused), Kind.REFUSED)
+            self._say(str(refused), OutcomeKind.REFUSED)
         self.version += 1
 
-    def _say(self, text: str, kind: Kind) -> None:
+    def _say(self, text: str, kind: OutcomeKind) -> None:
         self.session.work.tell(kind, text)
         self.version += 1
 

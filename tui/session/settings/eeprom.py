@@ -15,15 +15,15 @@ from tui.drive.values import from_words
 
 from ..drive import DriveSession
 from ..journal import Journal
-from ..read.retrying_reader import Asker
+from ..read.retrying_reader import RetryingReader
 from ..work import Permit
 from .refusals import device_refusal
 from .write import Writer
 
-LONGEST = 10.0
+SAVING_LONGEST = 10.0
 """Seconds that a drive may take to save or to recall."""
-LOOK = 0.1
-NAMED = 8
+SAVE_POLL_INTERVAL = 0.1
+SETTINGS_NAMED = 8
 """How many settings are named in a text."""
 
 
@@ -49,10 +49,10 @@ async def factory_reset(
     """
     order = factory_order(session.profile)
     writer = Writer(session, journal, permit)
-    asker = await _carry_out(writer, order, why="factory settings", confirmed=confirmed)
+    retrying = await _carry_out(writer, order, why="factory settings", confirmed=confirmed)
     # every word may hold something else now
     session.image.forget()
-    return await _told(session, asker)
+    return await _told(session, retrying)
 
 
 async def _carry_out(
@@ -61,7 +61,7 @@ async def _carry_out(
     *,
     why: str,
     confirmed: Collection[str],
-) -> Asker:
+) -> RetryingReader:
     session = writer.session
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
@@ -72,14 +72,14 @@ async def _carry_out(
             f"{parameter.code} of {profile.name} is unverified: it is known from a sister family"
             " only. Confirm it once to use it."
         )
-    asker = Asker(session)
-    await _check(asker, order)
+    retrying = RetryingReader(session)
+    await _check(retrying, order)
     word = order.raw
     if order.bit:
-        held = (await asker.ask_raws([order.parameter])).get(order.parameter)
+        held = (await retrying.ask_raws([order.parameter])).get(order.parameter)
         if held is None:
             raise MemoryRefused(
-                f"{order.parameter} cannot be read: {asker.why_absent(order.parameter)}"
+                f"{order.parameter} cannot be read: {retrying.why_absent(order.parameter)}"
             )
         word |= held & 0xFFFF & ~order.raw
     raw = from_words(parameter, [word])
@@ -87,59 +87,59 @@ async def _carry_out(
         # the drive takes the order back by itself: what it holds afterwards proves nothing
         await writer.write(parameter, raw, why=why, read_back=False)
     except DeviceException as error:
-        text = device_refusal(profile, parameter, error, asker.headline).rstrip(".")
+        text = device_refusal(profile, parameter, error, retrying.headline).rstrip(".")
         raise DeviceException(
             error.device, error.function, error.address, error.code, text
         ) from error
-    await _until_done(asker, order)
-    return asker
+    await _until_done(retrying, order)
+    return retrying
 
 
-async def _check(asker: Asker, order: MemoryOrder) -> None:
+async def _check(retrying: RetryingReader, order: MemoryOrder) -> None:
     """Raise MemoryRefused unless the drive surely is at rest and something would be recalled."""
-    state = await asker.ask_state()
+    state = await retrying.ask_state()
     if state not in AT_REST:
-        raise MemoryRefused(f"This needs the motor stopped; the drive is now {asker.headline}.")
-    status = asker.session.profile.quantity("extended_status_word")
+        raise MemoryRefused(f"This needs the motor stopped; the drive is now {retrying.headline}.")
+    status = retrying.session.profile.quantity("extended_status_word")
     if order.at_rest_mask and status is not None:
-        word = (await asker.ask_raws([status.code])).get(status.code)
+        word = (await retrying.ask_raws([status.code])).get(status.code)
         if word is None or word & order.at_rest_mask:
             raise MemoryRefused(
                 f"This needs the motor without current; {status.code} does not say so."
             )
-    if order.groups and not (await asker.ask_raws([order.groups])).get(order.groups):
+    if order.groups and not (await retrying.ask_raws([order.groups])).get(order.groups):
         raise MemoryRefused(
             f"{order.groups} selects no group of settings, so the drive would recall nothing."
             " Select the groups at its keypad, in the menu of factory settings."
         )
 
 
-async def _until_done(asker: Asker, order: MemoryOrder) -> None:
+async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
     """Wait until the order's bit or value has gone and the EEPROM is no longer written."""
-    profile = asker.session.profile
+    profile = retrying.session.profile
     status = profile.quantity("extended_status_word")
     codes = [order.parameter, *([status.code] if status else [])]
-    end = time.monotonic() + LONGEST
+    end = time.monotonic() + SAVING_LONGEST
     while time.monotonic() < end:
         try:
-            raws = await asker.ask_raws(codes)
+            raws = await retrying.ask_raws(codes)
         except NoAnswer:
             raws = {}  # a drive that is busy with its memory may not answer for a moment
         held = raws.get(order.parameter, order.raw)
         pending = held & order.raw if order.bit else held == order.raw
-        known = status is not None and not asker.why_absent(status.code)
+        known = status is not None and not retrying.why_absent(status.code)
         busy = profile.data.memory.busy_mask
         word = raws.get(status.code, busy) if status is not None and known else 0
         if raws and not pending and not word & busy:
             return
-        await asyncio.sleep(LOOK)
+        await asyncio.sleep(SAVE_POLL_INTERVAL)
     raise MemoryRefused(
-        f"The drive is not done after {LONGEST:g} s: look at its display, and read"
+        f"The drive is not done after {SAVING_LONGEST:g} s: look at its display, and read"
         f" {order.parameter} before anything is written."
     )
 
 
-async def _told(session: DriveSession, asker: Asker) -> str:
+async def _told(session: DriveSession, retrying: RetryingReader) -> str:
     """Which of the known factory settings the drive holds now."""
     profile = session.profile
     wanted = {
@@ -147,10 +147,10 @@ async def _told(session: DriveSession, asker: Asker) -> str:
         for p in profile.parameters
         if p.factory is not None and is_setting(profile, p) and not line_setting(profile, p.code)
     }
-    held = await asker.ask_many(wanted)
+    held = await retrying.ask_many(wanted)
     other = [code for code, raw in held.items() if raw != wanted[code]]
     text = f"{profile.name}: the factory settings are recalled in working memory"
     if not other:
         return f"{text}; {len(held)} settings were looked at."
-    names = ", ".join(other[:NAMED]) + (", ..." if len(other) > NAMED else "")
+    names = ", ".join(other[:SETTINGS_NAMED]) + (", ..." if len(other) > SETTINGS_NAMED else "")
     return f"{text}; {len(other)} of {len(held)} hold another value: {names}."

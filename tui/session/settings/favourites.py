@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..paths import state_folder
 
-RECENT = 30
+RECENT_KEPT = 30
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,7 +34,7 @@ class Marks:
 
     def edited(self, codes: Iterable[str]) -> Marks:
         """With these edited last."""
-        return replace(self, recent=tuple(dict.fromkeys((*codes, *self.recent)))[:RECENT])
+        return replace(self, recent=tuple(dict.fromkeys((*codes, *self.recent)))[:RECENT_KEPT])
 
 
 def load_marks(profile_id: str) -> Marks:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -16,22 +15,19 @@ from tui.bus.errors import LineError, RequestRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.parameter_set import ParameterSet
-from tui.drive.settings.restore_plan import PLAIN, Held, Options, RestorePlan, plan_restore
+from tui.drive.settings.restore_plan import NO_OPTIONS, Held, Options, RestorePlan, plan_restore
 from tui.drive.settings.writable import waits_for_reset
 
 from ..drive import DriveSession
 from ..journal import Journal, now_text
 from ..paths import state_folder
-from ..read.upload import Upload, setting_codes
+from ..read.upload import ReadProgress, Upload, setting_codes
 from ..work import Permit
-from .apply import Applied, Progress, Result, apply_edits
+from .apply import Applied, Result, WriteProgress, apply_edits
 from .link_change import LinkChange
 
 PASSES = 5
 """How often is planned again at most: writing some settings changes others."""
-
-Reading = Callable[[int, int], None]
-"""Called while the drive is read, with how many parameters were read and how many there are."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,7 +52,7 @@ class Restored:
         return not self.stopped and not len(self.left)
 
 
-async def held_by(session: DriveSession, reading: Reading | None = None) -> Held:
+async def held_by(session: DriveSession, reading: ReadProgress | None = None) -> Held:
     """The settings that the drive holds now; raises the line's errors."""
     upload = Upload(session, setting_codes(session.profile), reading)
     await upload.run()
@@ -64,16 +60,16 @@ async def held_by(session: DriveSession, reading: Reading | None = None) -> Held
     return Held(upload.raws, upload.absent, session.image.lacking, reference)
 
 
-async def restore(
+async def restore_set(
     session: DriveSession,
     journal: Journal,
     source: ParameterSet,
     source_profile: Profile,
-    options: Options = PLAIN,
+    options: Options = NO_OPTIONS,
     *,
     permit: Permit,
-    progress: Progress | None = None,
-    reading: Reading | None = None,
+    progress: WriteProgress | None = None,
+    reading: ReadProgress | None = None,
 ) -> Restored:
     """Write what differs, read it back, and look again until nothing more is to be done.
 
@@ -124,8 +120,8 @@ async def plan_for(
     session: DriveSession,
     source: ParameterSet,
     source_profile: Profile,
-    options: Options = PLAIN,
-    reading: Reading | None = None,
+    options: Options = NO_OPTIONS,
+    reading: ReadProgress | None = None,
 ) -> RestorePlan:
     """What restoring would do to this drive now; reads it, writes nothing."""
     held = await held_by(session, reading)
@@ -138,7 +134,7 @@ async def _one_pass(
     plan: RestorePlan,
     options: Options,
     permit: Permit,
-    progress: Progress | None,
+    progress: WriteProgress | None,
 ) -> Applied:
     return await apply_edits(
         session,

@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-PATIENCE = 5.0
+START_PATIENCE = 5.0
 """Seconds that begin() waits for the disk; a slow memory card flushes in two."""
 OVERTAKEN = "a stop came first"
 
@@ -128,7 +128,7 @@ class Starts:
         boot_id = self._processes.boot_id()
         return replace(found, line=line, boot_id=boot_id, pid=pid, started=started, program=program)
 
-    def begin(self, record: StartRecord, patience: float = PATIENCE) -> None:
+    def begin(self, record: StartRecord, patience: float = START_PATIENCE) -> None:
         """Put a start on the disk, flushed, before its run frame goes out.
 
         Waits for the disk, at most `patience` seconds. Raises StartNotRecorded where the run is

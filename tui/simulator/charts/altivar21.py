@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from tui.drive.profile.schema import Parameter, Quantity
 
 from ..body import Body, Fallback
-from ..plant.motor import Order, Stop
+from ..plant.motor import MotorDemand, Stop
 from .altivar21_words import show_altivar21_words
 
 (PRESETS, RAMP_2, INJECTION, REVERSE, RUN, COAST, EMERGENCY, RESET, OWN_REFERENCE, OWN_COMMAND) = (
@@ -29,7 +29,7 @@ from .altivar21_words import show_altivar21_words
 ENERGY_RESET, STALL_2 = 1 << 1, 1 << 12
 SERIAL_COMMAND, SERIAL_REFERENCE, PRESET_REFERENCE, ANALOGUE_REFERENCE = 2, 4, 255, 1
 EMERGENCY_FAULT = 17
-REACHED_HZ = 0.05
+ATV21_REACHED_HZ = 0.05
 PRESET_QUANTITIES: tuple[Quantity, ...] = (
     "preset_speed_1",
     "preset_speed_2",
@@ -161,13 +161,13 @@ class Altivar21Chart:
         size = min(max(abs(hz), body.value("low_speed", 0.0)), high)
         return -size if hz < 0 else size
 
-    def order(self) -> Order:
+    def order(self) -> MotorDemand:
         """What the motor has to do now."""
         body = self._body
         remote = self._sources().command
         second = remote and bool(self._word & RAMP_2)
         up, down = body.rates(self._stop if body.fault else Stop.RAMP, second)
-        base = Order(acceleration=up, deceleration=down)
+        base = MotorDemand(acceleration=up, deceleration=down)
         moving = body.motor.frequency != 0
         if body.fault is not None:
             return self._stopping_order(base, moving)
@@ -180,7 +180,7 @@ class Altivar21Chart:
         coast = remote and self._word & COAST
         return replace(base, energised=moving and not coast, target=0.0)
 
-    def _stopping_order(self, base: Order, moving: bool) -> Order:
+    def _stopping_order(self, base: MotorDemand, moving: bool) -> MotorDemand:
         if self._stop is Stop.INJECTION:
             return replace(base, injection=bool(self._body.motor.rotor))
         slow = self._stop in (Stop.RAMP, Stop.FAST)
@@ -202,7 +202,7 @@ class Altivar21Chart:
         body.show_raw("alarm_word", alarms)
         body.show_raw("status_word", self._status(alarms))
         body.show_raw("status_word_2", self._status_2(sources))
-        reached = motor.energised and abs(motor.frequency - self._target_hz) < REACHED_HZ
+        reached = motor.energised and abs(motor.frequency - self._target_hz) < ATV21_REACHED_HZ
         body.show_raw("status_word_3", (1 << 12 | 1 << 13) if reached else 0)
         body.show_code("FE45", SERIAL_COMMAND if sources.command else 0)
         body.show_code("FE46", self._reference_source(sources))

@@ -13,7 +13,7 @@ from enum import Enum
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
-from ..plant.motor import Order, Stop
+from ..plant.motor import MotorDemand, Stop
 from ..rules import MODBUS_COMMAND, MODBUS_REFERENCE
 from .altivar_words import show_altivar_words
 from .drivecom_reference import DrivecomReference
@@ -21,7 +21,7 @@ from .drivecom_status import Appearance, extended_status_word, status_word
 from .io_profile import IoCommand, io_status, read_io_command
 
 
-class State(Enum):
+class DrivecomState(Enum):
     """States of the chart with the bits 0 to 6 of their status word, bit 4 left out."""
 
     DISABLED = 0x40
@@ -33,7 +33,7 @@ class State(Enum):
     FAULT = 0x08
 
 
-class Command(Enum):
+class DrivecomCommand(Enum):
     """Commands of the chart: mask and value of the command word."""
 
     DISABLE_VOLTAGE = (0x0002, 0x0000)
@@ -43,19 +43,19 @@ class Command(Enum):
     ENABLE = (0x000F, 0x000F)
 
 
-TRANSITIONS: Mapping[tuple[State, Command], State] = {
-    (State.DISABLED, Command.SHUTDOWN): State.READY,
-    (State.READY, Command.SWITCH_ON): State.SWITCHED_ON,
-    (State.READY, Command.DISABLE_VOLTAGE): State.DISABLED,
-    (State.READY, Command.QUICK_STOP): State.DISABLED,
-    (State.SWITCHED_ON, Command.ENABLE): State.ENABLED,
-    (State.SWITCHED_ON, Command.SHUTDOWN): State.READY,
-    (State.SWITCHED_ON, Command.DISABLE_VOLTAGE): State.DISABLED,
-    (State.SWITCHED_ON, Command.QUICK_STOP): State.DISABLED,
-    (State.ENABLED, Command.SHUTDOWN): State.READY,
-    (State.ENABLED, Command.DISABLE_VOLTAGE): State.DISABLED,
-    (State.ENABLED, Command.QUICK_STOP): State.QUICK_STOP,
-    (State.QUICK_STOP, Command.DISABLE_VOLTAGE): State.DISABLED,
+TRANSITIONS: Mapping[tuple[DrivecomState, DrivecomCommand], DrivecomState] = {
+    (DrivecomState.DISABLED, DrivecomCommand.SHUTDOWN): DrivecomState.READY,
+    (DrivecomState.READY, DrivecomCommand.SWITCH_ON): DrivecomState.SWITCHED_ON,
+    (DrivecomState.READY, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
+    (DrivecomState.READY, DrivecomCommand.QUICK_STOP): DrivecomState.DISABLED,
+    (DrivecomState.SWITCHED_ON, DrivecomCommand.ENABLE): DrivecomState.ENABLED,
+    (DrivecomState.SWITCHED_ON, DrivecomCommand.SHUTDOWN): DrivecomState.READY,
+    (DrivecomState.SWITCHED_ON, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
+    (DrivecomState.SWITCHED_ON, DrivecomCommand.QUICK_STOP): DrivecomState.DISABLED,
+    (DrivecomState.ENABLED, DrivecomCommand.SHUTDOWN): DrivecomState.READY,
+    (DrivecomState.ENABLED, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
+    (DrivecomState.ENABLED, DrivecomCommand.QUICK_STOP): DrivecomState.QUICK_STOP,
+    (DrivecomState.QUICK_STOP, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
 }
 """Transitions that are made at once; Disable operation (16#0007) may wait for a ramp."""
 
@@ -63,7 +63,7 @@ FAULT_RESET, HALT, STOP_STT, INJECTION, FAST = (1 << bit for bit in (7, 8, 12, 1
 CMI_SECOND_RAMP, CMI_FAST, CMI_INJECTION, CMI_LOCKED = (1 << bit for bit in (4, 10, 11, 15))
 STT = {0: Stop.RAMP, 1: Stop.FAST, 2: Stop.FREEWHEEL, 3: Stop.INJECTION}
 IO_PROFILE, SEPARATE = 3, 2
-REACHED_HZ = 0.1
+DRIVECOM_REACHED_HZ = 0.1
 LINE, TERMINALS = 1 << 3, 1 << 0
 """Channels in force, as CCC and CRC show them."""
 QSTD_LEAVES = 2
@@ -71,9 +71,9 @@ COMMAND_BITS = 160
 """Assignment of an input to bit 0 of the command word (RSF and others); bit 1 is one more."""
 
 
-def command_of(word: int) -> Command | None:
+def command_of(word: int) -> DrivecomCommand | None:
     """The command of a word; None where its bits 0 to 3 are none."""
-    return next((c for c in Command if word & c.value[0] == c.value[1]), None)
+    return next((c for c in DrivecomCommand if word & c.value[0] == c.value[1]), None)
 
 
 class DrivecomChart:
@@ -81,7 +81,7 @@ class DrivecomChart:
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self.state = State.DISABLED
+        self.state = DrivecomState.DISABLED
         self._network = False
         """Whether the command word of the line is in force."""
         self._leaving = False
@@ -99,7 +99,7 @@ class DrivecomChart:
         self._network = self._leaving = False
         self._last_command = 0
         self._io = IoCommand()
-        self.state = State.ENABLED if self._by_terminals() else State.DISABLED
+        self.state = DrivecomState.ENABLED if self._by_terminals() else DrivecomState.DISABLED
 
     def _by_terminals(self) -> bool:
         return self._body.traits.access_levels and self._body.setting("LAC", 2) < 2
@@ -111,7 +111,7 @@ class DrivecomChart:
         """Take a run order at the terminals into account."""
         if self._body.fault is None:
             self._network = self._leaving = False
-            self.state = State.ENABLED
+            self.state = DrivecomState.ENABLED
 
     def written(self, parameter: Parameter) -> None:
         """Follow a word that the line wrote."""
@@ -120,9 +120,9 @@ class DrivecomChart:
         elif (
             self._body.traits.config_disables
             and parameter.access == "rw-stopped"
-            and self.state in (State.READY, State.SWITCHED_ON)
+            and self.state in (DrivecomState.READY, DrivecomState.SWITCHED_ON)
         ):
-            self.state = State.DISABLED
+            self.state = DrivecomState.DISABLED
 
     def _command(self, word: int) -> None:
         rising = word & ~self._last_command
@@ -135,23 +135,23 @@ class DrivecomChart:
             reset_bit = self._body.setting("RSF", 0) - COMMAND_BITS
             if 0 <= reset_bit <= 15 and rising >> reset_bit & 1:
                 self.reset_fault()
-        elif self.state is State.FAULT:
+        elif self.state is DrivecomState.FAULT:
             if rising & FAULT_RESET:
                 self.reset_fault()
-        elif self.state is not State.REACTION:
+        elif self.state is not DrivecomState.REACTION:
             command = command_of(word)
-            if command is not Command.ENABLE:
+            if command is not DrivecomCommand.ENABLE:
                 self._body.terminal_hz = None
             self._move(command)
 
-    def _move(self, command: Command | None) -> None:
+    def _move(self, command: DrivecomCommand | None) -> None:
         self._leaving = False
         if command is None:
             return
-        if self.state is State.ENABLED and command is Command.SWITCH_ON:
+        if self.state is DrivecomState.ENABLED and command is DrivecomCommand.SWITCH_ON:
             self._disable_operation()
-        elif command is Command.ENABLE and self._enables_from_here():
-            self.state = State.ENABLED
+        elif command is DrivecomCommand.ENABLE and self._enables_from_here():
+            self.state = DrivecomState.ENABLED
         elif target := TRANSITIONS.get((self.state, command)):
             self.state = target
 
@@ -161,12 +161,12 @@ class DrivecomChart:
         self._stop = Stop.FREEWHEEL if freewheel_set else self._stop_type()
         self._leaving = self._stop is not Stop.FREEWHEEL
         if not self._leaving:
-            self.state = State.SWITCHED_ON
+            self.state = DrivecomState.SWITCHED_ON
 
     def _enables_from_here(self) -> bool:
-        if self.state is State.READY:
+        if self.state is DrivecomState.READY:
             return self._body.traits.enable_from_ready
-        return self.state is State.DISABLED and self._by_terminals()
+        return self.state is DrivecomState.DISABLED and self._by_terminals()
 
     @property
     def network_commands(self) -> bool:
@@ -191,18 +191,18 @@ class DrivecomChart:
     def trip(self, stop: Stop) -> None:
         """Go to Fault, over the fault reaction where the motor is stopped first."""
         slow = stop is not Stop.FREEWHEEL and self._body.turning
-        self.state = State.REACTION if slow else State.FAULT
+        self.state = DrivecomState.REACTION if slow else DrivecomState.FAULT
         self._stop = stop
         self._leaving = False
         self._io = IoCommand()
 
     def reset_fault(self) -> None:
         """Leave Fault if its cause is gone; nothing runs by itself afterwards."""
-        if self.state is State.FAULT and self._body.fault and not self._body.fault.persists:
+        if self.state is DrivecomState.FAULT and self._body.fault and not self._body.fault.persists:
             self._body.fault = None
             self._body.terminal_hz = None
-            self.state = State.ENABLED if self._by_terminals() else State.DISABLED
-            self._network = self._network and self.state is State.DISABLED
+            self.state = DrivecomState.ENABLED if self._by_terminals() else DrivecomState.DISABLED
+            self._network = self._network and self.state is DrivecomState.DISABLED
 
     @property
     def running(self) -> bool:
@@ -211,13 +211,13 @@ class DrivecomChart:
 
     # What the motor is told
 
-    def order(self) -> Order:
+    def order(self) -> MotorDemand:
         """What the motor has to do now."""
         body = self._body
         self._settle()
         stop = self._stopping()
         up, down = body.rates(stop or Stop.RAMP, second=self._second_ramp())
-        base = Order(acceleration=up, deceleration=down)
+        base = MotorDemand(acceleration=up, deceleration=down)
         if self._cmi & CMI_LOCKED or not self._powered():
             return base
         if stop is Stop.FREEWHEEL:
@@ -231,16 +231,16 @@ class DrivecomChart:
         """Transitions that the drive makes by itself once the motor stands."""
         body = self._body
         stands = self._stands
-        if self.state is State.REACTION and stands:
-            self.state = State.FAULT
+        if self.state is DrivecomState.REACTION and stands:
+            self.state = DrivecomState.FAULT
         elif self._leaving and stands:
             self._leaving = False
-            self.state = State.SWITCHED_ON
-        elif self.state is State.QUICK_STOP and stands:
+            self.state = DrivecomState.SWITCHED_ON
+        elif self.state is DrivecomState.QUICK_STOP and stands:
             if body.setting("QSTD", 6) == QSTD_LEAVES:
-                self.state = State.DISABLED
-        elif self.state is State.ENABLED and self._terminals_ended() and stands:
-            self.state = State.DISABLED
+                self.state = DrivecomState.DISABLED
+        elif self.state is DrivecomState.ENABLED and self._terminals_ended() and stands:
+            self.state = DrivecomState.DISABLED
 
     @property
     def _stands(self) -> bool:
@@ -251,11 +251,11 @@ class DrivecomChart:
         return not own and self._body.terminal_hz is None
 
     def _powered(self) -> bool:
-        if self.state in (State.QUICK_STOP, State.REACTION):
+        if self.state in (DrivecomState.QUICK_STOP, DrivecomState.REACTION):
             return not self._stands
-        if self.state is not State.ENABLED and not self._io_powered():
+        if self.state is not DrivecomState.ENABLED and not self._io_powered():
             return False
-        if self.state is State.ENABLED and not self._network:
+        if self.state is DrivecomState.ENABLED and not self._network:
             turning = self._body.motor.frequency != 0
             return self._body.terminal_hz is not None or turning
         return True
@@ -266,9 +266,9 @@ class DrivecomChart:
 
     def _stopping(self) -> Stop | None:
         """How the motor is being stopped; None while it follows its reference."""
-        if self.state is State.QUICK_STOP:
+        if self.state is DrivecomState.QUICK_STOP:
             return Stop.FAST
-        if self.state is State.REACTION or self._leaving:
+        if self.state is DrivecomState.REACTION or self._leaving:
             return self._stop
         if self._body.fallback is Fallback.STOP:
             return self._stop_type()
@@ -327,7 +327,7 @@ class DrivecomChart:
         if frequency := body.parameter("output_frequency"):
             count = self._reference.hz_per_count(frequency)
             body.registers.put(frequency, round(motor.frequency / count))
-        disabled = self.state is State.DISABLED and not self._io_profile()
+        disabled = self.state is DrivecomState.DISABLED and not self._io_profile()
         show_altivar_words(body, seen.stop, disabled=disabled, reached=seen.reached)
 
     def _appearance(self) -> Appearance:
@@ -343,7 +343,7 @@ class DrivecomChart:
             network=self._network,
             line_commands=self._network or (self.network_commands and body.terminal_hz is None),
             going=going,
-            reached=going and abs(motor.frequency - self._target_hz) < REACHED_HZ,
+            reached=going and abs(motor.frequency - self._target_hz) < DRIVECOM_REACHED_HZ,
             wanted=wanted,
             outside=self._reference.outside(wanted),
             stop=self._stopping(),

@@ -12,7 +12,7 @@ from dataclasses import replace
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
-from ..plant.motor import Order, Stop
+from ..plant.motor import MotorDemand, Stop
 
 CONTROL_WORD, CONTROL_ON, STATUS_WORD = "6.42", "6.43", "10.40"
 BIT_PARAMETERS: Mapping[int, str] = {
@@ -29,7 +29,7 @@ UNLOCKED, FORWARD, JOG, BACKWARD, CHANGE_WAY, RUN, RESET = (1 << b for b in (0, 
 RUNNING_ORDERS = FORWARD | JOG | BACKWARD | RUN
 DEFAULT_HZ = 30.0
 JOG_HZ = 5.0
-REACHED_HZ = 0.1
+LEROY_REACHED_HZ = 0.1
 MAINS_LOSS_BIT = 14
 
 
@@ -92,11 +92,11 @@ class LeroySomerChart:
         if fault is not None and not fault.persists:
             self._body.fault = None
 
-    def order(self) -> Order:
+    def order(self) -> MotorDemand:
         """What the motor has to do now."""
         body = self._body
         up, down = body.rates(Stop.RAMP)
-        base = Order(acceleration=up, deceleration=down)
+        base = MotorDemand(acceleration=up, deceleration=down)
         bits = self._bits()
         if body.fault is not None or not bits & UNLOCKED:
             self._target_hz = 0.0
@@ -130,12 +130,12 @@ class LeroySomerChart:
         motor = body.motor
         size, target = abs(motor.frequency), abs(self._target_hz)
         active = motor.energised
-        reached = abs(size - target) < REACHED_HZ
+        reached = abs(size - target) < LEROY_REACHED_HZ
         marks = (
             (body.fault is None and motor.mains > 0, 0),
             (active, 1),
-            (size < REACHED_HZ, 2),
-            (active and size < body.value("low_speed", 0.0) + REACHED_HZ, 3),
+            (size < LEROY_REACHED_HZ, 2),
+            (active and size < body.value("low_speed", 0.0) + LEROY_REACHED_HZ, 3),
             (active and not reached and size < target, 4),
             (active and reached, 5),
             (active and not reached and size > target, 6),

@@ -9,10 +9,12 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 from tui.drive.values import is_enumeration, raw_range, type_range
 
-from .motor import Rating
+from .motor import RatingPlate
 
 
-def first_values(profile: Profile, rating: Rating, line_first: Mapping[str, int]) -> dict[str, int]:
+def first_values(
+    profile: Profile, rating: RatingPlate, line_first: Mapping[str, int]
+) -> dict[str, int]:
     """A raw value for every parameter: commissioned, factory, from the rating, or the lowest.
 
     `line_first` are raw values by code, in any case, of a drive set up for its line.
@@ -30,7 +32,7 @@ def first_values(profile: Profile, rating: Rating, line_first: Mapping[str, int]
     return values
 
 
-def _plate(rating: Rating) -> dict[Quantity | None, float]:
+def _plate(rating: RatingPlate) -> dict[Quantity | None, float]:
     return {
         "rated_frequency": rating.frequency,
         "rated_voltage": rating.voltage,

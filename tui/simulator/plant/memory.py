@@ -13,11 +13,11 @@ from ..body import Body
 CMI_FACTORY, CMI_SAVE, CMI_RESTORE = 1 << 0, 1 << 1, 1 << 2
 SAVE_TIME = 0.5
 LEVEL_3 = 2
-CHANNELS = ("FR1", "CD1", "CHCF", "TCC")
+CHANNEL_CODES = ("FR1", "CD1", "CHCF", "TCC")
 LINE_ROLES = frozenset({"address", "baud", "format", "parity", "protocol", "timeout", "delay"})
 
 
-class Memory:
+class SettingsMemory:
     """Follows the words that save, recall and restore settings."""
 
     def __init__(self, body: Body) -> None:
@@ -44,7 +44,7 @@ class Memory:
         """Reaching level L3 makes the channels their factory values (ATV31/312)."""
         level = self._body.registers.present(parameter)
         if level == LEVEL_3 and self._level != LEVEL_3:
-            for code in CHANNELS:
+            for code in CHANNEL_CODES:
                 if channel := self._body.registers.named(code):
                     self._body.registers.make_factory(channel)
         self._level = level

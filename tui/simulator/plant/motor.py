@@ -35,7 +35,7 @@ class Stop(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Rating:
+class RatingPlate:
     """A drive and its motor as on their rating plates: kW, V, Hz, rpm, A."""
 
     power: float
@@ -81,7 +81,7 @@ class MotorState:
 
 
 @dataclass(frozen=True, slots=True)
-class Order:
+class MotorDemand:
     """What the drive makes of commands and reference: target in Hz, ramps in Hz/s."""
 
     energised: bool = False
@@ -92,7 +92,7 @@ class Order:
 
 
 def step(
-    state: MotorState, rating: Rating, order: Order, load: float, mains: float, dt: float
+    state: MotorState, rating: RatingPlate, order: MotorDemand, load: float, mains: float, dt: float
 ) -> MotorState:
     """The state after `dt` seconds at a load (1.0 is rated torque) and a mains voltage in V."""
     while dt > MAX_STEP:
@@ -102,7 +102,7 @@ def step(
 
 
 def _step(
-    state: MotorState, rating: Rating, order: Order, load: float, mains: float, dt: float
+    state: MotorState, rating: RatingPlate, order: MotorDemand, load: float, mains: float, dt: float
 ) -> MotorState:
     if order.injection:
         moved = _brake(state, rating, dt)
@@ -113,7 +113,9 @@ def _step(
     return _supply(moved, rating, mains, dt)
 
 
-def _drive(state: MotorState, rating: Rating, order: Order, load: float, dt: float) -> MotorState:
+def _drive(
+    state: MotorState, rating: RatingPlate, order: MotorDemand, load: float, dt: float
+) -> MotorState:
     frequency = approach(state.frequency, order, dt)
     acceleration = (frequency - state.frequency) / dt if dt > 0 else state.acceleration
     share = abs(frequency) / rating.frequency
@@ -135,7 +137,7 @@ def _drive(state: MotorState, rating: Rating, order: Order, load: float, dt: flo
     )
 
 
-def approach(frequency: float, order: Order, dt: float) -> float:
+def approach(frequency: float, order: MotorDemand, dt: float) -> float:
     """The ramp's output after `dt`: towards the target, through zero where it must reverse."""
     target = order.target
     if frequency * target < 0:
@@ -151,7 +153,7 @@ def _coast(state: MotorState, dt: float) -> MotorState:
     return _unloaded(state, rotor if abs(rotor) > 0.2 else 0.0, current=0.0, braking=False)
 
 
-def _brake(state: MotorState, rating: Rating, dt: float) -> MotorState:
+def _brake(state: MotorState, rating: RatingPlate, dt: float) -> MotorState:
     rotor = state.rotor * math.exp(-dt / _BRAKE_TIME)
     rotor = rotor if abs(rotor) > 0.2 else 0.0
     return _unloaded(state, rotor, current=0.7 * rating.current, braking=True)
@@ -172,7 +174,7 @@ def _unloaded(state: MotorState, rotor: float, *, current: float, braking: bool)
     )
 
 
-def _supply(state: MotorState, rating: Rating, mains: float, dt: float) -> MotorState:
+def _supply(state: MotorState, rating: RatingPlate, mains: float, dt: float) -> MotorState:
     """Mains side, thermal states and counters."""
     on = mains > 0
     losses = 0.02 * rating.power if on else 0.0
@@ -207,10 +209,10 @@ def _towards(value: float, end: float, part: float) -> float:
 _PLATE = re.compile(r"[HWEPL]?([U0DC]\d\d)(M2|M3X?|N4C?|S6X?)")
 _VOLTAGES = {"M2": 230.0, "M3": 230.0, "N4": 400.0, "S6": 575.0}
 _FACTORS = {"U": 0.1, "D": 1.0, "0": 0.01, "C": 10.0}
-_STANDARD = Rating(4.0, 400.0, speed=1440.0)
+_STANDARD = RatingPlate(4.0, 400.0, speed=1440.0)
 
 
-def rating_of(reference: str) -> Rating:
+def rating_of(reference: str) -> RatingPlate:
     """A rating after a drive's reference (ATV71HU15M3: 1.5 kW, 230 V); 4 kW, 400 V otherwise."""
     match = _PLATE.search(reference.upper()[5:]) or _PLATE.search(reference.upper())
     if match is None:
@@ -218,10 +220,10 @@ def rating_of(reference: str) -> Rating:
     power = int(match[1][1:]) * _FACTORS[match[1][0]]
     voltage = next(v for prefix, v in _VOLTAGES.items() if match[2].startswith(prefix))
     slip = 0.055 if power < 2 else 0.04 if power < 8 else 0.025
-    return _with_currents(Rating(power, voltage, speed=round(1500 * (1 - slip), -1)))
+    return _with_currents(RatingPlate(power, voltage, speed=round(1500 * (1 - slip), -1)))
 
 
-def _with_currents(rating: Rating) -> Rating:
+def _with_currents(rating: RatingPlate) -> RatingPlate:
     efficiency = 0.76 if rating.power < 1 else 0.82 if rating.power < 4 else 0.88
     current = 1000 * rating.power / (math.sqrt(3) * rating.voltage * 0.8 * efficiency)
     return replace(rating, current=round(current, 1), drive_current=round(1.3 * current, 1))

@@ -26,7 +26,7 @@ class Consequence:
     fallback: Fallback | None = None
 
 
-ALTIVAR: Mapping[str, Consequence] = {
+ALTIVAR_REACTIONS: Mapping[str, Consequence] = {
     "no": Consequence(),
     "yes": Consequence(trip=Stop.FREEWHEEL),
     "rmp": Consequence(trip=Stop.RAMP),
@@ -39,7 +39,7 @@ ALTIVAR: Mapping[str, Consequence] = {
 """Reactions by their code on the keypad."""
 ALTIVAR_RAW: Mapping[int, str] = {0: "no", 1: "yes", 6: "rmp", 7: "fst"}
 """Raw values of SLL that the ATV312 manual gives, for a profile without codes."""
-ALTIVAR_21: Mapping[int, Consequence] = {
+ALTIVAR_21_REACTIONS: Mapping[int, Consequence] = {
     0: Consequence(trip=Stop.FREEWHEEL),
     1: Consequence(trip=Stop.RAMP),
     2: Consequence(trip=Stop.INJECTION),
@@ -47,7 +47,7 @@ ALTIVAR_21: Mapping[int, Consequence] = {
 FREEWHEEL = Consequence(trip=Stop.FREEWHEEL)
 
 
-class Watch:
+class SilenceWatch:
     """Counts the silence of the line towards one drive."""
 
     def __init__(self, body: Body) -> None:
@@ -108,10 +108,10 @@ class Watch:
             return FREEWHEEL
         raw = self._body.setting(self._data.reaction, -1)
         if self._body.traits.kind == "altivar21":
-            return ALTIVAR_21.get(raw, FREEWHEEL)
+            return ALTIVAR_21_REACTIONS.get(raw, FREEWHEEL)
         reaction = next((r for r in self._data.reactions if r.raw == raw), None)
         code = _code(reaction) or ALTIVAR_RAW.get(raw, "")
-        return ALTIVAR.get(code, FREEWHEEL)
+        return ALTIVAR_REACTIONS.get(code, FREEWHEEL)
 
     @property
     def fault(self) -> int | None:

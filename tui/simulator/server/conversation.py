@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from .faults import FaultPlan
-from .frames import is_whole, request_length
+from .frames import is_sealed, request_length
 from .line import SimulatedLine
 
-IDLE = 0.05
+SILENCE_ENDS_FRAME = 0.05
 """Silence in s that ends a frame of unknown length where the line does not keep real time."""
 MBAP = 7
 MAX_MBAP_LENGTH = 254
@@ -104,14 +104,14 @@ class RtuConversation:
         self._buffer += data
         if not self._timing.real_time or self._paced:
             expected = request_length(self._buffer)
-            if expected == len(self._buffer) and is_whole(self._buffer):
+            if expected == len(self._buffer) and is_sealed(self._buffer):
                 self._finish()
 
     @property
     def _end(self) -> float:
         """When the silence after the received bytes has lasted long enough."""
-        silence = self._timing.silence if self._timing.real_time else IDLE
-        return self._received + (max(silence, IDLE) if self._paced else silence)
+        silence = self._timing.silence if self._timing.real_time else SILENCE_ENDS_FRAME
+        return self._received + (max(silence, SILENCE_ENDS_FRAME) if self._paced else silence)
 
     def poll(self, now: float) -> bytes:
         """The bytes that are due to be written by now."""

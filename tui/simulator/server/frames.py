@@ -24,7 +24,7 @@ _COUNTED = {15: (6, 9), 16: (6, 9), 23: (10, 13)}
 """Functions whose request carries a byte count: its place, and the bytes beside the counted."""
 
 
-def crc16(data: bytes) -> int:
+def checksum(data: bytes) -> int:
     """Checksum of a frame's bytes: polynomial 16#A001, start 16#FFFF."""
     crc = 0xFFFF
     for byte in data:
@@ -34,12 +34,12 @@ def crc16(data: bytes) -> int:
 
 def seal(body: bytes) -> bytes:
     """A whole frame: the body with its checksum, low byte first."""
-    return body + crc16(body).to_bytes(2, "little")
+    return body + checksum(body).to_bytes(2, "little")
 
 
-def is_whole(frame: bytes) -> bool:
+def is_sealed(frame: bytes) -> bool:
     """Whether the bytes are one frame with a right checksum."""
-    return len(frame) >= _MIN_FRAME and crc16(frame[:-2]) == int.from_bytes(frame[-2:], "little")
+    return len(frame) >= _MIN_FRAME and checksum(frame[:-2]) == int.from_bytes(frame[-2:], "little")
 
 
 def request_length(head: bytes) -> int | None:

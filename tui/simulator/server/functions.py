@@ -12,7 +12,7 @@ from tui.drive.profile.schema import Function, Identification
 from ..rules import Refusals
 from .access import Refused, past_limit
 
-MEI_IDENTIFICATION = 14
+IDENTIFICATION_TYPE = 14
 COUNTER_RESET, CHECKSUM_COUNT, FRAME_COUNT, ECHO = 10, 12, 14, 0
 NAME_LENGTH = 16
 
@@ -28,7 +28,7 @@ class Words(Protocol):
 
 
 @dataclass
-class Counters:
+class DiagnosticCounters:
     """What function 8 counts, of frames to the drive's own address."""
 
     frames: int = 0
@@ -56,7 +56,7 @@ class Server:
     refusals: Refusals
     identification: Identification = field(default_factory=Identification)
     identity: Mapping[int, bytes] = field(default_factory=dict)
-    counters: Counters = field(default_factory=Counters)
+    counters: DiagnosticCounters = field(default_factory=DiagnosticCounters)
 
     def answer(self, pdu: bytes) -> bytes | None:
         """The reply to a request without address and checksum; None where it stays silent."""
@@ -76,7 +76,7 @@ class Server:
             return None
         head = bytes([function | 0x80])
         if function == 43 and self.identification.exception_has_mei_byte:
-            head += bytes([MEI_IDENTIFICATION])
+            head += bytes([IDENTIFICATION_TYPE])
         return head + bytes([code])
 
 
@@ -155,7 +155,7 @@ def _diagnose(server: Server, function: Function, body: bytes) -> bytes:
 def _identify(server: Server, function: Function, body: bytes) -> bytes:
     """Function 43/14; the ATV21 has its own codes for a wrong field, the others 1 and 2."""
     own_codes = not server.identification.exception_has_mei_byte
-    if len(body) != 3 or body[0] != MEI_IDENTIFICATION:
+    if len(body) != 3 or body[0] != IDENTIFICATION_TYPE:
         raise Refused(1)
     _, read_id, first = body
     if not 1 <= read_id <= server.identification.highest_read_device_id:
@@ -165,7 +165,7 @@ def _identify(server: Server, function: Function, body: bytes) -> bytes:
         raise Refused(3 if own_codes else 2)
     chosen = {first: server.identity[first]} if single else server.identity
     objects = b"".join(bytes([i, len(text)]) + text for i, text in sorted(chosen.items()))
-    head = bytes([MEI_IDENTIFICATION, read_id, server.identification.conformity, 0, 0])
+    head = bytes([IDENTIFICATION_TYPE, read_id, server.identification.conformity, 0, 0])
     return head + bytes([len(chosen)]) + objects
 
 

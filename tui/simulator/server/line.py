@@ -10,16 +10,16 @@ from dataclasses import dataclass
 from ..drive import SimulatedDrive
 from ..errors import SimulatorError
 from ..spec import LineTiming
-from .frames import is_whole, seal
+from .frames import is_sealed, seal
 
-FRESH = 0.004
+FRESH_VALUES = 0.004
 """Age in s up to which the drives' values are fresh enough to answer with."""
 ANY_UNIT = 255
 """Unit that Modbus TCP clients use for the only device behind an address."""
 
 
 @dataclass(frozen=True, slots=True)
-class Reply:
+class PendingReply:
     """A reply on its way: its bytes, and the drive's turnaround in s."""
 
     data: bytes
@@ -68,10 +68,10 @@ class SimulatedLine:
         known = ", ".join(str(d.address) for d in self.drives) or "none"
         raise SimulatorError(f"No simulated drive has address {address}. Addresses: {known}.")
 
-    def receive(self, frame: bytes) -> Reply | None:
+    def receive(self, frame: bytes) -> PendingReply | None:
         """What comes back for what was received between two silences; None for silence."""
         listening = [d for d in self.drives if d.hears(self.timing)]
-        if not is_whole(frame):
+        if not is_sealed(frame):
             for drive in listening:
                 if len(frame) >= 4 and drive.answers_at(frame[0]):
                     drive.count_checksum_error()
@@ -80,22 +80,24 @@ class SimulatedLine:
         reply = self._ask(listening, address, pdu)
         if reply is None:
             return None
-        return Reply(seal(bytes([address]) + reply.data), reply.turnaround)
+        return PendingReply(seal(bytes([address]) + reply.data), reply.turnaround)
 
-    def ask(self, unit: int, pdu: bytes) -> Reply | None:
+    def ask(self, unit: int, pdu: bytes) -> PendingReply | None:
         """What comes back for a message of Modbus TCP; the reply's data is a PDU."""
         if unit == ANY_UNIT and len(self.drives) == 1:
             unit = self.drives[0].address
         return self._ask(self.drives, unit, pdu)
 
-    def _ask(self, drives: Sequence[SimulatedDrive], address: int, pdu: bytes) -> Reply | None:
-        self.advance(FRESH)
-        reply: Reply | None = None
+    def _ask(
+        self, drives: Sequence[SimulatedDrive], address: int, pdu: bytes
+    ) -> PendingReply | None:
+        self.advance(FRESH_VALUES)
+        reply: PendingReply | None = None
         for drive in drives:
             if drive.is_called(address):
                 drive.obey(pdu)
             elif reply is None and drive.answers_at(address):
                 answer = drive.answer(address, pdu)
                 if answer is not None:
-                    reply = Reply(answer, drive.turnaround)
+                    reply = PendingReply(answer, drive.turnaround)
         return reply

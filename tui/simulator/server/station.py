@@ -10,7 +10,7 @@ from ..spec import LineTiming
 
 SHORTEST_TURNAROUND = 0.0015
 """PX-MODBUS manual 4, 15.06: never less, in s."""
-LINE_ROLES = ("baud", "format", "parity")
+FORMAT_ROLES = ("baud", "format", "parity")
 
 
 class Station:
@@ -27,7 +27,7 @@ class Station:
         roles: set[str] = set()
         for setting in self._profile.data.link.settings:
             fitting = [c.raw for c in setting.choices if _fits(c, timing)]
-            if setting.role in LINE_ROLES and setting.role not in roles and fitting:
+            if setting.role in FORMAT_ROLES and setting.role not in roles and fitting:
                 parameter = self._profile[setting.parameter]
                 self._registers.settle(parameter, fitting[0])
                 self._settings.append((setting, parameter))

@@ -166,7 +166,7 @@ class CommandExample(Table, frozen=True, kw_only=True):
     confidence: Confidence = "manual"
 
 
-class Reference(Table, frozen=True, kw_only=True):
+class ReferenceWay(Table, frozen=True, kw_only=True):
     """A way to give the drive its frequency or speed."""
 
     parameter: str

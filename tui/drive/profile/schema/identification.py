@@ -26,7 +26,7 @@ class Erratum(Table, frozen=True, kw_only=True):
     why: str = ""
 
 
-class Head(Table, frozen=True, kw_only=True):
+class ProfileHead(Table, frozen=True, kw_only=True):
     """The first table of a profile, all that a listing reads."""
 
     id: Identifier

@@ -32,7 +32,7 @@ class LinkSetting(Table, frozen=True, kw_only=True):
     note: str = ""
 
 
-class Link(Table, frozen=True, kw_only=True):
+class LinkSettings(Table, frozen=True, kw_only=True):
     """Line settings of the drive as it leaves the factory, and the parameters behind them."""
 
     baud: int
@@ -47,7 +47,7 @@ class Link(Table, frozen=True, kw_only=True):
     source: str = ""
 
 
-class Server(Table, frozen=True, kw_only=True):
+class FurtherServer(Table, frozen=True, kw_only=True):
     """A further Modbus server in the same drive, at an address of its own."""
 
     parameter: str
@@ -66,7 +66,7 @@ class Addresses(Table, frozen=True, kw_only=True):
     """True where an address with a zero digit (10, 20, 105) calls a group of drives."""
     off: int | None = None
     """Raw address at which the drive's server is switched off."""
-    servers: list[Server] = []
+    servers: list[FurtherServer] = []
     note: str = ""
     source: str = ""
 
@@ -86,7 +86,7 @@ class Function(Table, frozen=True, kw_only=True):
     source: str = ""
 
 
-class Reading(Table, frozen=True, kw_only=True):
+class ReadShapes(Table, frozen=True, kw_only=True):
     """Which shapes of a read the drive answers."""
 
     single_words_only: bool = False

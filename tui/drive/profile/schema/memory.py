@@ -22,7 +22,7 @@ class MemoryOrder(Table, frozen=True, kw_only=True):
     source: str = ""
 
 
-class Memory(Table, frozen=True, kw_only=True):
+class MemoryOrders(Table, frozen=True, kw_only=True):
     """The orders to a drive's memory; what is not known is left out."""
 
     save: MemoryOrder | None = None

@@ -4,19 +4,11 @@ from __future__ import annotations
 
 from .base import Table
 from .block import Block
-from .chart import Chart, CommandExample, Reference
+from .chart import Chart, CommandExample, ReferenceWay
 from .control_source import ControlSource
-from .identification import Erratum, Head, Identification, Source
-from .link import (
-    Addresses,
-    Connector,
-    ExceptionCode,
-    Function,
-    LineRule,
-    Link,
-    Reading,
-)
-from .memory import Memory
+from .identification import Erratum, Identification, ProfileHead, Source
+from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkSettings, ReadShapes
+from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter
 
@@ -24,24 +16,24 @@ from .parameter import Enumeration, Parameter
 class ProfileData(Table, frozen=True, kw_only=True):
     """A whole profile file."""
 
-    profile: Head
+    profile: ProfileHead
     sources: list[Source] = []
     errata: list[Erratum] = []
     identification: Identification = Identification()
-    link: Link
+    link: LinkSettings
     addresses: Addresses = Addresses()
     functions: list[Function]
-    reading: Reading = Reading()
+    reading: ReadShapes = ReadShapes()
     blocks: list[Block] = []
     exceptions: list[ExceptionCode] = []
     charts: list[Chart] = []
     command_examples: list[CommandExample] = []
-    references: list[Reference] = []
+    references: list[ReferenceWay] = []
     faults: Faults = Faults()
     monitoring: Monitoring
     control_sources: list[ControlSource] = []
     communication_fault: CommunicationFault | None = None
-    memory: Memory = Memory()
+    memory: MemoryOrders = MemoryOrders()
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
     enumerations: list[Enumeration] = []

@@ -1,0 +1,32 @@
+"""One public name, one thing: what a person greps for is found once."""
+
+from __future__ import annotations
+
+import ast
+from collections import defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+LIKE_A_COMMAND = {"compare", "identify", "main", "report", "restore"}
+"""Functions of the command line are called as the commands that a person types."""
+
+
+def public(tree: ast.Module) -> Iterator[str]:
+    """The names that a module gives to others: classes, functions, constants, types."""
+    for node in tree.body:
+        match node:
+            case ast.ClassDef() | ast.FunctionDef() | ast.AsyncFunctionDef():
+                yield node.name
+            case ast.Assign(targets=[ast.Name(id=name)]) | ast.AnnAssign(target=ast.Name(id=name)):
+                yield name
+
+
+def test_no_public_name_stands_for_two_things() -> None:
+    where = defaultdict(list)
+    for path in sorted((ROOT / "tui").rglob("*.py")):
+        for name in public(ast.parse(path.read_text("utf-8"))):
+            if not name.startswith("_") and name not in ("log", "T", "P", "R"):
+                where[name].append(path.relative_to(ROOT).as_posix())
+    twice = {name: found for name, found in where.items() if len(found) > 1}
+    assert {name: found for name, found in twice.items() if name not in LIKE_A_COMMAND} == {}
