@@ -328,10 +328,10 @@ async def test_priorities_that_fall_are_noticed() -> None:
     """FA00 is in the memory that a power-off empties."""
     async with bench("atv21") as made:
         await made.order("forward")
-        assert made.commander.lost_orders() == ""
+        assert made.commander.given.lost_orders() == ""
         made.drive.power_cycle()
-        await made.until(lambda: bool(made.commander.lost_orders()))
-        assert "FA00 16#C400 is now 16#0000" in made.commander.lost_orders()
+        await made.until(lambda: bool(made.commander.given.lost_orders()))
+        assert "FA00 16#C400 is now 16#0000" in made.commander.given.lost_orders()
 
 
 async def test_a_stop_ends_an_order_on_its_way() -> None:

@@ -54,7 +54,7 @@ async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
         await until(lambda: here.fleet.stopper.reports[1].phase == "stopped")
         here.session.stir()
         await until(lambda: here.session.image.raws.get("CMD") == 7)
-        assert commander.lost_orders() == ""
+        assert commander.given.lost_orders() == ""
 
 
 async def test_another_programs_stop_is_told_with_the_word() -> None:
@@ -67,7 +67,7 @@ async def test_another_programs_stop_is_told_with_the_word() -> None:
         here.drive.set("CMD", 7)
         here.session.stir()
         await until(lambda: here.session.image.raws.get("CMD") == 7)
-        assert "CMD 16#000F is now 16#0007" in commander.lost_orders()
+        assert "CMD 16#000F is now 16#0007" in commander.given.lost_orders()
 
 
 @pytest.mark.parametrize(("steps", "ends"), [(40, 500), (-90, 0)])

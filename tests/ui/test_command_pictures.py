@@ -115,7 +115,7 @@ def panel(name: str) -> tuple[Any, MonitorScreen]:
     console = fakes.console_of(snapshot, armed=given.armed_for)
     console.session.work.outcome = given.outcome
     if given.lost:
-        console.commander.note_command("CMD", 0x000F)
+        console.commander.given.note_command("CMD", 0x000F)
         console.session.image.confirm("CMD", 0, fakes.NOW)
     record = trip() if unseen else None
     console.recorder = Recorder(console.session, console.journal, record, not unseen)

@@ -270,7 +270,7 @@ class Run:
         by = "by itself or from elsewhere"
         if session.work.stops:
             by = f"by {session.work.stopped_by}"
-        elif lost := self.console.commander.changed_words():
+        elif lost := self.console.commander.given.changed_words():
             by = f"by another program or master on the line: {lost}"
         elif latest.state.local:
             by = "at its terminals or keypad"

@@ -53,7 +53,7 @@ class OrderKeys(ArmingKeys):
             outcome=outcome,
             no_effect=interlock(chart, "forward", raws) if chart else "",
             offer=self._offer(),
-            lost=commander.lost_orders(),
+            lost=commander.given.lost_orders(),
         )
 
     def _offer(self) -> str:

@@ -42,7 +42,7 @@ class RunKeys(OrderKeys):
             number = number_of(profile, parameter, raws[parameter.code], raws)
             if number is not None:
                 held[parameter.code] = number
-        wanted = self.commander.wanted
+        wanted = self.commander.given.wanted
         text, unit = proposed(profile, purpose, wanted.text if wanted else "", held)
         if purpose == "reference" and not unit:
             self._refuse(f"Where {profile.name} takes its reference is not known.")

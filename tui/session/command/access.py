@@ -1,0 +1,108 @@
+"""What every command does to a drive: reads what it depends on, writes as long as it may."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+
+from tui.bus.line import Priority
+from tui.drive.chart import state_of
+from tui.drive.orders import (
+    OrderRefused,
+    chart_in_force,
+    deciding_codes,
+    interlock,
+    interlock_codes,
+    order_target,
+    with_options,
+)
+from tui.drive.profile.schema import Chart, Order, OrderId, State
+from tui.drive.values import from_words
+
+from ..drive import DriveSession
+from ..journal import Journal
+from ..read.reader import Reader
+from ..reading import Reading
+from ..settings.write import Writer
+from ..work import Permit
+from .given import GivenCommands
+
+STEP_TIME = 2.0
+"""Seconds that a drive may take for one step of its chart."""
+STATE_POLL_INTERVAL = 0.05
+
+
+@dataclass(frozen=True, slots=True)
+class CommandAccess:
+    """Reads and writes of one command, under its permit."""
+
+    session: DriveSession
+    journal: Journal
+    given: GivenCommands
+    permit: Permit
+
+    @property
+    def writer(self) -> Writer:
+        """Writes as long as the permit holds."""
+        return Writer(self.session, self.journal, self.permit)
+
+    @property
+    def raws(self) -> Mapping[str, int]:
+        """Raw values as last read."""
+        return self.session.image.raws
+
+    async def read(self, codes: list[str]) -> Mapping[str, Reading]:
+        """Readings by code, as a person's request."""
+        return await Reader(self.session).read(codes, priority=Priority.OPERATOR_READ)
+
+    async def chart(self, wanted: OrderId | None = None) -> Chart:
+        """The chart in force, with every word read anew that a command depends on.
+
+        Raises OrderRefused where the drive is not commanded from here, or an interlock speaks
+        against the wanted command.
+        """
+        session = self.session
+        codes = deciding_codes(session.profile)
+        for chart in session.profile.data.charts:
+            codes += [chart.status, chart.command, *interlock_codes(chart)]
+        await self.read([code for code in dict.fromkeys(codes) if code])
+        found = chart_in_force(session.profile, self.raws)
+        if found is None or not found.orders:
+            name = found.name if found else "what decides about its commands was not read"
+            raise OrderRefused(f"This drive is not commanded from here: {name}.")
+        if wanted is not None and (refused := interlock(found, wanted, self.raws)):
+            raise OrderRefused(refused)
+        return found
+
+    async def state(self, chart: Chart) -> State:
+        """The drive's state, read now."""
+        await self.read([chart.status])
+        return state_of(chart, self.raws[chart.status])
+
+    async def wait_for(self, chart: Chart, goals: Collection[str]) -> State:
+        """The state, as soon as it is one of those, or when its time is up."""
+        end = time.monotonic() + STEP_TIME
+        state = await self.state(chart)
+        while state.id not in goals and time.monotonic() < end:
+            await asyncio.sleep(STATE_POLL_INTERVAL)
+            state = await self.state(chart)
+        return state
+
+    async def send(self, chart: Chart, order: Order) -> None:
+        """Write the words of a command, one after another."""
+        parameter = order_target(self.session.profile, chart, order)
+        for word in with_options(chart, order, self.raws):
+            if parameter.code == chart.command:
+                await self.write_command(chart, word, order.name)
+            else:
+                await self.writer.write(parameter, from_words(parameter, [word]), why=order.name)
+
+    async def write_command(self, chart: Chart, word: int, why: str) -> None:
+        """Write a command word; it is watched from then on."""
+        parameter = self.session.profile[chart.command]
+        # the state of the drive tells whether it was taken; the word itself is kept on record
+        await self.writer.write(parameter, from_words(parameter, [word]), why=why, check=0)
+        self.session.note_command()
+        self.given.note_command(parameter.code, word)

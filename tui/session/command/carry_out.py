@@ -1,0 +1,78 @@
+"""The commands of a person, each as it is carried out under its permit; each says what was done."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from tui.drive.orders import OrderRefused, choose
+from tui.drive.profile.schema import CommandOption, OrderId
+from tui.drive.values import from_words
+
+from .access import CommandAccess
+from .motor_start import MotorStart
+from .reference import Reference, parse_reference, reference_codes, within_limits
+
+
+async def give_order(access: CommandAccess, id: OrderId) -> str:
+    """Carry out a command that nothing speaks against."""
+    chart = await access.chart(id)
+    if id in ("forward", "reverse"):
+        return await MotorStart(access).carry_out(chart, id)
+    order = choose(chart, id, access.raws)
+    await access.send(chart, order)
+    return f"{order.name}: {(await access.state(chart)).name}"
+
+
+async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | None) -> str:
+    """Reference and run command in one, once nothing speaks against the command."""
+    chart = await access.chart(id)
+    if reference is not None:
+        await give_reference(access, reference)
+    return await MotorStart(access).carry_out(chart, id)
+
+
+async def give_reference(access: CommandAccess, text: str) -> str:
+    """Write a reference as typed."""
+    profile = access.session.profile
+    readings = await access.read(reference_codes(profile))
+    return await _write_reference(access, parse_reference(profile, text, readings))
+
+
+async def step_reference(access: CommandAccess, hertz: Decimal) -> str:
+    """The reference so many Hz higher or lower."""
+    profile = access.session.profile
+    readings = await access.read(reference_codes(profile))
+    parameter = profile.quantity("command_frequency")
+    reading = readings.get(parameter.code) if parameter else None
+    if reading is None or reading.value is None or reading.value.number is None:
+        raise OrderRefused(f"Where {profile.name} takes its reference is not known.")
+    number = within_limits(profile, reading.value.number + hertz, readings)
+    return await _write_reference(access, parse_reference(profile, f"{number:f}Hz", readings))
+
+
+async def _write_reference(access: CommandAccess, reference: Reference) -> str:
+    await access.writer.write(reference.parameter, reference.raw, why="reference", replaceable=True)
+    access.session.note_command()
+    access.given.note_reference(reference)
+    rounded = ", rounded to what the drive can hold" if reference.rounded else ""
+    return f"Reference {reference.text} ({reference.parameter.code}){rounded}"
+
+
+async def set_option(access: CommandAccess, option: CommandOption, bits: int) -> str:
+    """Set the bits of an option in its word; the others stay."""
+    parameter = access.session.profile[option.parameter]
+    chart = await access.chart()
+    reading = (await access.read([parameter.code]))[parameter.code]
+    if reading.raw is None:
+        raise OrderRefused(f"{parameter.code} cannot be read: {reading.error}")
+    running = {state.id for state in chart.states if state.kind in ("running", "stopping")}
+    if option.stopped_only and (await access.state(chart)).id in running:
+        raise OrderRefused(f"{option.name} is changed with the motor stopped only.")
+    word = reading.raw & 0xFFFF & ~option.mask | bits
+    await access.writer.write(
+        parameter, from_words(parameter, [word]), why=option.name, check=option.mask
+    )
+    access.session.note_command()
+    access.given.note_option(parameter.code, word)
+    name = next(choice.name for choice in option.choices if choice.bits == bits)
+    return f"{option.name}: {name}"

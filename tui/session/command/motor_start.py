@@ -1,0 +1,126 @@
+"""Starting a motor: its reference, the way through its chart, and that it turns as commanded."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import dataclass
+
+from tui.drive.chart import read_chart
+from tui.drive.orders import OrderRefused, choose, walk
+from tui.drive.profile.schema import Chart, Order, OrderId
+
+from ..drive import DriveSession
+from ..starts.keeper import record_start
+from .access import STATE_POLL_INTERVAL, CommandAccess
+
+LOOKS = 10
+"""Looks within which the direction of a start must be the ordered one."""
+ENABLED = "enabled"
+"""The state of the Drivecom charts in which the motor runs."""
+
+
+@dataclass(slots=True)
+class MotorStart:
+    """One start of one motor."""
+
+    access: CommandAccess
+    sent: bool = False
+    """Whether a run frame went out, or may have."""
+
+    @property
+    def session(self) -> DriveSession:
+        """The drive whose motor is started."""
+        return self.access.session
+
+    async def carry_out(self, chart: Chart, id: OrderId) -> str:
+        """Reference first, then the way through the chart to the running state."""
+        same = [order for order in chart.orders if order.id == id]
+        if not same:
+            raise OrderRefused(f"The {chart.name} has no order {id!r}.")
+        access = self.access
+        at_rest = (await access.state(chart)).kind not in ("running", "stopping")
+        await record_start(self.session, "reverse" if id == "reverse" else "forward", access.permit)
+        try:
+            await self._write_reference_again()
+            if chart.kind == "drivecom":
+                await self._walk(chart, same[0])
+            else:
+                order = choose(chart, id, access.raws)
+                self._goes_out()
+                await access.send(chart, order)
+        finally:
+            if not self.sent and self.session.starts is not None:
+                self.session.starts.never_sent(self.session)
+        name = same[0].name
+        reached = await self._until_running(chart)
+        if at_rest:
+            await self._check_direction(chart, id)
+        return f"{name}: {reached}"
+
+    async def _check_direction(self, chart: Chart, id: OrderId) -> None:
+        """Stop a motor that starts the other way: bit 11 may be assigned to something else."""
+        access = self.access
+        turns = read_chart(self.session.profile, access.raws).direction
+        if turns is None or turns == id:
+            return
+        for _ in range(LOOKS):
+            await asyncio.sleep(STATE_POLL_INTERVAL)
+            await access.read([chart.direction.parameter] if chart.direction else [])
+            turns = read_chart(self.session.profile, access.raws).direction
+            if turns == id:
+                return
+        await access.send(chart, choose(chart, "stop", access.raws))
+        raise OrderRefused(
+            f"Ordered {id}, the drive turned {turns} and was stopped: its reverse order is"
+            " assigned to something else."
+        )
+
+    async def _write_reference_again(self) -> None:
+        """Some drives run only once their reference was written, too: it is, as it stands."""
+        access, wanted = self.access, self.access.given.wanted
+        parameter = self.session.profile.quantity("command_frequency")
+        if wanted is not None:
+            parameter = wanted.parameter
+        if parameter is None:
+            return
+        reading = (await access.read([parameter.code]))[parameter.code]
+        raw = wanted.raw if wanted is not None else reading.raw
+        if raw is not None:
+            await access.writer.write(parameter, raw, why="reference before the run order")
+            self.session.note_command()
+
+    def _goes_out(self) -> None:
+        """From here on a standstill says that the motor was stopped."""
+        self.sent = True
+        if self.session.starts is not None:
+            self.session.starts.sent(self.session)
+
+    async def _walk(self, chart: Chart, run: Order) -> None:
+        """From the state now to the running one, each state seen before the next command."""
+        access = self.access
+        state = await access.state(chart)
+        if state.kind == "fault":
+            raise OrderRefused("The drive is in fault: reset it first.")
+        way = walk(chart, state.id, ENABLED)
+        for goal, word in way:
+            last = goal == ENABLED
+            if last:
+                self._goes_out()
+            await access.write_command(chart, run.words[-1] if last else word, run.name)
+            reached = await access.wait_for(chart, {goal, ENABLED})
+            if reached.id not in (goal, ENABLED):
+                names = {s.id: s.name for s in chart.states}
+                raise OrderRefused(
+                    f"The drive stays in {reached.name} and does not go to {names[goal]}"
+                    f" on 16#{word:04X}."
+                )
+        if not way:
+            self._goes_out()
+            await access.write_command(chart, run.words[-1], run.name)
+
+    async def _until_running(self, chart: Chart) -> str:
+        running = {s.id for s in chart.states if s.kind == "running"}
+        state = await self.access.wait_for(chart, running)
+        if state.kind != "running":
+            raise OrderRefused(f"The drive does not run; it is in the state {state.name}.")
+        return state.name
