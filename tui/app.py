@@ -35,7 +35,7 @@ from .screens.places import Places
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
-    from tui.session.command.stop import StopSummary
+    from tui.session.command.stop_report import StopSummary
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
@@ -305,7 +305,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
         reports = list(self.fleet.stopper.reports.values()) if self.fleet else []
         if not reports:
             return
-        from tui.session.command.stop import StopSummary
+        from tui.session.command.stop_report import StopSummary
 
         last = max(report.time for report in reports)
         stop = StopSummary([report for report in reports if report.time >= last - 0.1])

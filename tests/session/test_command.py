@@ -22,7 +22,8 @@ from tui.drive.profile import library
 from tui.session import arming
 from tui.session.arming import ARMED_FOR
 from tui.session.command.commander import Commander
-from tui.session.command.stop import Phase, Stopper
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal

@@ -21,7 +21,8 @@ from tests.programs import PATIENCE, wait_until
 from tests.session.sets_bench import bench
 from tui.session import journal as module
 from tui.session import journal_file
-from tui.session.command.stop import Phase, Stopper
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase
 from tui.session.journal import Entry, Journal
 from tui.session.report import entries_of
 

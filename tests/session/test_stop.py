@@ -12,7 +12,8 @@ from tui.bus.line import Line, Priority
 from tui.bus.link import SerialLink
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
 from tui.drive.profile import library
-from tui.session.command.stop import Phase, Stopper, StopReport
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase, StopReport
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.read.reader import Reader

@@ -10,7 +10,8 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Priority, Reply
 from tui.drive.orders import OrderRefused, stop_in_any
 from tui.drive.profile import library
-from tui.session.command.stop import Phase, Stopper
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase
 from tui.session.connect.limits import limits_of
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal

@@ -25,7 +25,7 @@ from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.help import HelpScreen
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
-from tui.session.command.stop import Phase
+from tui.session.command.stop_report import Phase
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive

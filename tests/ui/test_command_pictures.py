@@ -10,7 +10,8 @@ from textual.pilot import Pilot
 
 from tui.drive.profile import library
 from tui.screens.monitor.screen import MonitorScreen
-from tui.session.command.stop import Phase, Stopper, StopReport, StopSummary
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase, StopReport, StopSummary
 from tui.session.fleet import FoundDrive
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment, Recorder

@@ -322,7 +322,7 @@ class Run:
 
         Raises Failure where the drive answers and does not stop.
         """
-        from tui.session.command.stop import Phase
+        from tui.session.command.stop_report import Phase
 
         from .stop import ended
 

@@ -25,7 +25,8 @@ from .orders import close_journal, complain
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
-    from tui.session.command.stop import Stopper, StopReport
+    from tui.session.command.stop import Stopper
+    from tui.session.command.stop_report import StopReport
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
@@ -90,7 +91,7 @@ def has_order(session: DriveSession, order: OrderId) -> bool:
 
 async def ended(stopper: Stopper, device: int) -> StopReport:
     """The report of a stop that was ordered, once nothing more is awaited."""
-    from tui.session.command.stop import Phase
+    from tui.session.command.stop_report import Phase
 
     while True:
         report = stopper.reports[device]
@@ -141,7 +142,7 @@ async def _stop_one(opened: OpenLine, found: StoppableDrive, order: OrderId) -> 
 
 async def _seen_through(stopper: Stopper, found: StoppableDrive, order: OrderId) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
-    from tui.session.command.stop import Phase
+    from tui.session.command.stop_report import Phase
 
     session = found.session
     stopper.stop([session], order, by="drivepanel stop")

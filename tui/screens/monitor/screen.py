@@ -25,7 +25,7 @@ from tui.screens.monitor.state import (
 from tui.screens.monitor.trends import stacked_trends, trend_lines
 from tui.screens.monitor.view import SPANS, USUAL_SPAN, View
 from tui.screens.monitor.words import bit_lines, word_pages
-from tui.session.command.stop import Phase, StopReport
+from tui.session.command.stop_report import Phase, StopReport
 from tui.session.console import DriveConsole
 from tui.session.reading import Rating
 from tui.widgets.lines import Lines

@@ -8,7 +8,7 @@ from rich.text import Text
 from tui.bus.line import LineStatus
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.command.stop import Phase, StopReport
+from tui.session.command.stop_report import Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.monitor.line_watch import TOLD_SHARE
 from tui.session.reading import Quality

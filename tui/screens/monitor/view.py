@@ -8,7 +8,7 @@ from tui.bus.line import LineCounters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import MonitoringValue
 from tui.screens.command.control import UNARMED, Control
-from tui.session.command.stop import StopReport
+from tui.session.command.stop_report import StopReport
 from tui.session.connect.identify import DriveIdentity
 from tui.session.monitor.line_watch import TimeoutWatch
 from tui.session.monitor.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint

@@ -1,0 +1,188 @@
+"""One stop of one drive: its word chosen by what the drive tells now, sent, followed to its end."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+
+from tui.bus.errors import ExchangeError
+from tui.bus.line import Priority
+from tui.drive.chart import state_of
+from tui.drive.orders import (
+    chart_in_force,
+    choose,
+    last_word,
+    nearest_stop,
+    order_target,
+    stop_conditions,
+    stop_in_any,
+    with_options,
+)
+from tui.drive.profile.schema import Chart, Order, OrderId
+from tui.drive.values import from_words
+
+from ..drive import DriveSession
+from ..drive_state import STATE_FRESH
+from ..image import Raw
+from ..read.reader import Reader
+from ..settings.write import Writer
+from .stop_report import Phase
+
+log = logging.getLogger(__name__)
+
+STANDING = frozenset({"starting", "blocked", "ready", "stopped", "stopping", "fault"})
+"""Kinds of state in which a motor at 0 Hz is stopped: nothing enables it."""
+
+SEEN_FOR = 60.0
+"""Seconds for which a stop is followed; a ramp may take that long."""
+STANDSTILL_POLL_INTERVAL = 0.15
+TAKES_EFFECT = 1.5
+"""Seconds within which a drive must show that it obeys."""
+
+TellStop = Callable[[DriveSession, Phase, str, float], None]
+
+
+@dataclass(slots=True)
+class MotorStop:
+    """One stop of one drive: its word chosen by what the drive tells now, sent, followed."""
+
+    session: DriveSession
+    writer: Writer
+    order: OrderId
+    ordered: float
+    say: TellStop
+    wanted: OrderId = field(init=False)
+    """The way to stop that was asked for."""
+    sent: bool = False
+    """Whether its words have gone out."""
+    reader: Reader = field(init=False)
+    held: dict[str, Raw] = field(default_factory=dict)
+    """What command words held before they were written here: option bits are kept from it."""
+
+    def __post_init__(self) -> None:
+        self.reader = Reader(self.session)
+        self.wanted = self.order
+
+    async def carry_out(self) -> str | None:
+        """Choose, send and follow; returns why the motor does not stop, or nothing."""
+        chart, chosen = await self._chosen()
+        await self._send(chart, chosen)
+        return await self._follow(chart, chosen)
+
+    async def _chosen(self) -> tuple[Chart, Order]:
+        """The words that stop this drive now; what decides is read anew where it may differ."""
+        profile = self.session.profile
+        deciding = [chart.when.parameter for chart in profile.data.charts if chart.when]
+        try:
+            await self._read_anew(deciding)
+            chart = chart_in_force(profile, self._sure(deciding))
+            if chart is not None:
+                self.order = nearest_stop(chart, self.order)
+                await self._read_anew(stop_conditions(chart, self.order))
+        except ExchangeError as failure:
+            # blind: by the word that stops whatever the drive is in
+            log.warning("stop of device %s without a look: %s", self.session.device, failure)
+            known = self._sure(deciding)
+            chart = chart_in_force(profile, known)
+            if chart is None:
+                return stop_in_any(profile, known)
+        if chart is None:
+            return stop_in_any(profile, {})
+        return chart, choose(chart, self.order, self._sure(stop_conditions(chart, self.order)))
+
+    async def _read_anew(self, codes: Iterable[str]) -> None:
+        wanted = list(dict.fromkeys(codes))
+        unsure = [code for code in wanted if code not in self._sure(wanted)]
+        if unsure:
+            await self.reader.read(unsure, priority=Priority.STOP)
+
+    def _sure(self, codes: Iterable[str]) -> dict[str, int]:
+        """What is surely held now: just read, or not to be changed since the motor has run."""
+        session, image = self.session, self.session.image
+        fresh, trusted = image.fresh(STATE_FRESH), image.trusted
+        turns = session.state(STATE_FRESH).kind in ("running", "stopping")
+        found = {}
+        for code in codes:
+            held = image.get(code)
+            if code not in trusted or held is None:
+                continue
+            since = session.profile[code].access == "rw-stopped" and held.time > session.rest_seen
+            if code in fresh or (turns and since):
+                found[code] = trusted[code]
+        return found
+
+    async def _send(self, chart: Chart, order: Order) -> None:
+        session = self.session
+        parameter = order_target(session.profile, chart, order)
+        if (held := session.image.get(parameter.code)) is not None:
+            self.held[parameter.code] = held
+        kept = {code: one.raw for code, one in self.held.items() if one.raw is not None}
+        for word in with_options(chart, order, kept):
+            raw = from_words(parameter, [word])
+            why = f"stopped: {order.name}"
+            await self.writer.write(
+                parameter, raw, why=why, priority=Priority.STOP, read_back=False
+            )
+        self.sent = True
+
+    async def _follow(self, chart: Chart, order: Order) -> str | None:
+        """See the motor stop; returns why it does not, or nothing."""
+        progress, before = time.monotonic(), None
+        ending = last_word(chart, order)
+        while (now := time.monotonic()) - self.ordered < SEEN_FOR:
+            kind, hertz = await self._motion(chart)
+            if not hertz and kind in STANDING:
+                self.say(self.session, Phase.STOPPED, f"stopped{self._instead()}", self.ordered)
+                self.session.stir()
+                return None
+            if hertz == 0 and kind == "running" and ending is not None:
+                # at 0 Hz and enabled by the very word that has stopped it
+                await self._send(chart, ending)
+                progress, ending = time.monotonic(), None
+                continue
+            if kind != "running" or (None not in (hertz, before) and (hertz or 0) < (before or 0)):
+                progress = now
+            if now - progress > TAKES_EFFECT:
+                return self._why_not(hertz)
+            before = hertz
+            speed = f", {hertz:g} Hz" if hertz else ""
+            text = f"{order.name}{speed}{self._instead()}"
+            self.say(self.session, Phase.STOPPING, text, self.ordered)
+            await asyncio.sleep(STANDSTILL_POLL_INTERVAL)
+        return "it still turns after a minute."
+
+    def _instead(self) -> str:
+        """Which way to stop the drive lacks, where another took its place."""
+        if self.order == self.wanted:
+            return ""
+        wanted, way = self.wanted.replace("-", " "), self.order.replace("-", " ")
+        return f" (it has no {wanted}: {'ramp stop' if way == 'stop' else way})"
+
+    def _why_not(self, hertz: float | None) -> str:
+        """What still enables a drive that does not obey."""
+        state = self.session.state(STATE_FRESH)
+        who = "from its terminals or keypad" if state.local else state.channel
+        if hertz == 0:
+            by = who or "from elsewhere"
+            return f"it stands at 0 Hz and is still enabled {by}: a reference turns it at once."
+        return f"it answers and runs on; it is commanded {who or 'from elsewhere'}."
+
+    async def _motion(self, chart: Chart) -> tuple[str, float | None]:
+        """The kind of state and the output frequency in Hz, read now."""
+        session = self.session
+        frequency = session.profile.quantity("output_frequency")
+        # the word that was sent, too: the next one keeps its option bits
+        codes = [
+            chart.status,
+            *(code for code in self.held if self.session.image.get(code) is None),
+        ]
+        if frequency is not None:
+            codes.append(frequency.code)
+        readings = await self.reader.read(codes, priority=Priority.OPERATOR_READ)
+        number = readings[frequency.code].number if frequency else None
+        word = readings[chart.status].raw
+        kind = state_of(chart, word).kind if word is not None else "unknown"
+        return kind, abs(number) if number is not None else None
