@@ -23,16 +23,16 @@ async def editing(family: str, **spec: object) -> AsyncIterator[tuple[Bench, Edi
     """A drive with an editor that reads."""
     async with bench(family, **spec) as made:  # type: ignore[arg-type]
         editor = made.console.editor
-        editor.start()
+        editor.values.start()
         try:
             yield made, editor
         finally:
-            editor.stop()
+            editor.values.stop()
 
 
 async def read(made: Bench, editor: Editor, *codes: str) -> None:
-    editor.visible = codes
-    await made.until(lambda: all(code in editor.raws for code in codes))
+    editor.values.visible = codes
+    await made.until(lambda: all(code in editor.values.raws for code in codes))
 
 
 async def written(made: Bench, editor: Editor) -> str:
@@ -51,17 +51,17 @@ async def test_find_edit_apply_undo(family: str) -> None:
         code = NUMBERS[family]
         assert code in rows(editor.facts, "settings", "acc")
         await read(made, editor, code)
-        before = editor.raws[code]
-        editor.stage(code, "7.5 s")
-        assert editor.edits.get(code) is not None
-        editor.undo(code)
-        assert len(editor.edits) == 0
-        assert editor.raws[code] == before
-        editor.stage(code, "7.5 s")
+        before = editor.values.raws[code]
+        editor.staging.stage(code, "7.5 s")
+        assert editor.staging.edits.get(code) is not None
+        editor.staging.undo(code)
+        assert len(editor.staging.edits) == 0
+        assert editor.values.raws[code] == before
+        editor.staging.stage(code, "7.5 s")
         editor.apply()
         assert "1 written and read back" in await written(made, editor)
-        assert made.drive.raw(code) == editor.raws[code] == 75
-        assert len(editor.edits) == 0
+        assert made.drive.raw(code) == editor.values.raws[code] == 75
+        assert len(editor.staging.edits) == 0
         assert editor.marks.recent[0] == code
         assert rows(editor.facts, "recent") == [code]
 
@@ -70,12 +70,13 @@ async def test_find_edit_apply_undo(family: str) -> None:
 async def test_everything_is_read_what_is_looked_at_first(family: str) -> None:
     async with editing(family) as (made, editor):
         last = [p.code for p in editor.session.profile.parameters if p.access != "w"][-1]
+        values = editor.values
         await made.until(
-            lambda: last in editor.raws or last in editor.absent or editor.progress[0] > 0
+            lambda: last in values.raws or last in values.absent or values.progress[0] > 0
         )
-        editor.visible = (last,)
-        await made.until(lambda: last in editor.raws or last in editor.absent)
-        await made.until(lambda: editor.progress[0] == editor.progress[1], 60.0)
+        values.visible = (last,)
+        await made.until(lambda: last in values.raws or last in values.absent)
+        await made.until(lambda: values.progress[0] == values.progress[1], 60.0)
         for chosen in FILTERS:
             rows(editor.facts, chosen, "a")
 
@@ -83,12 +84,12 @@ async def test_everything_is_read_what_is_looked_at_first(family: str) -> None:
 async def test_a_refused_edit_stays_staged_and_says_why() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "HSP", "LSP", "TFR")
-        editor.stage("HSP", "70")
+        editor.staging.stage("HSP", "70")
         editor.apply()
         said = await written(made, editor)
         assert said == "nothing written; 1 still staged: HSP"
-        assert "TFR" in editor.results["HSP"].text
-        assert editor.edits.get("HSP") is not None
+        assert "TFR" in editor.staging.results["HSP"].text
+        assert editor.staging.edits.get("HSP") is not None
         assert made.drive.raw("HSP") == 500
 
 
@@ -103,8 +104,8 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
         assert refused is not None
         assert refused.reason == "running"
         assert editor.refusal("ACC") is None
-        editor.stage("TFR", "65")
-        editor.stage("ACC", "4")
+        editor.staging.stage("TFR", "65")
+        editor.staging.stage("ACC", "4")
         editor.apply()
         assert "1 written and read back; 1 still staged" in await written(made, editor)
         assert made.drive.raw("ACC") == 40
@@ -114,14 +115,14 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
 async def test_what_somebody_else_changes_is_noticed_and_not_overwritten() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "ACC")
-        editor.stage("ACC", "7")
+        editor.staging.stage("ACC", "7")
         made.drive.set("ACC", 55)
-        await made.until(lambda: "ACC" in editor.changed_elsewhere)
+        await made.until(lambda: "ACC" in editor.staging.changed_elsewhere)
         editor.apply()
         assert "still staged" in await written(made, editor)
         assert made.drive.raw("ACC") == 55
         made.session.work.outcome = None
-        editor.accept_changes()
+        editor.staging.accept_changes()
         editor.apply()
         assert "1 written" in await written(made, editor)
         assert made.drive.raw("ACC") == 70
@@ -130,12 +131,12 @@ async def test_what_somebody_else_changes_is_noticed_and_not_overwritten() -> No
 async def test_a_ramp_keeps_its_seconds_when_its_increment_changes() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "ACC", "INR")
-        editor.stage("ACC", "7.5")
-        editor.stage("INR", "0.01 s")
+        editor.staging.stage("ACC", "7.5")
+        editor.staging.stage("INR", "0.01 s")
         editor.apply()
         await written(made, editor)
         assert (made.drive.raw("INR"), made.drive.raw("ACC")) == (0, 750)
-        value = editor.value("ACC")
+        value = editor.values.value("ACC")
         assert value is not None
         assert value.display == "7.50 s"
 
@@ -155,19 +156,19 @@ async def test_an_unverified_one_is_confirmed_once() -> None:
 async def test_nothing_is_staged_while_something_is_written() -> None:
     async with editing("atv71") as (made, editor):
         await read(made, editor, "ACC", "DEC")
-        editor.stage("ACC", "7.5")
+        editor.staging.stage("ACC", "7.5")
         editor.apply()
         if editor.busy:
             with pytest.raises(ValueRefused, match="wait"):
-                editor.stage("DEC", "5")
+                editor.staging.stage("DEC", "5")
         await written(made, editor)
-        editor.stage("DEC", "5")
+        editor.staging.stage("DEC", "5")
 
 
 async def test_save_to_eeprom_and_factory_settings() -> None:
     async with editing("atv312") as (made, editor):
         await read(made, editor, "ACC")
-        editor.stage("ACC", "9")
+        editor.staging.stage("ACC", "9")
         editor.apply()
         await written(made, editor)
         assert editor.unsaved == {"ACC"}
@@ -192,10 +193,11 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
         editor.source = read_set(file)
         editor.other = dict(editor.source.raws)
         await read(made, editor, "ACC", "DEC", "HSP", "INR")
-        await made.until(lambda: (editor.raws["ACC"], editor.raws["HSP"]) == (99, 400))
+        image = made.session.image
+        await made.until(lambda: (image.raws["ACC"], image.raws["HSP"]) == (99, 400))
         assert set(rows(editor.facts, "differs")) == {"ACC", "HSP"}
-        editor.take_plan(await editor.plan())
-        assert {edit.code for edit in editor.edits} == {"ACC", "HSP"}
+        editor.staging.take_plan(await editor.plan())
+        assert {edit.code for edit in editor.staging.edits} == {"ACC", "HSP"}
         editor.apply()
         assert "2 written" in await written(made, editor)
         assert (made.drive.raw("ACC"), made.drive.raw("HSP")) == (30, 500)
@@ -204,13 +206,13 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
 async def test_what_waits_for_a_reset_is_told_until_the_drive_was_off() -> None:
     async with editing("atv21") as (made, editor):
         await read(made, editor, "F875")
-        editor.stage_raw("F875", 2)
+        editor.staging.stage_raw("F875", 2)
         editor.apply()
         assert "after a reset of the drive: F875" in await written(made, editor)
         assert editor.waits_for_reset == {"F875"}
-        editor.visible = ("F875",)
+        editor.values.visible = ("F875",)
         made.drive.power_off()
-        await made.until(lambda: "did not answer" in editor.trouble)
+        await made.until(lambda: "did not answer" in editor.values.trouble)
         assert editor.waits_for_reset == {"F875"}
         made.drive.power_on()
         await made.until(lambda: editor.waits_for_reset == set(), 40.0)

@@ -201,7 +201,7 @@ async def test_a_stop_ends_parameter_writing_before_its_next_frame() -> None:
             raw = readings[code].raw
             assert raw is not None
             try:
-                editor.stage_raw(code, raw + 1)
+                editor.staging.stage_raw(code, raw + 1)
                 staged += 1
             except OrderRefused:
                 continue
@@ -218,10 +218,10 @@ async def test_a_stop_ends_parameter_writing_before_its_next_frame() -> None:
         assert [one for one in here.writes()[at:] if one[0] != 8501] == []
         assert at < staged
         assert not here.session.arming.armed
-        assert len(editor.edits) >= staged - at
+        assert len(editor.staging.edits) >= staged - at
         # of the one that was on the wire the drive itself is asked
-        await until(lambda: all(here.drive.raw(e.code) == e.old for e in editor.edits))
-        assert len(editor.edits) < staged
+        await until(lambda: all(here.drive.raw(e.code) == e.old for e in editor.staging.edits))
+        assert len(editor.staging.edits) < staged
 
 
 async def test_settings_and_blocks_are_refused_while_the_drive_is_not_armed() -> None:
@@ -229,7 +229,7 @@ async def test_settings_and_blocks_are_refused_while_the_drive_is_not_armed() ->
     async with bench("atv71") as here:
         await Reader(here.session).read(["ACC", "INR"])
         editor = here.console.editor
-        editor.stage("ACC", "7 s")
+        editor.staging.stage("ACC", "7 s")
         editor.apply()
         editor.save()
         editor.factory()
@@ -237,7 +237,7 @@ async def test_settings_and_blocks_are_refused_while_the_drive_is_not_armed() ->
         assert here.writes() == []
         assert here.session.work.outcome is not None
         assert "Not armed" in here.session.work.outcome.text
-        assert "ACC" in editor.edits
+        assert "ACC" in editor.staging.edits
 
 
 async def test_one_thing_at_a_time_is_done_to_a_drive() -> None:
@@ -246,7 +246,7 @@ async def test_one_thing_at_a_time_is_done_to_a_drive() -> None:
         here.session.arming.arm()
         here.console.commander.order("forward")
         editor = here.console.editor
-        editor.stage("ACC", "7 s")
+        editor.staging.stage("ACC", "7 s")
         editor.apply()
         assert here.session.work.outcome is not None
         assert "Another command" in here.session.work.outcome.text

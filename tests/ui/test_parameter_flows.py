@@ -105,12 +105,12 @@ async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() 
         for code in ("ACC", "DEC", "HSP"):
             await find(made, code)
             await made.pilot.press("minus")
-            await until(made.pilot, lambda code=code: code in screen.editor.edits)  # type: ignore[misc]
+            await until(made.pilot, lambda code=code: code in screen.editor.staging.edits)  # type: ignore[misc]
         await find(made, "ACC")
         await made.pilot.press("u")
-        assert [edit.code for edit in screen.editor.edits] == ["ACC", "DEC"]
+        assert [edit.code for edit in screen.editor.staging.edits] == ["ACC", "DEC"]
         await made.pilot.press("delete")
-        assert [edit.code for edit in screen.editor.edits] == ["DEC"]
+        assert [edit.code for edit in screen.editor.staging.edits] == ["DEC"]
         await made.pilot.press("delete")
         assert "This parameter is not staged" in shown(made.app, "message")
         await made.pilot.press("u")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +16,12 @@ from tui.drive.profile import library
 from tui.screens.parameters.screen import ParametersScreen
 from tui.screens.parameters.view import news_lines
 from tui.session.console import DriveConsole
+from tui.session.drive_state import DriveState
 from tui.session.image import Raw
 from tui.session.settings.apply import EditOutcome, Result
 from tui.session.settings.editor import Editor
 from tui.session.settings.favourites import Marks
+from tui.session.settings.watched_values import WatchedValues
 from tui.session.work import Outcome as WorkOutcome
 from tui.session.work import OutcomeKind
 
@@ -33,14 +36,21 @@ HELD = {
 }  # fmt: skip
 
 
-class StillEditor(Editor):
-    """An editor whose values do not change."""
+class StillValues(WatchedValues):
+    """Values that do not change."""
 
     def start(self) -> None:
         """Nothing is read."""
 
     def stop(self) -> None:
         """Nothing was read."""
+
+
+def still_editor(console: DriveConsole, state: Callable[[], DriveState | None]) -> Editor:
+    """An editor whose values do not change."""
+    editor = Editor(console.session, console.journal, state)
+    editor.values = StillValues(console.session, lambda: editor.state, lambda: None)
+    return editor
 
 
 def editor_of(
@@ -50,7 +60,7 @@ def editor_of(
     profile = library.load("atv71")
     snapshot = fakes.snapshot_of(profile, state)
     console = fakes.console_of(snapshot, armed=armed)
-    editor = StillEditor(console.session, console.journal, lambda: snapshot.state)
+    editor = still_editor(console, lambda: snapshot.state)
     editor.marks = Marks(favourites=("ACC", "HSP"))
     rest = {} if reading else {p.code: 0 for p in profile.parameters if p.access != "w"}
     image = console.session.image
@@ -71,20 +81,20 @@ def plain(_: Editor) -> None:
 
 
 def staged(editor: Editor) -> None:
-    editor.stage("ACC", "5.03")
-    editor.stage("DEC", "4.0")
-    editor.stage("HSP", "45")
+    editor.staging.stage("ACC", "5.03")
+    editor.staging.stage("DEC", "4.0")
+    editor.staging.stage("HSP", "45")
 
 
 def refused(editor: Editor) -> None:
     staged(editor)
-    edit = editor.edits.get("HSP")
+    edit = editor.staging.edits.get("HSP")
     assert edit is not None
     text = (
         "HSP: the drive refused with exception 4, not written. The drive is running forward."
         " Stop the motor and write again."
     )
-    editor.results = {"HSP": Result(edit, EditOutcome.DRIVE_REFUSED, text, 500)}
+    editor.staging.results = {"HSP": Result(edit, EditOutcome.DRIVE_REFUSED, text, 500)}
     say(editor, OutcomeKind.REFUSED, "2 written and read back; 1 still staged: HSP")
 
 
@@ -100,7 +110,7 @@ def done(editor: Editor) -> None:
 
 
 def compared(editor: Editor) -> None:
-    editor.other = {**editor.raws, "ACC": 60, "HSP": 400, "TTO": 50}
+    editor.other = {**editor.values.raws, "ACC": 60, "HSP": 400, "TTO": 50}
     editor.other_label = "pump-2.toml"
 
 
@@ -185,10 +195,10 @@ def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
 def test_another_hands_value_is_told_as_the_drive_counts_it() -> None:
     """An Altivar 31 without a ramp increment counts in tenths; that is not an unknown scale."""
     console = fakes.console_of(None, family="atv31")
-    editor = StillEditor(console.session, console.journal, lambda: None)
+    editor = still_editor(console, lambda: None)
     image = console.session.image
     image.take({"ACC": Raw(1.0, 50), "Inr": Raw(1.0, None, "exception 2", absent=True)})
-    editor.stage("ACC", "7 s")
+    editor.staging.stage("ACC", "7 s")
     image.confirm("ACC", 30, 2.0)
     said = "\n".join(line.plain for line in news_lines(editor, "ACC", Text(""), 100))
     assert "it was 5.0 s" in said

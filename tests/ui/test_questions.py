@@ -406,7 +406,7 @@ async def test_nothing_is_written_on_any_key_but_y(name: str) -> None:
 async def back_to_monitor(made: Bench) -> None:
     """From where the question was asked; what was staged or armed there is let go."""
     if isinstance(made.app.screen, ParametersScreen):
-        made.app.screen.editor.undo_all()
+        made.app.screen.editor.staging.undo_all()
         await made.pilot.press("A", "2")
     elif isinstance(made.app.screen, BlocksScreen | ControlSourceScreen):
         await made.pilot.press("A", "2")

@@ -173,8 +173,8 @@ class Leaving(Panel):
             device, editor = console.device, console.begun_editor
             if editor is None:
                 continue
-            if len(editor.edits):
-                told.append(f"Device {device}: {len(editor.edits)} staged edits are not written.")
+            if count := len(editor.staging.edits):
+                told.append(f"Device {device}: {count} staged edits are not written.")
             if editor.unsaved:
                 count = len(editor.unsaved)
                 told.append(

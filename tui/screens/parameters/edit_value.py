@@ -43,9 +43,9 @@ class EditNumber(Question[str | None]):
     def compose(self) -> ComposeResult:
         """The field, what it comes to, and what is known."""
         editor, parameter = self._editor, self._parameter
-        staged = editor.edits.get(parameter.code)
-        raw = staged.new if staged else editor.raws.get(parameter.code)
-        value = editor.value(parameter.code, raw) if raw is not None else None
+        staged = editor.staging.edits.get(parameter.code)
+        raw = staged.new if staged else editor.values.raws.get(parameter.code)
+        value = editor.values.value(parameter.code, raw) if raw is not None else None
         limits, factory = range_text(editor, parameter), factory_text(editor, parameter)
         with Vertical(id="dialog"):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
@@ -70,9 +70,10 @@ class EditNumber(Question[str | None]):
         """Show what the text comes to; whether it may be staged."""
         held = self.query_one("#held", Plain)
         editor, parameter = self._editor, self._parameter
+        values = editor.values
         try:
-            edits = editor.edits.stage(
-                editor.session.profile, parameter.code, text, editor.raws, editor.lacking
+            edits = editor.staging.edits.stage(
+                editor.session.profile, parameter.code, text, values.raws, values.lacking
             )
         except DriveError as refused:
             held.update(Text(str(refused), ALARM))
@@ -94,7 +95,7 @@ class EditNumber(Question[str | None]):
         """The next value that the drive can hold."""
         editor, parameter = self._editor, self._parameter
         profile, field = editor.session.profile, self.query_one(Input)
-        scale = profile.scale(parameter, editor.raws, editor.lacking)
+        scale = profile.scale(parameter, editor.values.raws, editor.values.lacking)
         if scale is None:
             return
         try:
@@ -133,13 +134,13 @@ class PickValue(KeyQuestion[int | None]):
     def on_mount(self) -> None:
         """Begin at the staged or held value."""
         code = self._parameter.code
-        staged = self._editor.edits.get(code)
-        raw = staged.new if staged else self._editor.raws.get(code)
+        staged = self._editor.staging.edits.get(code)
+        raw = staged.new if staged else self._editor.values.raws.get(code)
         places = [place for place, (value, _) in enumerate(self._names) if value == raw]
         self.query_one(OptionList).highlighted = places[0] if places else 0
 
     def _line(self, raw: int, name: str) -> Text:
-        held = self._editor.raws.get(self._parameter.code) == raw
+        held = self._editor.values.raws.get(self._parameter.code) == raw
         text = Text(no_wrap=True)
         text.append(" ● " if held else " · ", STRONG if held else FAINT)
         text.append(f"{raw:>5}  ", FAINT)
@@ -163,8 +164,8 @@ class EditBits(KeyQuestion[int | None]):
     def __init__(self, editor: Editor, parameter: Parameter) -> None:
         super().__init__()
         self._parameter = parameter
-        staged = editor.edits.get(parameter.code)
-        held = editor.raws.get(parameter.code, 0)
+        staged = editor.staging.edits.get(parameter.code)
+        held = editor.values.raws.get(parameter.code, 0)
         self._held = held & 0xFFFF
         self._word = (staged.new if staged else held) & 0xFFFF
 

@@ -56,13 +56,13 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     def on_mount(self) -> None:
         """Begin to read."""
-        self.editor.start()
+        self.editor.values.start()
         self.call_after_refresh(self.list_again)
 
     def on_unmount(self) -> None:
         """Read no more; what is staged stays."""
-        self.editor.stop()
-        self.editor.visible = ()
+        self.editor.values.stop()
+        self.editor.values.visible = ()
 
     @property
     def _room(self) -> int:
@@ -74,7 +74,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         editor, room = self.editor, self._room
         self.offer_to_follow()
         shown = self.listed.window(room)
-        editor.visible = tuple(item.code for item in shown if item.code)
+        editor.values.visible = tuple(item.code for item in shown if item.code)
         table = [
             row_line(editor, item, width, chosen=place == self.listed.at)
             for place, item in enumerate(shown, start=self.listed.top)
@@ -90,7 +90,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         self.put("status", [status_line(editor, self.commander.armed_for, width)])
 
     def _title(self) -> Text:
-        done, count = self.editor.progress
+        done, count = self.editor.values.progress
         text = Text(no_wrap=True)
         text.append(f" {self.session.profile.name} · device {self.session.device}", STRONG)
         style = FAINT if self.listed.chosen == USUAL else ATTENTION
@@ -108,7 +108,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         editor = self.editor
         now = self.app.clock.monotonic()
         told = news(editor.said, now, busy=editor.busy, passed=self.passed)
-        return Text(*told) if told else Text(self.remark or editor.trouble, ALARM)
+        return Text(*told) if told else Text(self.remark or editor.values.trouble, ALARM)
 
     # Keys that move
 

@@ -180,7 +180,7 @@ class SetKeys(ParameterKeys):
         except (LineError, DriveError) as error:
             self.note(str(error))
             return
-        editor.take_plan(plan)
+        editor.staging.take_plan(plan)
         left = [item for item in plan.of_kind("skip") if item.reason != "no setting"]
         self.note(f"{len(plan.edits)} staged from {editor.other_label}; w writes them.")
         if left:

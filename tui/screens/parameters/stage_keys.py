@@ -29,9 +29,9 @@ class StageKeys(ParameterKeys):
         """Whether it may be staged; a motor that runs hinders only the writing."""
         refused = self.editor.refusal(code)
         if refused is None or refused.reason == "running":
-            if code in self.editor.raws:
+            if code in self.editor.values.raws:
                 return True
-            self.note(self.editor.absent.get(code) or f"{code} was not read yet.")
+            self.note(self.editor.values.absent.get(code) or f"{code} was not read yet.")
             return False
         if refused.reason == "unverified":
             self.action_confirm()
@@ -42,9 +42,9 @@ class StageKeys(ParameterKeys):
     def _stage(self, code: str, answer: str | int) -> None:
         try:
             if isinstance(answer, str):
-                remark = self.editor.stage(code, answer)
+                remark = self.editor.staging.stage(code, answer)
             else:
-                remark = self.editor.stage_raw(code, answer)
+                remark = self.editor.staging.stage_raw(code, answer)
         except DriveError as refused:
             self.note(str(refused))
         else:
@@ -55,16 +55,16 @@ class StageKeys(ParameterKeys):
         code = self.listed.code
         if not code or not self._may_edit(code):
             return
-        edit = self.editor.edits.get(code)
-        self._stage(code, (edit.new if edit else self.editor.raws[code]) + steps)
+        edit = self.editor.staging.edits.get(code)
+        self._stage(code, (edit.new if edit else self.editor.values.raws[code]) + steps)
 
     def action_confirm(self) -> None:
         """Confirm an unverified parameter, or keep an edit over another's change."""
         from ..dialogs.confirm import Confirm
 
         code = self.listed.code
-        if code in self.editor.changed_elsewhere:
-            self.editor.accept_changes()
+        if code in self.editor.staging.changed_elsewhere:
+            self.editor.staging.accept_changes()
             self.note("Your edits stay, against what the drive holds now.")
             return
         refused = self.editor.refusal(code) if code else None
@@ -80,7 +80,7 @@ class StageKeys(ParameterKeys):
         follows = (
             f"No document at hand confirms that {code} is at {parameter.number} on this family."
             " Read it at the keypad: only if both show the same, confirm it."
-            f" Here it reads {self.editor.raws.get(code, 'nothing')}."
+            f" Here it reads {self.editor.values.raws.get(code, 'nothing')}."
         )
         asked = Confirm(
             f"Confirm {code}?",
@@ -94,16 +94,16 @@ class StageKeys(ParameterKeys):
 
     def action_undo(self) -> None:
         """Take the last edit back; where nothing is staged, stage what was held before a write."""
-        if len(self.editor.edits.asked):
-            self.editor.undo(self.editor.edits.asked[-1].code)
+        if len(self.editor.staging.edits.asked):
+            self.editor.staging.undo(self.editor.staging.edits.asked[-1].code)
         else:
-            self.note(self.editor.stage_old())
+            self.note(self.editor.staging.stage_old())
         self.list_again()
 
     def action_undo_this(self) -> None:
         """Take the edit under the cursor back."""
-        if self.listed.code in self.editor.edits:
-            self.editor.undo(self.listed.code)
+        if self.listed.code in self.editor.staging.edits:
+            self.editor.staging.undo(self.listed.code)
         else:
             self.note("This parameter is not staged.")
         self.list_again()
@@ -112,13 +112,13 @@ class StageKeys(ParameterKeys):
         """Take every edit back, after asking."""
         from ..dialogs.confirm import Confirm
 
-        count = len(self.editor.edits)
+        count = len(self.editor.staging.edits)
         if not count:
             return
 
         def told(sure: bool | None) -> None:
             if sure:
-                self.editor.undo_all()
+                self.editor.staging.undo_all()
                 self.list_again()
 
         follows = f"{count} staged edits are dropped; the drive is not touched."

@@ -104,7 +104,7 @@ def _row(editor: Editor, parameter: Parameter, width: int) -> Text:
         text.append(f"{parameter.number[: MANUAL_NUMBER_WIDTH - 1]:<{MANUAL_NUMBER_WIDTH}}", FAINT)
     text.append(cut(parameter.name, name_width(width) - 1) + " ", FAINT)
     held = value_text(editor, code)
-    changed = not_factory(editor.session.profile, parameter, editor.raws.get(code))
+    changed = not_factory(editor.session.profile, parameter, editor.values.raws.get(code))
     text.append(
         f"{short(held, VALUE_WIDTH):>{VALUE_WIDTH}}", _value_style(editor, parameter, changed)
     )
@@ -123,7 +123,7 @@ def _code_style(parameter: Parameter, sure: bool) -> Style:
 
 
 def _value_style(editor: Editor, parameter: Parameter, changed: bool) -> Style:
-    if parameter.code not in editor.raws:
+    if parameter.code not in editor.values.raws:
         return FAINT
     if parameter.access == "r":
         return PLAIN
@@ -131,7 +131,7 @@ def _value_style(editor: Editor, parameter: Parameter, changed: bool) -> Style:
 
 
 def _staged(editor: Editor, code: str) -> Text:
-    edit, result = editor.edits.get(code), editor.results.get(code)
+    edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
     text = Text(no_wrap=True)
     if edit is None:
         said = "written" if result is not None and result.done else ""
@@ -139,7 +139,7 @@ def _staged(editor: Editor, code: str) -> Text:
         return text
     text.append(" → ", ATTENTION)
     failed = result is not None and not result.done
-    style = ALARM if failed or code in editor.changed_elsewhere else ATTENTION
+    style = ALARM if failed or code in editor.staging.changed_elsewhere else ATTENTION
     text.append(f"{short(edit.text, VALUE_WIDTH - 1):<{VALUE_WIDTH}}", style)
     return text
 
@@ -155,7 +155,7 @@ def _flags(editor: Editor, parameter: Parameter) -> str:
 
 def value_text(editor: Editor, code: str) -> str:
     """The held value, dashes while there is none."""
-    value = editor.value(code)
+    value = editor.values.value(code)
     return value.display if value is not None else NOT_AVAILABLE
 
 
@@ -175,7 +175,8 @@ def factory_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def _shown(editor: Editor, parameter: Parameter, raw: int) -> str:
-    return shown(editor.session.profile, parameter, raw, editor.raws, editor.lacking).display
+    values = editor.values
+    return shown(editor.session.profile, parameter, raw, values.raws, values.lacking).display
 
 
 def range_text(editor: Editor, parameter: Parameter) -> str:
@@ -187,7 +188,7 @@ def range_text(editor: Editor, parameter: Parameter) -> str:
         return f"{len(names)} values"
     if parameter.min is None and parameter.max is None:
         return ""
-    return limits_text(editor.session.profile, parameter, editor.raws, editor.lacking)
+    return limits_text(editor.session.profile, parameter, editor.values.raws, editor.values.lacking)
 
 
 def parameter_lines(editor: Editor, code: str, width: int) -> list[Text]:
@@ -219,7 +220,7 @@ def _wrapped(text: Text, width: int, most: int) -> list[Text]:
 
 
 def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
-    raw = editor.raws.get(parameter.code)
+    raw = editor.values.raws.get(parameter.code)
     text = Text(no_wrap=True)
     text.append(f" {parameter.code} ", STRONG)
     hexadecimal = f"16#{parameter.address:04X}"
@@ -230,7 +231,7 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
             f"   raw {raw} = 16#{raw & 0xFFFFFFFF if raw > 0xFFFF else raw & 0xFFFF:04X}", FAINT
         )
     if (limits := range_text(editor, parameter)) and not is_enumeration(parameter):
-        scale = editor.session.profile.scale(parameter, editor.raws, editor.lacking)
+        scale = editor.session.profile.scale(parameter, editor.values.raws, editor.values.lacking)
         step = f" by {scale:f}" if scale is not None else ""
         text.append(f"   {limits}{step}", PLAIN)
     factory = f"   factory {factory_text(editor, parameter)}"
@@ -243,7 +244,7 @@ def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
 def _meaning(editor: Editor, parameter: Parameter, width: int) -> Text:
     text = Text(no_wrap=True)
     text.append(f" {parameter.name}", PLAIN)
-    raw = editor.raws.get(parameter.code)
+    raw = editor.values.raws.get(parameter.code)
     if parameter.bits and raw is not None:
         names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, raw))
         text.append(f": {names or 'no bit set'}", PLAIN)
@@ -277,9 +278,9 @@ def _writing(editor: Editor, parameter: Parameter, width: int) -> Text:
 def _news(editor: Editor, parameter: Parameter) -> Text:
     """What happened to it last: another's change, a refusal, a remark."""
     code, profile = parameter.code, editor.session.profile
-    edit, result = editor.edits.get(code), editor.results.get(code)
-    if code in editor.changed_elsewhere:
-        before = _shown(editor, parameter, editor.changed_elsewhere[code])
+    edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
+    if code in editor.staging.changed_elsewhere:
+        before = _shown(editor, parameter, editor.staging.changed_elsewhere[code])
         said = f"Changed by somebody else: it was {before}. Delete drops your edit, y keeps it."
         return Text(said, ALARM)
     if result is not None and not result.done:
@@ -294,7 +295,7 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
         if waits_for_reset(profile, parameter):
             text.append(" In force after a reset of the drive.", ALARM)
         return text
-    return Text(editor.absent.get(code, ""), STALE)
+    return Text(editor.values.absent.get(code, ""), STALE)
 
 
 def status_line(editor: Editor, armed: float | None, width: int) -> Text:
@@ -303,7 +304,7 @@ def status_line(editor: Editor, armed: float | None, width: int) -> Text:
     watched = editor.watched()
     now = "state not known" if watched is None else watched.headline
     text.append(f"  {now}", PLAIN if editor.state else ALARM)
-    count = len(editor.edits)
+    count = len(editor.staging.edits)
     text.append(f"   {count} staged", ATTENTION if count else FAINT)
     if editor.unsaved:
         text.append(f"   {len(editor.unsaved)} not saved", ALARM)

@@ -21,7 +21,7 @@ class WriteKeys(ParameterKeys):
         """Say what will be written, and write it."""
         from .write_text import write_text
 
-        edits = [e for e in self.editor.edits if not only or e.code == only]
+        edits = [e for e in self.editor.staging.edits if not only or e.code == only]
         if not edits:
             self.note("Nothing is staged: Enter edits the parameter under the cursor.")
             return
@@ -38,7 +38,7 @@ class WriteKeys(ParameterKeys):
 
     def action_write_one(self) -> None:
         """Write the edit under the cursor."""
-        if self.listed.code in self.editor.edits:
+        if self.listed.code in self.editor.staging.edits:
             self.action_write(only=self.listed.code)
         else:
             self.note("This parameter is not staged.")

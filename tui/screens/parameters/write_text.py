@@ -13,7 +13,7 @@ EDITS_NAMED = 9
 
 def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
     """Old and new of each edit in the order of writing, then what is dangerous about it."""
-    profile, raws = editor.session.profile, editor.raws
+    profile, raws = editor.session.profile, editor.values.raws
     chosen = Edits(tuple(edits))
     order = ordered(profile, chosen, raws)
     lines = [f"{e.code}  {e.old_text or '-----'} → {e.text}" for e in order[:EDITS_NAMED]]
@@ -22,7 +22,7 @@ def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
     told = list(edit_problems(profile, chosen, raws).values())
     told += [r.text for e in order if (r := editor.refusal(e.code)) is not None]
     told += [edit.warning for edit in order if edit.warning]
-    told += consequences(profile, chosen, raws, editor.lacking)
+    told += consequences(profile, chosen, raws, editor.values.lacking)
     told += [
         f"{e.code} changes the line itself: the drive answers at its new settings only."
         for e in order

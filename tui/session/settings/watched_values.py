@@ -1,0 +1,146 @@
+"""The values of one drive for a screen of parameters: what is looked at first, then the rest.
+
+They come in through a worker of the line's loop, behind everything else where nobody looks; what
+is looked at is read again and again, so that another's change is noticed.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+from tui.bus.errors import LineError, NoAnswer
+from tui.bus.line import Priority, Worker
+from tui.drive.profile.schema import Parameter, StateKind
+from tui.drive.shown import scale_sources, shown
+from tui.drive.values import Value
+
+from ..drive import DriveSession
+from ..read.retrying_reader import RetryingReader, neighbours
+from ..read.upload import readable_codes
+
+IDLE_POLL_INTERVAL = 0.1
+"""Seconds between two turns of the reader that has nothing to do."""
+REREAD_AFTER = 1.0
+"""Seconds after which what is looked at is read again."""
+REREAD_AFTER_ERROR = 1.0
+WAS_OFF = 3.0
+"""Seconds of silence after which a drive that answers again was switched off, not disturbed."""
+
+
+@dataclass(slots=True)
+class WatchedValues:
+    """What a drive holds, read as long as somebody looks."""
+
+    session: DriveSession
+    state: Callable[[], StateKind | None]
+    """The kind of the drive's state as it is watched; None while it is not known."""
+    was_reset: Callable[[], None]
+    """Called in the line's thread when the drive was reset or switched off."""
+    visible: tuple[str, ...] = ()
+    """What is looked at now."""
+    trouble: str = ""
+    """Why nothing can be read now; empty while that works."""
+    _reader: Worker | None = None
+    _silent: float | None = None
+    """Since when the drive does not answer."""
+    _starting: bool = False
+    """Whether the drive was starting up when it was last looked at."""
+    _asked: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def raws(self) -> Mapping[str, int]:
+        """Raw values as last read, by whomever."""
+        return self.session.image.raws
+
+    @property
+    def absent(self) -> dict[str, str]:
+        """Codes without a value, and what the drive or the line said instead."""
+        return {code: one.error for code, one in self.session.image.refused.items()}
+
+    @property
+    def lacking(self) -> frozenset[str]:
+        """Codes that the drive itself said it does not have."""
+        return self.session.image.lacking
+
+    @property
+    def progress(self) -> tuple[int, int]:
+        """How many readable parameters were read, and how many there are."""
+        codes = readable_codes(self.session.profile)
+        return sum(code in self.raws or code in self.absent for code in codes), len(codes)
+
+    def value(self, code: str, raw: int | None = None) -> Value | None:
+        """A parameter's value as a person reads it: the held one, or another raw value's."""
+        held = self.raws.get(code) if raw is None else raw
+        if held is None:
+            return None
+        return shown(
+            self.session.profile, self.session.profile[code], held, self.raws, self.lacking
+        )
+
+    def start(self) -> None:
+        """Begin to read, all of it anew."""
+        self.stop()
+        self._asked = {}
+        self._reader = self.session.line.spawn(self._read, f"editor {self.session.device}")
+
+    def stop(self) -> None:
+        """Read no more."""
+        if self._reader is not None:
+            self._reader.cancel()
+            self._reader = None
+
+    async def _read(self) -> None:
+        profile = self.session.profile
+        first = RetryingReader(self.session)
+        later = RetryingReader(self.session, Priority.BACKGROUND)
+        rest = [*sorted(scale_sources(profile)), *readable_codes(profile)]
+        parts = iter(neighbours(profile, dict.fromkeys(rest)))
+        waiting: list[tuple[str, ...]] = []
+        while True:
+            try:
+                if due := self._due():
+                    await first.ask(due)
+                    self._asked |= dict.fromkeys(due, time.monotonic())
+                elif waiting:
+                    await later.ask(waiting[0])
+                    self._asked |= dict.fromkeys(waiting.pop(0), time.monotonic())
+                elif (part := next(parts, None)) is not None:
+                    known, absent = self.raws, self.absent
+                    left = [c for c in part if c not in known and c not in absent]
+                    waiting = [tuple(group) for group in later.reader.groups(left)]
+                else:
+                    await asyncio.sleep(IDLE_POLL_INTERVAL)
+                self.trouble = ""
+                self._look_for_a_reset()
+            except LineError as error:
+                if isinstance(error, NoAnswer) and self._silent is None:
+                    self._silent = time.monotonic()
+                self.trouble = str(error)
+                await asyncio.sleep(REREAD_AFTER_ERROR)
+
+    def _look_for_a_reset(self) -> None:
+        """A drive that was silent, or starts, was switched off: everything may be another value."""
+        since, self._silent = self._silent, None
+        off = since is not None and time.monotonic() - since > WAS_OFF
+        before, self._starting = self._starting, self.state() == "starting"
+        if not off and (before or not self._starting):
+            return
+        self.was_reset()
+        self._asked = {}
+        self.session.image.forget()
+
+    def _due(self) -> list[str]:
+        """What is looked at and was not read lately."""
+        oldest = time.monotonic() - REREAD_AFTER
+        due = [code for code in self.visible if self._asked.get(code, 0.0) < oldest]
+        if not due:
+            return []
+        follows = [p.scale_by.parameter for c in due if (p := self._parameter(c)) and p.scale_by]
+        return list(dict.fromkeys((*follows, *due)))
+
+    def _parameter(self, code: str) -> Parameter | None:
+        parameter = self.session.profile.get(code)
+        return parameter if parameter is not None and parameter.access != "w" else None
