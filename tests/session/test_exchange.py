@@ -281,7 +281,7 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
             await asyncio.sleep(0.02)
         commander = Commander(here.session, here.journal)
         here.permit()
-        block_editor.propose(plan_of(here, "read", EXAMPLE_IN))
+        block_editor.proposals.propose(plan_of(here, "read", EXAMPLE_IN))
         block_editor.write()
         commander.order("forward")
         assert here.session.work.busy_for(commander)
@@ -296,7 +296,7 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
         assert {word for register, word in here.writes() if register == 8501} <= {7}
         assert here.drive.raw("NMA8") != 7121
         # what was proposed stays, against what the drive holds now
-        assert block_editor.changes(plan_of(here, "read", []).block)
+        assert block_editor.proposals.changes(plan_of(here, "read", []).block)
         block_editor.write()
         assert "no longer armed" in await settled(block_editor)
         assert here.drive.raw("NMA8") != here.profile["LFT"].address
@@ -329,7 +329,7 @@ async def test_what_a_stop_cuts_short_is_said_to_stay() -> None:
     with bench("atv71") as here:
         async with at_desk(here) as block_editor:
             here.after_writes(2, lambda: here.session.work.stop("F12"))
-            block_editor.propose(plan_of(here, "read", EXAMPLE_IN))
+            block_editor.proposals.propose(plan_of(here, "read", EXAMPLE_IN))
             block_editor.write()
             assert await settled(block_editor) == "Ended by a stop. What was written stays."
             assert len(here.writes()) == 2
@@ -338,7 +338,7 @@ async def test_what_a_stop_cuts_short_is_said_to_stay() -> None:
 async def test_where_nothing_was_written_nothing_is_said_to_stay() -> None:
     with bench("atv71", run_hz=20.0) as here:
         async with at_desk(here) as block_editor:
-            block_editor.propose(plan_of(here, "read", EXAMPLE_IN))
+            block_editor.proposals.propose(plan_of(here, "read", EXAMPLE_IN))
             block_editor.write()
             assert (await settled(block_editor)).endswith("Nothing was written.")
             assert here.writes() == []
@@ -355,7 +355,7 @@ async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
                 break
             await asyncio.sleep(0.02)
         # disarmed as soon as one slot is another
-        block_editor.propose(plan_of(here, "write", ["FA50", "FA51"]))
+        block_editor.proposals.propose(plan_of(here, "write", ["FA50", "FA51"]))
         here.permit()
         disarm = here.session.arming.disarm
         here.after_writes(1, lambda: disarm("No key for a minute: no longer armed."))

@@ -82,7 +82,7 @@ def scanner() -> BlockEditor:
     block_editor = desk_on("atv71")
     session = block_editor.session
     hold(session, {"INR": 1})
-    first, second = block_editor.blocks
+    first, second = block_editor.proposals.blocks
     block_editor.views = {
         first.id: view_of(session, first, INPUTS, HELD),
         second.id: view_of(session, second, OUTPUTS, HELD),
@@ -95,17 +95,17 @@ def scanner() -> BlockEditor:
 
 
 def proposed(block_editor: BlockEditor) -> None:
-    first = block_editor.blocks[0]
-    block_editor.pick(first, 7, "LFT")
-    block_editor.move(first, 2, 1)
+    first = block_editor.proposals.blocks[0]
+    block_editor.proposals.pick(first, 7, "LFT")
+    block_editor.proposals.move(first, 2, 1)
 
 
 def wrong(block_editor: BlockEditor) -> None:
-    block_editor.pick(block_editor.blocks[1], 6, "CMD")
+    block_editor.proposals.pick(block_editor.proposals.blocks[1], 6, "CMD")
 
 
 def differs(block_editor: BlockEditor) -> None:
-    block = block_editor.blocks[0]
+    block = block_editor.proposals.blocks[0]
     view = block_editor.views[block.id]
     bad = Slot("NMA1", 3201, view.slots[0].parameter, 1480, "raw 1480", view.slots[0].direct,
                SlotMatch.DIFFERS, Force.ACTIVE)  # fmt: skip
@@ -118,7 +118,7 @@ def differs(block_editor: BlockEditor) -> None:
 def indirect() -> BlockEditor:
     block_editor = desk_on("atv21")
     session = block_editor.session
-    first, second = block_editor.blocks
+    first, second = block_editor.proposals.blocks
     view = view_of(session, first, (1, 2, 3, 4, 11), ATV21)
     active = tuple(
         Slot(s.code, s.raw, s.parameter, s.word, s.text, s.direct, s.verdict, Force.ACTIVE)

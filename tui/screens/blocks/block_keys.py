@@ -81,9 +81,7 @@ class BlockKeys(ArmingKeys):
         """Ask for a file, and save what is proposed, else today's assignment."""
         from ..dialogs.ask import Ask
 
-        plans = [
-            p for block in self.block_editor.blocks if (p := self.block_editor.proposed(block))
-        ]
+        plans = self.block_editor.proposals.assignments
         if not plans:
             self._refuse("Nothing was read yet that could be saved.")
             return
@@ -103,7 +101,7 @@ class BlockKeys(ArmingKeys):
         from tui.drive.settings.set_file import write_file
 
         block_editor, profile = self.block_editor, self.session.profile
-        plans = [plan for block in block_editor.blocks if (plan := block_editor.proposed(block))]
+        plans = block_editor.proposals.assignments
         note = f"{profile.name}, device {self.session.device}, {self.session.line_text}"
         write_file(path, dump_blocks(profile, plans, note))
         self.app.notify(f"Saved: {path}", timeout=5)
@@ -114,7 +112,7 @@ class BlockKeys(ArmingKeys):
 
         from ..dialogs.pick_file import PickFile
 
-        if not self.block_editor.blocks:
+        if not self.block_editor.proposals.blocks:
             self._refuse(no_blocks(self.session.profile))
             return
 
@@ -134,7 +132,7 @@ class BlockKeys(ArmingKeys):
         except (OSError, UnicodeDecodeError) as error:
             raise MappingError(f"{path} cannot be read: {error}.") from error
         for plan in load_blocks(text, path.name, self.session.profile).values():
-            self.block_editor.propose(plan)
+            self.block_editor.proposals.propose(plan)
 
     def action_words(self) -> None:
         """Choose the four user words."""

@@ -49,7 +49,7 @@ class BlocksScreen(BlockKeys):
 
     @property
     def _block(self) -> Block | None:
-        blocks = self.block_editor.blocks
+        blocks = self.block_editor.proposals.blocks
         return blocks[self._side % len(blocks)] if blocks else None
 
     def compose(self) -> ComposeResult:
@@ -66,7 +66,7 @@ class BlocksScreen(BlockKeys):
 
     def on_mount(self) -> None:
         """Begin to look."""
-        if not self.block_editor.blocks:
+        if not self.block_editor.proposals.blocks:
             for id in ("#second", "#detail", "#cost"):
                 self.query_one(id).display = False
         self.block_editor.start()
@@ -81,7 +81,7 @@ class BlocksScreen(BlockKeys):
         self.put("title", [self._title(width)])
         self.put("words", user_word_lines(self.block_editor, self.block_editor.words, width))
         self.put("message", self._message(width))
-        if self.block_editor.blocks:
+        if self.block_editor.proposals.blocks:
             self._show_tables(width)
         else:
             self._show_neighbours(width - 1)  # the table's margin
@@ -90,20 +90,21 @@ class BlocksScreen(BlockKeys):
         block_editor, block = self.block_editor, self._block
         assert block is not None
         each = (width - 1) // 2
-        most = max(len(b.slots) for b in block_editor.blocks)
+        most = max(len(b.slots) for b in block_editor.proposals.blocks)
         double = width >= WIDE_SLOTS and self.size.height - LINES_BESIDE_SLOTS >= 2 * most
-        for place, one in zip(("first", "second"), block_editor.blocks, strict=False):
+        for place, one in zip(("first", "second"), block_editor.proposals.blocks, strict=False):
             at = self._at if one is block else None
             self.put(place, table_lines(block_editor, one, each, at, double=double))
         detail = [rule("Slot", width), *slot_lines(block_editor, block, self._at, width)]
         self.put("detail", detail)
-        self.put("cost", cost_lines(block_editor, block, block_editor.saving(), width))
+        self.put("cost", cost_lines(block_editor, block, block_editor.proposals.saving(), width))
 
     def _show_neighbours(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
         head = rule("Neighbours of the monitoring set, one request each", width)
         room = max(3, self.size.height - len(why) - 8)
-        found = stretch_lines(self.block_editor, self.block_editor.stretches(), width, room)
+        stretches = self.block_editor.proposals.stretches()
+        found = stretch_lines(self.block_editor, stretches, width, room)
         self.put("first", [*why, Text(""), head, *found])
 
     def _title(self, width: int) -> Text:
@@ -119,7 +120,7 @@ class BlocksScreen(BlockKeys):
             text, style = told
         elif block_editor.trouble:
             text, style = block_editor.trouble, ALARM
-        elif count := sum(len(block_editor.changes(block)) for block in block_editor.blocks):
+        elif count := block_editor.proposals.count:
             text, style = f"{count} slots proposed otherwise: w writes them, u drops.", ATTENTION
         elif why := self.session.arming.why_disarmed:
             text = why
@@ -136,8 +137,8 @@ class BlocksScreen(BlockKeys):
 
     def action_other_table(self) -> None:
         """The other table."""
-        if self.block_editor.blocks:
-            self._side = (self._side + 1) % len(self.block_editor.blocks)
+        if self.block_editor.proposals.blocks:
+            self._side = (self._side + 1) % len(self.block_editor.proposals.blocks)
         self.action_move(0)
 
     # Keys that propose
@@ -153,7 +154,7 @@ class BlocksScreen(BlockKeys):
 
         def told(code: str | None) -> None:
             if code is not None:
-                self._try(lambda: self.block_editor.pick(block, place, code))
+                self._try(lambda: self.block_editor.proposals.pick(block, place, code))
 
         slot = block.slots[place]
         self.app.push_screen(PickParameter(self.session.profile, block, slot), told)
@@ -162,60 +163,60 @@ class BlocksScreen(BlockKeys):
         """Move the slot's content."""
         block, place = self._block, self._at
         if block is not None and 0 <= place + step < len(block.slots):
-            self._try(lambda: self.block_editor.move(block, place, step))
+            self._try(lambda: self.block_editor.proposals.move(block, place, step))
             self.action_move(step)
 
     def action_clear(self) -> None:
         """Propose the slot unused."""
         if (block := self._block) is not None:
-            self._try(lambda: self.block_editor.clear(block, self._at))
+            self._try(lambda: self.block_editor.proposals.clear(block, self._at))
 
     def action_factory(self) -> None:
         """Propose every slot as it left the factory."""
 
         def work() -> None:
-            for block in self.block_editor.blocks:
-                self.block_editor.factory(block)
+            for block in self.block_editor.proposals.blocks:
+                self.block_editor.proposals.factory(block)
 
         self._try(work)
 
     def action_undo(self) -> None:
         """Propose nothing."""
-        self.block_editor.drop()
+        self.block_editor.proposals.drop()
         self.look()
 
     # Keys that write
 
     def action_verify(self) -> None:
         """Compare every slot several times."""
-        if self.block_editor.blocks:
+        if self.block_editor.proposals.blocks:
             self.block_editor.verify()
         self.look()
 
     def action_write(self) -> None:
         """Say what follows, and write it."""
         block_editor = self.block_editor
-        todo = {block.id: block for block in block_editor.blocks if block_editor.changes(block)}
+        proposals = block_editor.proposals
+        todo = proposals.changed
         if not todo:
             self._refuse("Nothing is proposed: Enter picks what the slot stands for.")
             return
-        wrong = [p.text for block in todo.values() for p in refusing(block_editor.problems(block))]
-        wrong += [text for block in todo.values() if (text := block_editor.not_now(block))]
+        wrong = [p.text for block in todo for p in refusing(proposals.problems(block))]
+        wrong += [text for block in todo if (text := block_editor.not_now(block))]
         if wrong:
             self._refuse(wrong[0])
             return
         if not self._armed_or_told():
             return
 
-        count = sum(len(block_editor.changes(block)) for block in todo.values())
         yes, no = "writes, each slot read back", "writes nothing"
-        self._ask(f"Write {count} slots?", self._follows(), yes, no, block_editor.write)
+        self._ask(f"Write {proposals.count} slots?", self._follows(), yes, no, block_editor.write)
 
     def _follows(self) -> str:
         """What would be written, and what that means for others."""
         profile, lines, told = self.session.profile, [], []
-        for block in self.block_editor.blocks:
-            found = self.block_editor.changes(block)
+        for block in self.block_editor.proposals.blocks:
+            found = self.block_editor.proposals.changes(block)
             lines += [
                 f"{c.slot}: {describe(profile, block, c.old)} → {describe(profile, block, c.new)}"
                 for c in found

@@ -47,7 +47,7 @@ def table_lines(
 ) -> list[Text]:
     """The slots of one block under its heading; `at` is the place of the cursor, if it is here."""
     view = block_editor.views.get(block.id)
-    plan = block_editor.plans.get(block.id)
+    plan = block_editor.proposals.plans.get(block.id)
     through = "through the block" if block.direction == "read" else "last written"
     right = "proposed" if plan else f"{through} · direct" if width >= BOTH else ""
     lines = [rule(block.name, width, right)]
@@ -135,7 +135,7 @@ def notation_text(parameter: Parameter) -> str:
 
 def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) -> list[Text]:
     """The slot under the cursor, in four lines."""
-    view, plan = block_editor.views.get(block.id), block_editor.proposed(block)
+    view, plan = block_editor.views.get(block.id), block_editor.proposals.proposed(block)
     code = block.slots[place]
     if view is None or plan is None:
         trouble = (view.trouble if view else "") or block_editor.trouble or "reading the slots"
@@ -172,7 +172,7 @@ def _remarks(
     block_editor: BlockEditor, view: BlockView, slot: Slot, code: str, width: int
 ) -> list[Text]:
     """Verdict, force and problems of a slot, each a sentence."""
-    found = [(p.text, ALARM) for p in block_editor.problems(view.block) if p.slot == code]
+    found = [(p.text, ALARM) for p in block_editor.proposals.problems(view.block) if p.slot == code]
     if view.block.effective == "after-reset" and slot.raw:
         found.append((_force_text(slot), ALARM if slot.force is Force.PENDING else FAINT))
     elif view.block.direction == "read" and slot.verdict not in (
@@ -212,7 +212,7 @@ def cost_lines(
     else:
         text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
         text.append(f" in {saving.before.requests}", FAINT)
-        if block_editor.plans:
+        if block_editor.proposals.plans:
             text.append("  → proposed ", FAINT)
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
             text.append(f" in {saving.after.requests}", FAINT)
@@ -235,7 +235,7 @@ def cost_lines(
 
 def _output_words(block_editor: BlockEditor) -> list[int]:
     """What the outputs hold now, for the frame; 0 where that is not known."""
-    for block in block_editor.blocks:
+    for block in block_editor.proposals.blocks:
         view = block_editor.views.get(block.id)
         if block.direction == "write" and view is not None:
             held = [slot.direct.raw if slot.direct else None for slot in view.slots]
@@ -244,7 +244,10 @@ def _output_words(block_editor: BlockEditor) -> list[int]:
 
 
 def _plans(block_editor: BlockEditor) -> tuple[Assignment | None, Assignment | None]:
-    found = {block.direction: block_editor.proposed(block) for block in block_editor.blocks}
+    found = {
+        block.direction: block_editor.proposals.proposed(block)
+        for block in block_editor.proposals.blocks
+    }
     return found.get("read"), found.get("write")
 
 

@@ -1,7 +1,7 @@
-"""The blocks of one drive in an editor: watched, an assignment proposed, written, compared.
+"""The blocks of one drive in an editor: watched, compared, and the work on them.
 
 The values come in through a worker of the line's loop, as long as somebody looks. What is
-proposed belongs to the thread of the screen and is kept until it is written or dropped.
+proposed for them is in `proposals`.
 """
 
 from __future__ import annotations
@@ -14,20 +14,8 @@ from typing import Any
 
 from tui.bus.errors import LineError
 from tui.bus.line import Worker
-from tui.drive.blocks.assignment import (
-    Assignment,
-    MappingError,
-    Problem,
-    SlotChange,
-    assignment,
-    assignment_problems,
-    factory,
-    pick,
-    slot_changes,
-    slots_of,
-)
+from tui.drive.blocks.assignment import Assignment, MappingError
 from tui.drive.blocks.user_words import UserWords
-from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import Block
@@ -35,12 +23,13 @@ from tui.drive.settings.writable import AT_REST
 
 from ..drive import DriveSession
 from ..journal import Journal
-from ..monitor.monitor import Monitor, Snapshot, monitoring_codes, rates_of
+from ..monitor.monitor import Monitor, Snapshot
 from ..read.verdict import SlotMatch
 from ..work import Outcome, OutcomeKind, Permit, Task
 from .exchange import exchange
-from .mapping import BlockView, Force, Mapper, wire_timing
+from .mapping import BlockView, Force, Mapper
 from .outputs import Meant, example, meant, refuse_pending, values_text
+from .proposals import Proposals
 from .user_words import load_words, read_words, save_words
 from .write import at_rest_only, write_assignment
 
@@ -58,28 +47,20 @@ class BlockEditor:
     journal: Journal
     views: dict[str, BlockView] = field(default_factory=dict)
     """What was seen of each block when it was last compared, by its id; replaced as a whole."""
-    plans: dict[str, Assignment] = field(default_factory=dict)
-    """What is proposed, by the id of the block, where that is not today's assignment."""
+    proposals: Proposals = field(init=False)
     words: UserWords = field(default_factory=tuple)
     word_raws: list[int | None] = field(default_factory=list)
     trouble: str = ""
     """Why nothing can be read now; empty while that works."""
     mapper: Mapper = field(init=False)
-    _seen: dict[str, dict[str, int]] = field(default_factory=dict)
-    """The slots as the person saw them when a proposal was begun, by the id of the block."""
     _reader: Worker | None = None
     _verify: bool = False
-    _costs: dict[object, Saving] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        self.proposals = Proposals(self.session, lambda: self.busy)
         self.mapper = Mapper(self.session, lambda: self.monitor.reader.in_force)
         self.words = load_words(self.session)
         self.word_raws = [None] * len(self.words)
-
-    @property
-    def blocks(self) -> list[Block]:
-        """The blocks of the family, what is read first."""
-        return sorted(self.session.profile.data.blocks, key=lambda b: b.direction != "read")
 
     @property
     def busy(self) -> bool:
@@ -122,7 +103,7 @@ class BlockEditor:
 
     async def _look(self) -> None:
         verify, self._verify = self._verify, False
-        for block in self.blocks:
+        for block in self.proposals.blocks:
             look = self.mapper.verify if verify else self.mapper.look
             view = await look(block)
             self.views = {**self.views, block.id: view}
@@ -140,91 +121,6 @@ class BlockEditor:
                 leave()
 
         leave = self.monitor.listen(seen)
-
-    # Proposing
-
-    def today(self, block: Block) -> Assignment | None:
-        """What the drive holds; None while that is not known."""
-        raws = self.session.image.raws
-        return assignment(block, {slot: raws[slot] for slot in block.slots if slot in raws})
-
-    def proposed(self, block: Block) -> Assignment | None:
-        """What is proposed, else today's assignment."""
-        return self.plans.get(block.id) or self.today(block)
-
-    def propose(self, plan: Assignment) -> None:
-        """Propose an assignment; one that equals today's is no proposal. Raises MappingError."""
-        today = self.today(plan.block)
-        if today is None:
-            raise MappingError(f"{plan.block.name} could not be read yet.")
-        if self.busy:
-            raise MappingError("Something is being written; wait until that is done.")
-        if plan.raws == today.raws:
-            self.plans.pop(plan.block.id, None)
-            return
-        if plan.block.id not in self.plans:
-            self._seen[plan.block.id] = today.slots
-        self.plans[plan.block.id] = plan
-
-    def pick(self, block: Block, place: int, text: str) -> None:
-        """Propose what a person names for a slot. Raises MappingError, UnknownParameter."""
-        self.propose(pick(self.session.profile, self._base(block), place, text))
-
-    def move(self, block: Block, place: int, step: int) -> None:
-        """Propose a slot's content one place up or down. Raises MappingError."""
-        self.propose(self._base(block).moved(place, step))
-
-    def clear(self, block: Block, place: int) -> None:
-        """Propose an unused slot. Raises MappingError."""
-        self.propose(self._base(block).cleared(place))
-
-    def factory(self, block: Block) -> None:
-        """Propose what the drive left the factory with. Raises MappingError."""
-        self.propose(factory(self.session.profile, block))
-
-    def drop(self) -> None:
-        """Propose nothing any more."""
-        self.plans.clear()
-        self._seen.clear()
-
-    def _base(self, block: Block) -> Assignment:
-        plan = self.proposed(block)
-        if plan is None:
-            raise MappingError(f"{block.name} could not be read yet.")
-        return plan
-
-    def changes(self, block: Block) -> list[SlotChange]:
-        """What writing the proposal would change now."""
-        plan, today = self.plans.get(block.id), self.today(block)
-        return slot_changes(today.slots, plan) if plan and today else []
-
-    def problems(self, block: Block) -> list[Problem]:
-        """What is wrong with the proposal, or with today's assignment where there is none."""
-        plan = self.proposed(block)
-        return assignment_problems(self.session.profile, plan, self.mapper.lacking) if plan else []
-
-    # What it costs
-
-    def saving(self) -> Saving | None:
-        """The time of a fast monitoring cycle under today's slots and under the proposed ones."""
-        today = [plan for block in self.blocks if (plan := self.today(block))]
-        after = [plan for block in self.blocks if (plan := self.proposed(block))]
-        if not today:
-            return None
-        timing = wire_timing(self.session)
-        before_raws, after_raws = slots_of(today), slots_of(after)
-        key = (tuple(before_raws.items()), tuple(after_raws.items()), timing)
-        if key not in self._costs:
-            codes = rates_of(self.session.profile).fast
-            self._costs = {
-                key: saving(self.session.profile, codes, timing, before_raws, after_raws)
-            }
-        return self._costs[key]
-
-    def stretches(self) -> list[Stretch]:
-        """For families without blocks: which neighbours to read in one request."""
-        codes = monitoring_codes(self.session.profile)
-        return stretches(self.session.profile, codes, wire_timing(self.session))
 
     # User words
 
@@ -245,27 +141,28 @@ class BlockEditor:
 
     def write(self, stamp: int | None = None) -> None:
         """Write what is proposed; returns at once."""
-        plans = [self.plans[b.id] for b in self.blocks if b.id in self.plans]
+        proposals = self.proposals
+        plans = [proposals.plans[b.id] for b in proposals.blocks if b.id in proposals.plans]
 
         async def work(permit: Permit) -> str:
             texts = []
             for plan in plans:
                 if plan.block.effective == "after-reset":
                     # whatever becomes of the writing: what was written by then waits
-                    self.mapper.written |= {c.slot: c.new for c in self.changes(plan.block)}
+                    self.mapper.written |= {c.slot: c.new for c in proposals.changes(plan.block)}
                     self._wait_for_a_reset()
                 done = await write_assignment(
                     self.session,
                     self.journal,
                     plan,
                     permit=permit,
-                    expected=self._seen.get(plan.block.id),
+                    expected=proposals.seen.get(plan.block.id),
                 )
                 self.views = {
                     **self.views,
                     plan.block.id: await self.mapper.look(plan.block),
                 }
-                self.plans.pop(plan.block.id, None)
+                proposals.plans.pop(plan.block.id, None)
                 texts.append(done.text)
             return " ".join(dict.fromkeys(texts))
 
@@ -282,8 +179,8 @@ class BlockEditor:
         """
         session, outputs = self.session, self._outputs()
         refuse_pending(outputs, self.mapper.written)
-        read = next((b for b in self.blocks if b.direction == "read"), None)
-        inputs = self.today(read) if read else None
+        read = next((b for b in self.proposals.blocks if b.direction == "read"), None)
+        inputs = self.proposals.today(read) if read else None
         raws = session.image.raws
         return meant(session.profile, session.device, outputs, inputs, raws, text)
 
@@ -309,8 +206,8 @@ class BlockEditor:
         self._run(work, "Writing through the outputs", stamp)
 
     def _outputs(self) -> Assignment:
-        block = next((b for b in self.blocks if b.direction == "write"), None)
-        plan = self.today(block) if block else None
+        block = next((b for b in self.proposals.blocks if b.direction == "write"), None)
+        plan = self.proposals.today(block) if block else None
         if plan is None or not plan.length:
             raise MappingError("No output slot is in use.")
         return plan
@@ -350,10 +247,10 @@ class BlockEditor:
     async def _see_again(self) -> None:
         """After a refusal the person looks at what the drive holds now, and may write again."""
         with suppress(LineError, DriveError):
-            for id, plan in list(self.plans.items()):
+            for id, plan in list(self.proposals.plans.items()):
                 view = await self.mapper.look(plan.block)
                 self.views = {**self.views, id: view}
-                self._seen[id] = view.raws
+                self.proposals.seen[id] = view.raws
 
     def refuse(self, text: str) -> None:
         """Tell why something was not done."""

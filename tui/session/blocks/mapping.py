@@ -127,11 +127,6 @@ class Mapper:
     def __post_init__(self) -> None:
         self._asker = RetryingReader(self.session, self.priority)
 
-    @property
-    def lacking(self) -> frozenset[str]:
-        """Parameters that the drive said it does not have."""
-        return self.session.image.lacking
-
     def note_reset(self) -> None:
         """The drive may have been reset or switched off: what was written before may count now."""
         self.written = {}

@@ -1,0 +1,146 @@
+"""What is proposed for the blocks of one drive, beside what it holds; nothing is written here.
+
+It belongs to the thread of the screen and is kept until it is written or dropped.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from tui.drive.blocks.assignment import (
+    Assignment,
+    MappingError,
+    Problem,
+    SlotChange,
+    assignment,
+    assignment_problems,
+    factory,
+    pick,
+    slot_changes,
+    slots_of,
+)
+from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
+from tui.drive.profile.schema import Block
+
+from ..drive import DriveSession
+from ..monitor.monitor import monitoring_codes, rates_of
+from .mapping import wire_timing
+
+
+@dataclass(slots=True)
+class Proposals:
+    """The assignments that are proposed for a drive's blocks, and what they come to."""
+
+    session: DriveSession
+    busy: Callable[[], bool]
+    """Whether something is being written: nothing is proposed meanwhile."""
+    plans: dict[str, Assignment] = field(default_factory=dict)
+    """What is proposed, by the id of the block, where that is not today's assignment."""
+    seen: dict[str, dict[str, int]] = field(default_factory=dict)
+    """The slots as the person saw them when a proposal was begun, by the id of the block."""
+    _costs: dict[object, Saving] = field(default_factory=dict)
+
+    @property
+    def blocks(self) -> list[Block]:
+        """The blocks of the family, what is read first."""
+        return sorted(self.session.profile.data.blocks, key=lambda b: b.direction != "read")
+
+    def today(self, block: Block) -> Assignment | None:
+        """What the drive holds; None while that is not known."""
+        raws = self.session.image.raws
+        return assignment(block, {slot: raws[slot] for slot in block.slots if slot in raws})
+
+    def proposed(self, block: Block) -> Assignment | None:
+        """What is proposed, else today's assignment."""
+        return self.plans.get(block.id) or self.today(block)
+
+    @property
+    def assignments(self) -> list[Assignment]:
+        """What is proposed, else today's assignment, of every block of which that is known."""
+        return [plan for block in self.blocks if (plan := self.proposed(block))]
+
+    @property
+    def changed(self) -> list[Block]:
+        """The blocks that writing the proposals would change now."""
+        return [block for block in self.blocks if self.changes(block)]
+
+    @property
+    def count(self) -> int:
+        """How many slots writing the proposals would change now."""
+        return sum(len(self.changes(block)) for block in self.blocks)
+
+    def propose(self, plan: Assignment) -> None:
+        """Propose an assignment; one that equals today's is no proposal. Raises MappingError."""
+        today = self.today(plan.block)
+        if today is None:
+            raise MappingError(f"{plan.block.name} could not be read yet.")
+        if self.busy():
+            raise MappingError("Something is being written; wait until that is done.")
+        if plan.raws == today.raws:
+            self.plans.pop(plan.block.id, None)
+            return
+        if plan.block.id not in self.plans:
+            self.seen[plan.block.id] = today.slots
+        self.plans[plan.block.id] = plan
+
+    def pick(self, block: Block, place: int, text: str) -> None:
+        """Propose what a person names for a slot. Raises MappingError, UnknownParameter."""
+        self.propose(pick(self.session.profile, self._base(block), place, text))
+
+    def move(self, block: Block, place: int, step: int) -> None:
+        """Propose a slot's content one place up or down. Raises MappingError."""
+        self.propose(self._base(block).moved(place, step))
+
+    def clear(self, block: Block, place: int) -> None:
+        """Propose an unused slot. Raises MappingError."""
+        self.propose(self._base(block).cleared(place))
+
+    def factory(self, block: Block) -> None:
+        """Propose what the drive left the factory with. Raises MappingError."""
+        self.propose(factory(self.session.profile, block))
+
+    def drop(self) -> None:
+        """Propose nothing any more."""
+        self.plans.clear()
+        self.seen.clear()
+
+    def _base(self, block: Block) -> Assignment:
+        plan = self.proposed(block)
+        if plan is None:
+            raise MappingError(f"{block.name} could not be read yet.")
+        return plan
+
+    def changes(self, block: Block) -> list[SlotChange]:
+        """What writing the proposal would change now."""
+        plan, today = self.plans.get(block.id), self.today(block)
+        return slot_changes(today.slots, plan) if plan and today else []
+
+    def problems(self, block: Block) -> list[Problem]:
+        """What is wrong with the proposal, or with today's assignment where there is none."""
+        plan = self.proposed(block)
+        return (
+            assignment_problems(self.session.profile, plan, self.session.image.lacking)
+            if plan
+            else []
+        )
+
+    def saving(self) -> Saving | None:
+        """The time of a fast monitoring cycle under today's slots and under the proposed ones."""
+        today = [plan for block in self.blocks if (plan := self.today(block))]
+        if not today:
+            return None
+        timing = wire_timing(self.session)
+        before_raws, after_raws = slots_of(today), slots_of(self.assignments)
+        key = (tuple(before_raws.items()), tuple(after_raws.items()), timing)
+        if key not in self._costs:
+            codes = rates_of(self.session.profile).fast
+            self._costs = {
+                key: saving(self.session.profile, codes, timing, before_raws, after_raws)
+            }
+        return self._costs[key]
+
+    def stretches(self) -> list[Stretch]:
+        """For families without blocks: which neighbours to read in one request."""
+        codes = monitoring_codes(self.session.profile)
+        return stretches(self.session.profile, codes, wire_timing(self.session))
