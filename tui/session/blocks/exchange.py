@@ -7,24 +7,15 @@ slots are read before and after, and each parameter is read back.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from tui.bus.errors import LineError, RequestRefused
 from tui.bus.line import Priority
-from tui.drive.blocks.assignment import (
-    UNUSED,
-    Assignment,
-    assignment_problems,
-    describe,
-    refusing,
-    slot_target,
-)
-from tui.drive.blocks.wire_cost import reach, span
-from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
+from tui.drive.blocks.assignment import UNUSED, Assignment, slot_target
+from tui.drive.blocks.wire_cost import span
 from tui.drive.profile.schema import Parameter
-from tui.drive.settings.writable import AT_REST, is_order
 from tui.drive.shown import depends_on
-from tui.drive.values import check_raw, from_words, to_words
+from tui.drive.values import from_words, to_words
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
@@ -32,6 +23,7 @@ from ..read.retrying_reader import RetryingReader
 from ..settings.write import NotTaken, Writer
 from ..starts.keeper import record_start
 from ..work import Permit
+from .exchange_checks import ExchangeChecks
 from .write import AssignmentRefused
 
 
@@ -72,10 +64,11 @@ async def exchange(
             f"What {outputs.block.name.lower()} stands for since the last reset cannot be read,"
             " and nobody has confirmed it: nothing is written."
         )
-    work = _Exchange(
-        session, Writer(session, journal, permit), RetryingReader(session), outputs, inputs, wanted
-    )
-    work.check_named()
+    retrying = RetryingReader(session)
+    checks = ExchangeChecks(session, retrying, outputs, inputs, wanted)
+    checks.check_named()
+    writer = Writer(session, journal, permit)
+    work = _Exchange(session, writer, retrying, outputs, inputs, wanted, checks)
     return await work.carry_out(permit)
 
 
@@ -87,36 +80,16 @@ class _Exchange:
     outputs: Assignment
     inputs: Assignment | None
     wanted: Mapping[str, int]
-    places: range = field(init=False)
-    targets: list[Parameter] = field(init=False)
-    """What the places of the write stand for, in their order."""
+    checks: ExchangeChecks
 
-    def __post_init__(self) -> None:
-        profile, block = self.session.profile, self.outputs.block
-        self.places = reach(profile, self.outputs, self.wanted)
-        found = [slot_target(profile, block, self.outputs.raws[place]) for place in self.places]
-        self.targets = [parameter for parameter in found if parameter is not None]
-
-    def check_named(self) -> None:
-        """Raise AssignmentRefused for a stranger, a hole, or a slot that must not be used."""
-        profile, block = self.session.profile, self.outputs.block
-        known = {p.code for p in self.targets}
-        if foreign := [code for code in self.wanted if code not in known]:
-            raise AssignmentRefused(f"No output slot stands for {', '.join(foreign)}.")
-        if not self.wanted:
-            raise AssignmentRefused("No output was named; nothing was written.")
-        for place in self.places:
-            if slot_target(profile, block, self.outputs.raws[place]) is None:
-                stands = describe(profile, block, self.outputs.raws[place])
-                raise AssignmentRefused(
-                    f"{block.slots[place]} is {stands}: nothing is written through it."
-                )
-        if wrong := refusing(assignment_problems(profile, self.outputs)):
-            raise AssignmentRefused(" ".join(problem.text for problem in wrong))
+    @property
+    def targets(self) -> list[Parameter]:
+        """What the places of the write stand for, in their order."""
+        return self.checks.targets
 
     async def carry_out(self, permit: Permit) -> Exchanged:
-        await self._check_slots("before")
-        await self._interlocks()
+        await self.checks.check_slots("before")
+        await self.checks.check_state()
         await self._read_scales()
         held = await self._held()
         raws = {p.code: self.wanted.get(p.code, held.get(p.code)) for p in self.targets}
@@ -125,13 +98,11 @@ class _Exchange:
                 f"What {', '.join(unknown)} holds now is not known; give it a value as well."
             )
         known = {code: raw for code, raw in raws.items() if raw is not None}
-        for parameter in self.targets:
-            if parameter.code in self.wanted:
-                self._check(parameter, known[parameter.code])
+        self.checks.check_values(known)
         permit.check()
         await self._record_start(permit)
         reply, back = await self._send(known, held)
-        await self._check_slots("after")
+        await self.checks.check_slots("after")
         self._see_taken(known, held, back)
         return Exchanged(known, self._read(reply))
 
@@ -158,34 +129,6 @@ class _Exchange:
         return await self.retrying.ask_raws(
             code for code in dict.fromkeys(codes) if profile[code].access != "w"
         )
-
-    async def _interlocks(self) -> None:
-        """The interlocks of a run order where an output is an order; rest where one needs it."""
-        profile = self.session.profile
-        state = await self.retrying.ask_state()
-        stopped = [p.code for p in self.targets if p.access == "rw-stopped"]
-        if stopped and state not in AT_REST:
-            raise AssignmentRefused(
-                f"{', '.join(stopped)} are written with the motor stopped only; the drive is"
-                f" {self.retrying.headline}."
-            )
-        if not any(is_order(profile, parameter) for parameter in self.targets):
-            return
-        codes = deciding_codes(profile)
-        for chart in profile.data.charts:
-            codes += interlock_codes(chart)
-        await self.retrying.ask_raws(codes)
-        raws = self.session.image.raws
-        found = chart_in_force(profile, raws)
-        if found is None or not found.orders:
-            raise AssignmentRefused("This drive is not commanded from here.")
-        if refused := interlock(found, "forward", raws):
-            raise AssignmentRefused(refused)
-
-    def _check(self, parameter: Parameter, raw: int) -> None:
-        profile = self.session.profile
-        scale = profile.scale(parameter, self.retrying.raws, self.retrying.lacking)
-        check_raw(parameter, raw, profile.names(parameter), scale)
 
     async def _send(
         self, raws: Mapping[str, int], held: Mapping[str, int]
@@ -216,7 +159,7 @@ class _Exchange:
 
     async def _transmit(self, words: list[int]) -> tuple[int, ...]:
         session, block = self.session, self.outputs.block
-        address = block.address + self.places.start
+        address = block.address + self.checks.places.start
         read = span(self.inputs) if self.inputs is not None else None
         if read is None or session.profile.function(23) is None:
             await session.line.write(
@@ -304,28 +247,3 @@ class _Exchange:
             if raw != UNUSED and parameter is not None and word != unknown:
                 found[parameter.code] = from_words(parameter, [word])
         return found
-
-    async def _check_slots(self, when: str) -> None:
-        """Raise unless the slots stand for what the person saw; afterwards it may be too late."""
-        for plan in (self.outputs, self.inputs):
-            if plan is None:
-                continue
-            block = plan.block
-            held = await self.retrying.ask_raws(block.slots)
-            changed = [slot for slot, raw in plan.slots.items() if held.get(slot) != raw]
-            if not changed:
-                continue
-            text = f"{', '.join(changed)} of {block.name.lower()} were changed by somebody else"
-            if when == "before":
-                raise AssignmentRefused(f"{text}: nothing was written. Look at them first.")
-            if plan is self.inputs:
-                raise AssignmentRefused(
-                    f"{text}: the outputs were written, of what came back nothing is taken."
-                )
-            raise AssignmentRefused(
-                f"{text} while words were written through them: look at {self._names(held)}."
-            )
-
-    def _names(self, held: Mapping[str, int]) -> str:
-        profile, block = self.session.profile, self.outputs.block
-        return ", ".join(describe(profile, block, raw) for raw in held.values() if raw)
