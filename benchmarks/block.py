@@ -29,7 +29,9 @@ from tui.drive.profile.schema import Block
 from tui.drive.read_plan import WireTiming
 from tui.session.connect.open_line import open_line
 from tui.session.drive import DriveSession
-from tui.session.monitor.monitor import Monitor, Snapshot, rates_of
+from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.rates import rates_of
+from tui.session.monitor.snapshot import Snapshot
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
 EIGHT = ("ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT")

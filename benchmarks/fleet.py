@@ -29,7 +29,8 @@ from tui.bus.link import parse_link
 from tui.drive.profile.library import load
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.session.drive import DriveSession
-from tui.session.monitor.monitor import Monitor, monitoring_codes
+from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.rates import monitoring_codes
 from tui.simulator import LineTiming
 
 FAMILIES = ("atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca")

@@ -31,7 +31,7 @@ from benchmarks.wire import Record, WireLine, share
 from tui.drive.profile.library import load
 from tui.drive.read_plan import WireTiming, plan_reads
 from tui.drive.values import word_count
-from tui.session.monitor.monitor import monitoring_codes
+from tui.session.monitor.rates import monitoring_codes
 from tui.simulator import LineTiming
 
 FAMILIES = "atv21,atv31,atv312,atv71,powerdrive,proxidrive,varmeca"

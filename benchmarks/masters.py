@@ -28,7 +28,8 @@ from serial import PARITY_NONE
 
 from benchmarks.wire import ROOT, Record, WireLine, Worker
 from tui.drive.profile.library import load
-from tui.session.monitor.monitor import SHORTEST_PERIOD, monitoring_codes
+from tui.session.monitor.monitor import SHORTEST_PERIOD
+from tui.session.monitor.rates import monitoring_codes
 
 DEVICE = 1
 PATIENCE = 20.0

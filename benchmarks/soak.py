@@ -39,7 +39,8 @@ from tui.bus.link import parse_link
 from tui.drive.profile.library import load
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
-from tui.session.monitor.monitor import Monitor, Snapshot
+from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.reader import Reader
 from tui.session.reading import Reading
 

@@ -17,7 +17,7 @@ from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, port_of, served, si
 from tui.cli.shared.output import readings_table
 from tui.drive.profile import library
 from tui.drive.values import decode
-from tui.session.monitor.monitor import monitoring_codes
+from tui.session.monitor.rates import monitoring_codes
 from tui.session.reading import Quality, Reading
 
 from .commands import tcp_line

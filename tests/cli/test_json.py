@@ -10,7 +10,7 @@ import pytest
 
 from tests.programs import drivepanel
 from tui.drive.profile import library
-from tui.session.monitor.monitor import monitoring_codes
+from tui.session.monitor.rates import monitoring_codes
 
 from .commands import tcp_line
 

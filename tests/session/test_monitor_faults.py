@@ -14,7 +14,8 @@ from tui.bus.errors import LineLost, NoAnswer
 from tui.bus.line import LineState, LineStatus, Priority, Reply, Worker
 from tui.bus.schedule.pace import Pace
 from tui.session.drive import DriveSession
-from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor, Snapshot
+from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor
+from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.rotation import Rotation
 
 from .fakes import FakeLine, parameter, profile_of

@@ -31,7 +31,8 @@ from tui.session.connect.identify import ScanResult, identify_drive, scan
 from tui.session.connect.open_line import OpenLine, check_line, demo_line, open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
-from tui.session.monitor.monitor import Monitor, Snapshot
+from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.snapshot import Snapshot
 from tui.session.paths import recent_lines, remember_line, state_folder
 from tui.session.read.reader import Reader
 from tui.session.reading import Quality

@@ -13,7 +13,8 @@ import pytest
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.drive import DriveSession
-from tui.session.monitor.monitor import Monitor, Snapshot
+from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.snapshot import Snapshot
 from tui.session.reading import Quality
 from tui.simulator import DriveSpec, LineTiming, Simulation
 

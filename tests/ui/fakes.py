@@ -24,7 +24,9 @@ from tui.session.drive_state import drive_state
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.journal import Journal
 from tui.session.monitor.line_watch import LineWatch, Look, TimeoutWatch
-from tui.session.monitor.monitor import Monitor, Snapshot, TrendPoint
+from tui.session.monitor.monitor import Monitor
+from tui.session.monitor.snapshot import Snapshot
+from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.reading import Quality, Reading
 from tui.widgets.clock import Clock
 
@@ -112,7 +114,7 @@ class StillMonitor(Monitor):
     ) -> None:
         super().__init__(session)
         self._latest = latest
-        self._trend.extend(trend)
+        self._trend = Trend(session.profile, trend)
 
     def start(
         self,

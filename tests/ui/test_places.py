@@ -26,7 +26,7 @@ from tui.screens.monitor.state import (
 from tui.screens.monitor.trends import stacked_trends, trend_lines
 from tui.screens.monitor.view import View
 from tui.screens.monitor.words import bit_lines, word_pages
-from tui.session.monitor.monitor import TrendPoint
+from tui.session.monitor.trend import TrendPoint
 from tui.session.reading import Quality
 from tui.widgets.drawing import aligned, bar, key_line, trend
 from tui.widgets.palette import STOP_KEY

@@ -14,7 +14,8 @@ from .drive import DriveSession
 from .drive_state import DriveState
 from .journal import Journal
 from .monitor.fault_record import Recorder
-from .monitor.monitor import Monitor, Snapshot
+from .monitor.monitor import Monitor
+from .monitor.snapshot import Snapshot
 from .read.reader import Reader
 from .reading import Reading
 

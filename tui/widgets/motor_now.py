@@ -8,7 +8,7 @@ from tui.bus.line import LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 from tui.session.monitor.line_watch import GLANCE, Look
-from tui.session.monitor.monitor import STALE_CYCLES, Snapshot
+from tui.session.monitor.snapshot import STALE_CYCLES, Snapshot
 from tui.session.reading import Quality
 
 from .drive_signs import STATE_SIGNS, STATE_STYLES, age_text

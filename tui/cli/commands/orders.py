@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
     from tui.session.monitor.line_watch import TimeoutWatch
-    from tui.session.monitor.monitor import Snapshot
+    from tui.session.monitor.snapshot import Snapshot
     from tui.session.starts.keeper import StartKeeper
     from tui.session.work import Permit
 

@@ -50,7 +50,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
     from tui.session.monitor.line_watch import TimeoutWatch
-    from tui.session.monitor.monitor import Snapshot
+    from tui.session.monitor.snapshot import Snapshot
 
 TOLD_EVERY = 1.0
 """Seconds between two lines about the motor."""

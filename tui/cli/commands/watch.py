@@ -27,7 +27,7 @@ from ..shared.watch_outputs import JsonOutput, Output, csv_output, text_output
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.monitor.monitor import Snapshot
+    from tui.session.monitor.snapshot import Snapshot
 
 SNAPSHOTS_WAITING = 64
 """Snapshots kept for an output that is slower than the line; older ones are dropped."""
@@ -71,7 +71,7 @@ def watch(
     """
 
     async def work(opened: OpenLine) -> None:
-        from tui.session.monitor.monitor import monitoring_codes
+        from tui.session.monitor.rates import monitoring_codes
 
         session = await connect_drive(opened, target)
         wanted = [session.profile.find(code).code for code in codes] or None

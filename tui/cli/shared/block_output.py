@@ -60,7 +60,7 @@ def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
     """Microseconds of a fast cycle of the monitoring set, directly and with these slots."""
     from tui.drive.blocks.wire_cost import saving
     from tui.session.blocks.mapping import wire_timing
-    from tui.session.monitor.monitor import rates_of
+    from tui.session.monitor.rates import rates_of
 
     raws = {slot: raw for view in views for slot, raw in view.raws.items()}
     fast = rates_of(session.profile).fast
@@ -159,7 +159,7 @@ def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> 
     from tui.drive.blocks.assignment import no_blocks
     from tui.drive.blocks.wire_cost import stretches
     from tui.session.blocks.mapping import wire_timing
-    from tui.session.monitor.monitor import monitoring_codes
+    from tui.session.monitor.rates import monitoring_codes
 
     from .output import print_json
 

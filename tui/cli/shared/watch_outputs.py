@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from rich.live import Live
 
     from tui.session.drive import DriveSession
-    from tui.session.monitor.monitor import Snapshot
+    from tui.session.monitor.snapshot import Snapshot
     from tui.session.reading import Reading
 
 

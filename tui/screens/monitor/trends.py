@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter, Quantity
-from tui.session.monitor.monitor import STALE_CYCLES
+from tui.session.monitor.snapshot import STALE_CYCLES
 from tui.widgets.drawing import cut, rule, trend
 from tui.widgets.palette import FAINT, LINE
 

@@ -11,7 +11,9 @@ from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
 from tui.session.connect.identify import DriveIdentity
 from tui.session.monitor.line_watch import TimeoutWatch
-from tui.session.monitor.monitor import SLOW_FACTOR, STALE_CYCLES, Snapshot, TrendPoint
+from tui.session.monitor.rates import SLOW_FACTOR
+from tui.session.monitor.snapshot import STALE_CYCLES, Snapshot
+from tui.session.monitor.trend import TrendPoint
 from tui.session.reading import Reading
 from tui.widgets.drive_signs import age_text
 

@@ -23,7 +23,8 @@ from tui.drive.settings.writable import AT_REST
 
 from ..drive import DriveSession
 from ..journal import Journal
-from ..monitor.monitor import Monitor, Snapshot
+from ..monitor.monitor import Monitor
+from ..monitor.snapshot import Snapshot
 from ..read.verdict import SlotMatch
 from ..work import Outcome, OutcomeKind, Permit, Task
 from .exchange import exchange

@@ -24,7 +24,7 @@ from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
 from tui.drive.profile.schema import Block
 
 from ..drive import DriveSession
-from ..monitor.monitor import monitoring_codes, rates_of
+from ..monitor.rates import monitoring_codes, rates_of
 from .mapping import wire_timing
 
 

@@ -10,7 +10,7 @@ from tui.drive.values import check_raw
 
 from ..drive import DriveSession
 from ..drive_state import drive_state
-from ..monitor.monitor import monitoring_codes
+from ..monitor.rates import monitoring_codes
 from ..read.reader import Reader
 from ..settings.write import Writer
 

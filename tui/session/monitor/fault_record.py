@@ -17,7 +17,7 @@ from tui.drive.values import NOT_AVAILABLE
 from ..drive import DriveSession
 from ..journal import Entry, Journal
 from ..reading import Quality, Reading
-from .monitor import Snapshot
+from .snapshot import Snapshot
 
 SECONDS_KEPT = 30.0
 """Seconds before a trip that are kept."""

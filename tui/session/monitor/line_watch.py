@@ -24,7 +24,8 @@ from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.reader import Reader
 from ..reading import Reading
-from .monitor import Monitor, monitoring_codes
+from .monitor import Monitor
+from .rates import monitoring_codes
 
 log = logging.getLogger(__name__)
 

@@ -12,32 +12,24 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from tui.bus.errors import LineClosed, LineError, LineLost
-from tui.bus.line import LineState, Priority, Worker
-from tui.drive.chart import watched_codes
+from tui.bus.line import Priority, Worker
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
-from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Quantity
 
 from ..drive import DriveSession
-from ..drive_state import DriveState, drive_state
+from ..drive_state import drive_state
 from ..read.reader import Reader
 from ..read.rotation import Rotation
 from ..reading import Reading
+from .rates import SLOW_FACTOR, Rates, rates_of
+from .snapshot import STALE_CYCLES, Snapshot
+from .trend import Trend, TrendPoint
 
 log = logging.getLogger(__name__)
 
-STALE_CYCLES = 3
-"""Cycles after which a value is no longer taken for the present one."""
-STALE_LEAST = 1.5
-"""Seconds for which a snapshot counts however fast the cycles are."""
-SLOW_FACTOR = 10
-"""Cycles of the fast values to one of the slow ones."""
-TREND_SECONDS = 600.0
-TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
 SHORTEST_PERIOD = 0.05
 RESET_NEAR = frozenset({"fault", "starting", "unknown"})
 """Kinds of state in or after which a drive is reset, maybe without falling silent."""
@@ -47,58 +39,6 @@ RESTART_AFTER = 1.0
 """Seconds after which a monitor that failed by an error of its own begins anew."""
 RATE_OVER = 6
 """Cycles over which the rate is measured."""
-
-
-@dataclass(frozen=True, slots=True)
-class Snapshot:
-    """All values of one cycle, or the last ones with the error of a cycle that failed."""
-
-    cycle: int
-    time: float
-    """When it was taken, time.monotonic()."""
-    wall: float
-    """The same as time.time()."""
-    readings: Mapping[str, Reading]
-    state: DriveState
-    rate: float
-    """Cycles a second as they were; 0 while nothing answers."""
-    error: str
-    """Why this cycle brought nothing, or empty."""
-    line: LineState
-    block: str = ""
-    """The block or scanner that brought some of the values."""
-    period: float = 0.5
-    """Seconds from one cycle to the next, as they were."""
-
-    def is_stale(self, now: float) -> bool:
-        """Whether no cycle has ended for so long that nothing here is the present any more."""
-        return now - self.time > max(STALE_CYCLES * self.period, STALE_LEAST)
-
-
-@dataclass(frozen=True, slots=True)
-class Rates:
-    """Codes by how often they are read."""
-
-    fast: tuple[str, ...]
-    changing: tuple[str, ...] = ()
-    """Details of the state: read when it changes, in every cycle of a fault or an alarm, and
-    with the slow ones."""
-    slow: tuple[str, ...] = ()
-    key: tuple[str, ...] = ()
-    """Those of the fast ones that tell the state."""
-
-    @property
-    def seldom(self) -> tuple[str, ...]:
-        """What is not read in every cycle."""
-        return (*self.changing, *self.slow)
-
-
-@dataclass(frozen=True, slots=True)
-class TrendPoint:
-    """Values of TREND_QUANTITIES at a time; None where there was none to be trusted."""
-
-    time: float
-    values: tuple[float | None, ...]
 
 
 Listener = Callable[[Snapshot], None]
@@ -124,11 +64,9 @@ class Monitor:
         self._all_due = True
         self._stirs = 0
         self._learn_due = True
-        self._trend: deque[TrendPoint] = deque()
+        self._trend = Trend(session.profile)
         self._listeners: tuple[Listener, ...] = ()
         self._worker: Worker | None = None
-        trend = (session.profile.quantity(quantity) for quantity in TREND_QUANTITIES)
-        self._trend_codes = [parameter.code if parameter else None for parameter in trend]
 
     @property
     def latest(self) -> Snapshot | None:
@@ -138,7 +76,7 @@ class Monitor:
     @property
     def trend(self) -> tuple[TrendPoint, ...]:
         """The trend of the last minutes, oldest first."""
-        return tuple(self._trend)
+        return self._trend.points
 
     @property
     def running(self) -> bool:
@@ -320,34 +258,8 @@ class Monitor:
         if snapshot.state.kind in RESET_NEAR:
             self.reader.distrust()
         self._latest = snapshot
-        self._add_to_trend(snapshot)
+        self._trend.add(snapshot)
         self._hand_out(snapshot)
-
-    def _add_to_trend(self, snapshot: Snapshot) -> None:
-        """A failed cycle leaves a gap in the trend, never a repeated value."""
-        readings = snapshot.readings
-        values = tuple(
-            readings[code].number if code and code in readings and not snapshot.error else None
-            for code in self._trend_codes
-        )
-        self._trend.append(TrendPoint(snapshot.time, values))
-        while self._trend[0].time < snapshot.time - TREND_SECONDS:
-            self._trend.popleft()
-
-
-def rates_of(profile: Profile) -> Rates:
-    """How often each value of a profile's monitoring set is read."""
-    rates = {value.parameter: value.rate for value in profile.data.monitoring.values}
-    when = {chart.when.parameter for chart in profile.data.charts if chart.when}
-    changing = {profile.data.faults.parameter, *when} - {""}
-    codes = monitoring_codes(profile)
-    told = {code: rates.get(code, "on-change" if code in changing else "fast") for code in codes}
-    fast, change, slow = (
-        tuple(code for code in codes if told[code] == rate)
-        for rate in ("fast", "on-change", "slow")
-    )
-    watched = set(watched_codes(profile))
-    return Rates(fast, change, slow, tuple(code for code in fast if code in watched))
 
 
 def _span(begun: Sequence[float], period: float) -> float:
@@ -355,12 +267,3 @@ def _span(begun: Sequence[float], period: float) -> float:
     if len(begun) < 2:
         return period
     return max(period, (begun[-1] - begun[0]) / (len(begun) - 1))
-
-
-def monitoring_codes(profile: Profile) -> list[str]:
-    """Codes of a profile's monitoring set with the words that tell its state and fault."""
-    codes = [value.parameter for value in profile.data.monitoring.values]
-    codes += watched_codes(profile)
-    if profile.data.faults.parameter:
-        codes.append(profile.data.faults.parameter)
-    return list(dict.fromkeys(codes))

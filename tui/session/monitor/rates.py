@@ -1,0 +1,53 @@
+"""How often each value of a profile's monitoring set is read."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tui.drive.chart import watched_codes
+from tui.drive.profile.profile import Profile
+
+SLOW_FACTOR = 10
+"""Cycles of the fast values to one of the slow ones."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rates:
+    """Codes by how often they are read."""
+
+    fast: tuple[str, ...]
+    changing: tuple[str, ...] = ()
+    """Details of the state: read when it changes, in every cycle of a fault or an alarm, and
+    with the slow ones."""
+    slow: tuple[str, ...] = ()
+    key: tuple[str, ...] = ()
+    """Those of the fast ones that tell the state."""
+
+    @property
+    def seldom(self) -> tuple[str, ...]:
+        """What is not read in every cycle."""
+        return (*self.changing, *self.slow)
+
+
+def rates_of(profile: Profile) -> Rates:
+    """How often each value of a profile's monitoring set is read."""
+    rates = {value.parameter: value.rate for value in profile.data.monitoring.values}
+    when = {chart.when.parameter for chart in profile.data.charts if chart.when}
+    changing = {profile.data.faults.parameter, *when} - {""}
+    codes = monitoring_codes(profile)
+    told = {code: rates.get(code, "on-change" if code in changing else "fast") for code in codes}
+    fast, change, slow = (
+        tuple(code for code in codes if told[code] == rate)
+        for rate in ("fast", "on-change", "slow")
+    )
+    watched = set(watched_codes(profile))
+    return Rates(fast, change, slow, tuple(code for code in fast if code in watched))
+
+
+def monitoring_codes(profile: Profile) -> list[str]:
+    """Codes of a profile's monitoring set with the words that tell its state and fault."""
+    codes = [value.parameter for value in profile.data.monitoring.values]
+    codes += watched_codes(profile)
+    if profile.data.faults.parameter:
+        codes.append(profile.data.faults.parameter)
+    return list(dict.fromkeys(codes))

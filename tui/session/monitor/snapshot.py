@@ -1,0 +1,42 @@
+"""What one cycle of a monitor has brought."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from tui.bus.line import LineState
+
+from ..drive_state import DriveState
+from ..reading import Reading
+
+STALE_CYCLES = 3
+"""Cycles after which a value is no longer taken for the present one."""
+STALE_LEAST = 1.5
+"""Seconds for which a snapshot counts however fast the cycles are."""
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """All values of one cycle, or the last ones with the error of a cycle that failed."""
+
+    cycle: int
+    time: float
+    """When it was taken, time.monotonic()."""
+    wall: float
+    """The same as time.time()."""
+    readings: Mapping[str, Reading]
+    state: DriveState
+    rate: float
+    """Cycles a second as they were; 0 while nothing answers."""
+    error: str
+    """Why this cycle brought nothing, or empty."""
+    line: LineState
+    block: str = ""
+    """The block or scanner that brought some of the values."""
+    period: float = 0.5
+    """Seconds from one cycle to the next, as they were."""
+
+    def is_stale(self, now: float) -> bool:
+        """Whether no cycle has ended for so long that nothing here is the present any more."""
+        return now - self.time > max(STALE_CYCLES * self.period, STALE_LEAST)

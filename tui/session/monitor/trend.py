@@ -1,0 +1,48 @@
+"""The last minutes of some values, for a trend."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Quantity
+
+from .snapshot import Snapshot
+
+TREND_SECONDS = 600.0
+TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
+
+
+@dataclass(frozen=True, slots=True)
+class TrendPoint:
+    """Values of TREND_QUANTITIES at a time; None where there was none to be trusted."""
+
+    time: float
+    values: tuple[float | None, ...]
+
+
+class Trend:
+    """Keeps TREND_QUANTITIES of one drive for TREND_SECONDS."""
+
+    def __init__(self, profile: Profile, points: Iterable[TrendPoint] = ()) -> None:
+        self._points = deque(points)
+        found = (profile.quantity(quantity) for quantity in TREND_QUANTITIES)
+        self._codes = [parameter.code if parameter else None for parameter in found]
+
+    @property
+    def points(self) -> tuple[TrendPoint, ...]:
+        """The trend of the last minutes, oldest first."""
+        return tuple(self._points)
+
+    def add(self, snapshot: Snapshot) -> None:
+        """A failed cycle leaves a gap in the trend, never a repeated value."""
+        readings = snapshot.readings
+        values = tuple(
+            readings[code].number if code and code in readings and not snapshot.error else None
+            for code in self._codes
+        )
+        self._points.append(TrendPoint(snapshot.time, values))
+        while self._points[0].time < snapshot.time - TREND_SECONDS:
+            self._points.popleft()
