@@ -23,9 +23,10 @@ from tui.session.drive import DriveSession
 from tui.session.drive_state import drive_state
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.journal import Journal
-from tui.session.monitor.line_watch import LineWatch, Look, TimeoutWatch
+from tui.session.monitor.line_watch import LineWatch, Look
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
+from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.reading import Quality, Reading
 from tui.widgets.clock import Clock

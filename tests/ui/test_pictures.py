@@ -19,7 +19,7 @@ from tui.session.connect.identify import DriveIdentity
 from tui.session.console import DriveConsole
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
-from tui.session.monitor.line_watch import TimeoutWatch
+from tui.session.monitor.timeout import TimeoutWatch
 
 from . import fakes
 

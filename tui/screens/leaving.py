@@ -14,7 +14,7 @@ from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.monitor.line_watch import TimeoutWatch
+    from tui.session.monitor.timeout import TimeoutWatch
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
@@ -51,7 +51,7 @@ class Leaving(Panel):
 
     def _left_running(self, sessions: list[DriveSession]) -> str:
         """Which motors run, and what each drive does when nobody asks it any more."""
-        from tui.session.monitor.line_watch import left_alone_text
+        from tui.session.monitor.timeout import left_alone_text
 
         assert self.fleet is not None
         line_watch = self.fleet.line_watch
@@ -63,7 +63,7 @@ class Leaving(Panel):
         """Which drives act on their communication time-out once they are left, and when."""
         if self.fleet is None:
             return []
-        from tui.session.monitor.line_watch import left_alone_text, names_of
+        from tui.session.monitor.timeout import left_alone_text, names_of
 
         told = {session.device for session in but}
         line_watch = self.fleet.line_watch

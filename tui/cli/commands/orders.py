@@ -31,8 +31,8 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
-    from tui.session.monitor.line_watch import TimeoutWatch
     from tui.session.monitor.snapshot import Snapshot
+    from tui.session.monitor.timeout import TimeoutWatch
     from tui.session.starts.keeper import StartKeeper
     from tui.session.work import Permit
 

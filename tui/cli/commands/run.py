@@ -18,7 +18,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tui.bus.errors import LineError
-from tui.session.monitor.line_watch import left_alone_text
+from tui.session.monitor.timeout import left_alone_text
 from tui.session.starts.keeper import StartKeeper
 
 from ..shared.errors import DRIVE_REFUSED, REFUSED_HERE, Failure, told
@@ -49,8 +49,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
-    from tui.session.monitor.line_watch import TimeoutWatch
     from tui.session.monitor.snapshot import Snapshot
+    from tui.session.monitor.timeout import TimeoutWatch
 
 TOLD_EVERY = 1.0
 """Seconds between two lines about the motor."""

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
-    from tui.session.monitor.line_watch import TimeoutWatch
+    from tui.session.monitor.timeout import TimeoutWatch
     from tui.session.reading import Reading
 
 SHOWN_QUANTITIES: dict[Quantity, str] = {

@@ -10,7 +10,7 @@ from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.command.stop_report import Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
-from tui.session.monitor.line_watch import TOLD_SHARE
+from tui.session.monitor.timeout import TOLD_SHARE
 from tui.session.reading import Quality
 from tui.widgets.drawing import armed_text, cut, pair, rule
 from tui.widgets.drive_signs import STATE_SIGNS, STATE_STYLES, age_text

@@ -10,9 +10,9 @@ from tui.drive.profile.schema import MonitoringValue
 from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
 from tui.session.connect.identify import DriveIdentity
-from tui.session.monitor.line_watch import TimeoutWatch
 from tui.session.monitor.rates import SLOW_FACTOR
 from tui.session.monitor.snapshot import STALE_CYCLES, Snapshot
+from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import TrendPoint
 from tui.session.reading import Reading
 from tui.widgets.drive_signs import age_text

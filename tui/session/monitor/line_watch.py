@@ -10,7 +10,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
-from collections.abc import Awaitable, Callable, Mapping, Sequence
+from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 from tui.bus.errors import LineError
@@ -18,14 +18,13 @@ from tui.bus.line import Line, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Reaction
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.reader import Reader
-from ..reading import Reading
 from .monitor import Monitor
 from .rates import monitoring_codes
+from .timeout import TOLD_SHARE, TimeoutWarning, TimeoutWatch, timeout_seconds
 
 log = logging.getLogger(__name__)
 
@@ -34,26 +33,9 @@ MAY_TURN = frozenset({"running", "unknown"})
 GLANCE = 3.0
 """Seconds between two looks at a drive that no monitor watches."""
 ASKED_PER_TIMEOUT = 4.0
-TOLD_SHARE = 0.5
-"""Share of its time-out after which a drive that was not heard is told of."""
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
 SHORTEST = 0.02
-
-
-@dataclass(frozen=True, slots=True)
-class TimeoutWatch:
-    """A drive's watch over the line: seconds to its time-out, and what it does then."""
-
-    timeout: float
-    reaction: Reaction | None
-    active: bool = True
-    """False where it begins only with a first command, and none was sent from here."""
-
-    @property
-    def trips(self) -> bool:
-        """Whether the drive may end in a fault; a reaction that is not known may be one."""
-        return self.reaction is None or self.reaction.trips
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,21 +47,6 @@ class Look:
     time: float
     timeout: float | None
     """The drive's communication time-out in seconds, if it is one that runs already."""
-
-
-@dataclass(frozen=True, slots=True)
-class TimeoutWarning:
-    """A drive that was not heard for a good part of its time-out; times in seconds."""
-
-    device: int
-    profile: Profile
-    silent: float
-    watch: TimeoutWatch
-
-    @property
-    def left(self) -> float:
-        """Seconds until the drive acts; below zero it has."""
-        return self.watch.timeout - self.silent
 
 
 @dataclass(slots=True)
@@ -270,35 +237,11 @@ class LineWatch:
         codes = [code for code in (rules.timeout, rules.reaction) if code]
         codes += deciding_codes(kept.session.profile)
         readings = await kept.reader.read(codes, priority=Priority.POLL)
-        timeout = _seconds(readings[rules.timeout], rules.off)
+        timeout = timeout_seconds(readings[rules.timeout], rules.off)
         raw = readings[rules.reaction].raw if rules.reaction else None
         reaction = next((one for one in rules.reactions if one.raw == raw), None)
         kept.watch = None if timeout is None else TimeoutWatch(timeout, reaction)
         kept.learned = time.monotonic()
-
-
-def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
-    """What drives of one family do when nobody asks them any more, in a sentence."""
-    it = "it" if len(sessions) == 1 else "each"
-    if watch is None:
-        return f"{names_of(sessions)}: left alone {it} goes on: no communication time-out."
-    does = watch.reaction.does if watch.reaction else "its own reaction follows"
-    after = f"acts {watch.timeout:g} s after the last request"
-    return f"{names_of(sessions)}: left alone {it} {after}: {does.rstrip('.')}."
-
-
-def names_of(sessions: Sequence[DriveSession]) -> str:
-    """Drives of one family as a person calls them: by device, and the family."""
-    word = "Device" if len(sessions) == 1 else "Devices"
-    return f"{word} {', '.join(str(one.device) for one in sessions)}, {sessions[0].profile.name}"
-
-
-def _seconds(reading: Reading, off: int | None) -> float | None:
-    """The time-out in seconds; None where it is off or could not be read."""
-    number = reading.number
-    if reading.raw is None or reading.raw == off or not number:
-        return None
-    return number / 1000 if reading.unit == "ms" else number
 
 
 def _any_word(profile: Profile) -> int:
