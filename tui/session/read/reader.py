@@ -14,12 +14,12 @@ from tui.drive.chart import read_chart
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
-from tui.drive.shown import depends_on, shown
-from tui.drive.values import Value, from_words, percent_of, word_count
+from tui.drive.values import from_words, word_count
 
 from ..drive import DriveSession
-from ..image import Origin, Raw, RegisterImage
-from ..reading import Quality, Rating, Reading
+from ..image import Origin, Raw
+from ..reading import Reading
+from .decoding import Decoding, sources_of
 from .slots import Slots
 
 SOURCE_AGE = 5.0
@@ -76,8 +76,8 @@ class Reader:
         await self._read_sources(wanted, priority)
         raws = await self._raws(frozenset(wanted), priority)
         self._note_state(wanted)
-        known = _Known(self.session.image)
-        return {code: self._reading(self.profile[code], raws[code], known) for code in wanted}
+        decoding = Decoding(self.session)
+        return {code: decoding.reading(self.profile[code], raws[code]) for code in wanted}
 
     def _note_state(self, codes: Iterable[str]) -> None:
         """Tell the session when the motor was seen at rest."""
@@ -134,7 +134,7 @@ class Reader:
         return await self.read(codes, priority=Priority.POLL)
 
     async def _read_sources(self, codes: list[str], priority: Priority) -> None:
-        sources = {source for code in codes for source in _sources_of(self.profile[code])}
+        sources = {source for code in codes for source in sources_of(self.profile[code])}
         oldest = time.monotonic() - SOURCE_AGE if priority >= Priority.POLL else math.inf
         due = frozenset(code for code in sources - set(codes) if not self._is_known(code, oldest))
         if due:
@@ -275,40 +275,3 @@ class Reader:
     def _refusal(self, refusal: DeviceException) -> Raw:
         absent = refusal.code == self.profile.data.reading.unknown_exception
         return Raw(time.monotonic(), None, str(refusal), absent)
-
-    def _reading(self, parameter: Parameter, raw: Raw, known: _Known) -> Reading:
-        if raw.raw is None:
-            return Reading.bad(parameter, raw.time, raw.error)
-        value = self._value(parameter, raw.raw, known)
-        physical = self._physical(parameter, value, known)
-        return Reading(parameter, raw.raw, value, Quality.GOOD, raw.time, physical=physical)
-
-    def _value(self, parameter: Parameter, raw: int, known: _Known) -> Value:
-        return shown(self.profile, parameter, raw, known.raws, known.lacking)
-
-    def _physical(self, parameter: Parameter, value: Value, known: _Known) -> Value | None:
-        """A percentage in the unit of its rating: the person's, else the drive's own."""
-        if parameter.unit != "%" or value.number is None:
-            return None
-        rating = self.session.ratings.get(parameter.code)
-        own_raw = known.raws.get(parameter.rating)
-        if rating is None and own_raw is not None:
-            own = self._value(self.profile[parameter.rating], own_raw, known)
-            rating = Rating(own.number, own.unit) if own.number is not None else None
-        if rating is None:
-            return None
-        number = percent_of(value.number, rating.number)
-        return Value(value.raw, number, rating.unit, f"{number:f}")
-
-
-class _Known:
-    """What scales and units follow, at one moment."""
-
-    def __init__(self, image: RegisterImage) -> None:
-        self.raws = image.trusted
-        self.lacking = image.lacking
-
-
-def _sources_of(parameter: Parameter) -> list[str]:
-    """Parameters without which this one's value, or the rating that it is a part of, is unknown."""
-    return [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]

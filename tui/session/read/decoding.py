@@ -1,0 +1,58 @@
+"""What raw values come to for a person: value, unit, and what a percentage is of its rating."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from tui.drive.profile.schema import Parameter
+from tui.drive.shown import depends_on, shown
+from tui.drive.values import Value, percent_of
+
+from ..drive import DriveSession
+from ..image import Raw
+from ..reading import Quality, Rating, Reading
+
+
+@dataclass(slots=True)
+class Decoding:
+    """Decodes raw values by what is known of a drive at one moment."""
+
+    session: DriveSession
+    _raws: Mapping[str, int] = field(init=False)
+    """What scales and units follow."""
+    _lacking: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._raws = self.session.image.trusted
+        self._lacking = self.session.image.lacking
+
+    def reading(self, parameter: Parameter, raw: Raw) -> Reading:
+        """One parameter as a person reads it."""
+        if raw.raw is None:
+            return Reading.bad(parameter, raw.time, raw.error)
+        value = self._value(parameter, raw.raw)
+        physical = self._physical(parameter, value)
+        return Reading(parameter, raw.raw, value, Quality.GOOD, raw.time, physical=physical)
+
+    def _value(self, parameter: Parameter, raw: int) -> Value:
+        return shown(self.session.profile, parameter, raw, self._raws, self._lacking)
+
+    def _physical(self, parameter: Parameter, value: Value) -> Value | None:
+        """A percentage in the unit of its rating: the person's, else the drive's own."""
+        if parameter.unit != "%" or value.number is None:
+            return None
+        rating = self.session.ratings.get(parameter.code)
+        own_raw = self._raws.get(parameter.rating)
+        if rating is None and own_raw is not None:
+            own = self._value(self.session.profile[parameter.rating], own_raw)
+            rating = Rating(own.number, own.unit) if own.number is not None else None
+        if rating is None:
+            return None
+        number = percent_of(value.number, rating.number)
+        return Value(value.raw, number, rating.unit, f"{number:f}")
+
+
+def sources_of(parameter: Parameter) -> list[str]:
+    """Parameters without which this one's value, or the rating that it is a part of, is unknown."""
+    return [*depends_on(parameter), *([parameter.rating] if parameter.rating else [])]
