@@ -9,7 +9,6 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING, ClassVar
 
-from rich.text import Text
 from textual.driver import Driver
 from textual.events import Event, Key, Paste
 
@@ -23,7 +22,9 @@ from tui.session.paths import remember_line, state_folder
 from tui.terminal.admission import Admission
 from tui.terminal.driver import with_own_keys
 from tui.terminal.fields import takes_space
+from tui.terminal.last_words import LastWords
 from tui.terminal.lean import LeanApp
+from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
 from tui.terminal.stroke import stroke_of
 from tui.terminal.type_ahead import TypeAhead
@@ -55,7 +56,7 @@ STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 Opener = Callable[..., OpenLine]
 
 
-class DrivePanelApp(LeanApp, Places, Leaving):
+class DrivePanelApp(LeanApp, LastWords, Places, Leaving):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
@@ -161,8 +162,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
 
     def _from_keys(self, tell: Callable[..., None], *words: str) -> None:
         """Do something in the screen's loop, from the thread that reads the keys."""
-        if self._loop is not None and self._loop.is_running():
-            self._loop.call_soon_threadsafe(lambda: tell(*words))
+        soon_in_loop(self, tell, *words)
 
     def stop_stamp(self) -> object:
         """Another object after every stop; may be called in any thread."""
@@ -214,8 +214,7 @@ class DrivePanelApp(LeanApp, Places, Leaving):
         with suppress(LineClosed):
             fleet.stop(sessions, order)
         devices = [session.device for session in sessions]
-        if self._loop is not None and self._loop.is_running():
-            self._loop.call_soon_threadsafe(self._void_questions, devices)
+        soon_in_loop(self, self._void_questions, devices)
 
     def _void_questions(self, devices: list[int]) -> None:
         from .screens.dialogs.question import void_questions
@@ -334,17 +333,14 @@ class DrivePanelApp(LeanApp, Places, Leaving):
         if self._journal is not None:
             await asyncio.to_thread(self._journal.close)
 
-    def _handle_exception(self, error: Exception) -> None:
+    def last_words(self, error: Exception) -> str:
         """An error of the panel itself: all of it to the log, one line to the person."""
         log.error("the panel had to stop", exc_info=error)
-        super()._handle_exception(error)
         place = state_folder() / "drivepanel.log"
-        self._exit_renderables[:] = [
-            Text(
-                f"The panel had to stop: an error of its own ({plain(str(error), lines=True)})."
-                f" More is in {place}."
-            )
-        ]
+        return (
+            f"The panel had to stop: an error of its own ({plain(str(error), lines=True)})."
+            f" More is in {place}."
+        )
 
     async def connect(self, text: str) -> None:
         """Open a line in place of the one that is open; raises the line's errors."""

@@ -1,13 +1,14 @@
 """What tui/terminal uses of Textual that Textual does not promise; where it went, this tells.
 
 Looked at with Textual 8.2.8. Where a check fails after an update, look at the named module and at
-what Textual does now, before the versions in pyproject.toml are changed.
+what Textual does now, before the versions in pyproject.toml are changed. No other room of the
+project uses such parts.
 """
 
 from __future__ import annotations
 
+import asyncio
 import inspect
-import re
 from collections.abc import Callable
 from importlib.metadata import version
 from pathlib import Path
@@ -18,11 +19,13 @@ from packaging.requirements import Requirement
 
 import tui.terminal
 
-ROOM = Path(tui.terminal.__file__).parent
-PROJECT = ROOM.parents[1] / "pyproject.toml"
+from .private_uses import ROOM, Use, in_project, uses
 
-VERSIONS = "<9,>=8.2"
-"""The versions of Textual that were looked at."""
+FOLDER = Path(tui.terminal.__file__).parent
+PROJECT = FOLDER.parents[1] / "pyproject.toml"
+
+VERSIONS = {"textual": "<9,>=8.2"}
+"""The versions that were looked at; a private part may be another one in the next."""
 
 
 class Part(NamedTuple):
@@ -30,6 +33,9 @@ class Part(NamedTuple):
 
     name: str
     used_in: str
+    """The module of tui/terminal that rests on it."""
+    look_at: str
+    """What to read there and in Textual, when it is not what it was."""
     still: Callable[[], bool]
 
 
@@ -137,48 +143,283 @@ def _keys_go_through_the_app_first() -> bool:
     return "not event.is_forwarded" in source and "forward_target._forward_event(event)" in source
 
 
+def _updates_of_the_compositor() -> bool:
+    from rich.console import Console
+    from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
+    from textual.geometry import Region
+    from textual.strip import Strip
+
+    strip = Strip([])
+    part = LayoutUpdate([[strip]], Region(2, 3, 4, 1))
+    chops = ChopsUpdate([{0: strip}], [(0, 0, 4)], [[4]])
+    return (
+        isinstance(part, CompositorUpdate)
+        and isinstance(chops, CompositorUpdate)
+        and (part.strips, part.region) == ([[strip]], Region(2, 3, 4, 1))
+        and (chops.chops, chops.spans, chops.chop_ends) == ([{0: strip}], [(0, 0, 4)], [[4]])
+        and CompositorUpdate().render_segments(Console()) == ""
+    )
+
+
+def _updates_go_through_display() -> bool:
+    from textual.app import App
+    from textual.screen import Screen
+
+    sends = inspect.getsource(App._display)
+    asked = inspect.signature(App._display).parameters
+    return (
+        list(asked) == ["self", "screen", "renderable"]
+        and "isinstance(renderable, CompositorUpdate)" in sends
+        and "renderable.render_segments(console)" in sends
+        and "app._display(self, " in inspect.getsource(Screen)
+    )
+
+
+def _console_knows_its_colours() -> bool:
+    from rich.color import ColorSystem
+    from rich.console import Console
+
+    known: Any = Console(color_system="256")._color_system
+    none: Any = Console(color_system=None)._color_system
+    return known is ColorSystem.EIGHT_BIT and none is None
+
+
+def _loop_is_there_while_the_app_runs() -> bool:
+    from textual.app import App
+
+    async def while_it_runs() -> bool:
+        app = App[None]()
+        idle: Any = app._loop
+        async with app.run_test():
+            return idle is None and app._loop is asyncio.get_running_loop()
+
+    run = inspect.getsource(App.run) + inspect.getsource(App.run_async)
+    return asyncio.run(while_it_runs()) and "app._loop = asyncio.get_running_loop()" in run
+
+
+def _errors_are_handled_in_one_place() -> bool:
+    from textual.app import App
+    from textual.message_pump import MessagePump
+
+    taken = list(inspect.signature(App._handle_exception).parameters)
+    return taken == ["self", "error"] and (
+        "self.app._handle_exception(error)" in inspect.getsource(MessagePump)
+    )
+
+
+def _an_error_is_shown_from_a_list() -> bool:
+    from textual.app import App
+
+    shown = inspect.getsource(App._print_error_renderables)
+    first: Any = App[None]()._exit_renderables
+    return first == [] and "self.error_console.print(self._exit_renderables[0])" in shown
+
+
 PARTS = [
-    Part("textual._ansi_sequences.ANSI_SEQUENCES_KEYS", "names.py", _key_table),
-    Part("textual._keyboard_protocol.FUNCTIONAL_KEYS", "names.py", _kitty_table),
-    Part("textual.keys._character_to_key", "names.py", _character_names),
-    Part("textual._xterm_parser.XTermParser", "driver.py", _parser_of_reports),
-    Part("textual.drivers.linux_driver.LinuxDriver", "driver.py", _driver_is_chosen_by_name),
-    Part("LinuxDriver.run_input_thread", "driver.py", _driver_reads_in_a_thread),
-    Part("LinuxDriver.write", "driver.py", _driver_asks_in_writes_of_their_own),
-    Part("LinuxDriver(mouse=)", "driver.py", _driver_heeds_mouse),
-    Part("App._set_pointer_shape", "driver.py", _pointer_shape),
-    Part("Driver._app", "driver.py", _driver_knows_its_app),
-    Part("textual.events.Key.__dict__", "stroke.py", _events_carry_more),
-    Part("App.on_event", "type_ahead.py", _keys_go_through_the_app_first),
+    Part(
+        "textual._ansi_sequences.ANSI_SEQUENCES_KEYS",
+        "names.py",
+        "which sequences stand in Textual's table, and what stands for a key there",
+        _key_table,
+    ),
+    Part(
+        "textual._keyboard_protocol.FUNCTIONAL_KEYS",
+        "names.py",
+        "_modified and _typed: what the numbers of the kitty protocol are called",
+        _kitty_table,
+    ),
+    Part(
+        "textual.keys._character_to_key",
+        "names.py",
+        "of_character: how Textual names a key that types a character",
+        _character_names,
+    ),
+    Part(
+        "textual._xterm_parser.XTermParser",
+        "driver.py",
+        "_messages: what Textual makes of a terminal's reports",
+        _parser_of_reports,
+    ),
+    Part(
+        "textual.drivers.linux_driver.LinuxDriver",
+        "driver.py",
+        "with_own_keys: which driver App.get_driver_class gives; stop keys are read there",
+        _driver_is_chosen_by_name,
+    ),
+    Part(
+        "LinuxDriver.run_input_thread",
+        "driver.py",
+        "read_keys: which thread of Textual reads the keys, and how it ends",
+        _driver_reads_in_a_thread,
+    ),
+    Part(
+        "LinuxDriver.write",
+        "driver.py",
+        "QuietDriver.write: how Textual asks a terminal for reports at its start and end",
+        _driver_asks_in_writes_of_their_own,
+    ),
+    Part(
+        "LinuxDriver(mouse=)",
+        "driver.py",
+        "QuietDriver: what Textual asks of a terminal where no mouse is wanted",
+        _driver_heeds_mouse,
+    ),
+    Part(
+        "App._set_pointer_shape",
+        "driver.py",
+        "UNASKED: what Textual sends to give the mouse another shape",
+        _pointer_shape,
+    ),
+    Part(
+        "Driver._app",
+        "driver.py",
+        "read_keys and StoppingDriver: how a driver comes to the app that stops",
+        _driver_knows_its_app,
+    ),
+    Part(
+        "textual.events.Key.__dict__",
+        "stroke.py",
+        "attach: whether an event can carry what is known of its key",
+        _events_carry_more,
+    ),
+    Part(
+        "App.on_event",
+        "type_ahead.py",
+        "how App hands a key to the screen, and how it comes back from there",
+        _keys_go_through_the_app_first,
+    ),
+    Part(
+        "textual._compositor.ChopsUpdate, LayoutUpdate, CompositorUpdate",
+        "lean.py",
+        "lean: what the compositor hands over, and what App._display asks of it",
+        _updates_of_the_compositor,
+    ),
+    Part(
+        "App._display",
+        "lean.py",
+        "LeanApp: the one place through which every picture goes to the terminal",
+        _updates_go_through_display,
+    ),
+    Part(
+        "rich.console.Console._color_system",
+        "lean.py",
+        "LeanUpdate: how many colours Rich says that the terminal has",
+        _console_knows_its_colours,
+    ),
+    Part(
+        "App._loop",
+        "loop.py",
+        "soon_in_loop: where App keeps the loop that it runs in; a stop tells the screen by it",
+        _loop_is_there_while_the_app_runs,
+    ),
+    Part(
+        "App._handle_exception",
+        "last_words.py",
+        "LastWords: what an app does about an error of its own",
+        _errors_are_handled_in_one_place,
+    ),
+    Part(
+        "App._exit_renderables",
+        "last_words.py",
+        "LastWords: what App prints once the screen is left",
+        _an_error_is_shown_from_a_list,
+    ),
 ]
 
 
-def test_the_versions_of_textual_are_those_that_were_looked_at() -> None:
+@pytest.mark.parametrize("package", VERSIONS)
+def test_the_versions_are_those_that_were_looked_at(package: str) -> None:
     import tomli
 
     needed = tomli.loads(PROJECT.read_text(encoding="utf-8"))["project"]["dependencies"]
-    asked = next(one for one in map(Requirement, needed) if one.name == "textual")
-    assert str(asked.specifier) == VERSIONS, "look at every part below, then change VERSIONS"
-    assert asked.specifier.contains(version("textual"))
+    asked = next(one for one in map(Requirement, needed) if one.name == package)
+    assert str(asked.specifier) == VERSIONS[package], "look at what follows, then change VERSIONS"
+    assert asked.specifier.contains(version(package))
 
 
 @pytest.mark.parametrize("part", PARTS, ids=lambda part: part.name)
 def test_a_private_part_of_textual_is_what_it_was(part: Part) -> None:
     told = (
-        f"Textual {version('textual')}: {part.name} is not what tui/terminal/{part.used_in} needs"
+        f"Textual {version('textual')}: {part.name} is not what tui/terminal/{part.used_in}"
+        f" needs. Look at {part.look_at}."
     )
     try:
         still = part.still()
     except (ImportError, AttributeError, KeyError, TypeError, ValueError) as gone:
-        pytest.fail(f"{told}: {gone!r}")
+        pytest.fail(f"{told} {gone!r}")
     assert still, told
 
 
-def test_every_private_module_of_textual_that_is_used_is_named_here() -> None:
+def test_every_private_part_that_is_used_has_a_check_in_the_right_module() -> None:
     used = {
-        found
-        for path in ROOM.glob("*.py")
-        for found in re.findall(r"textual\.(_\w+)", path.read_text(encoding="utf-8"))
+        (path.removeprefix(f"{ROOM}/"), use.name)
+        for path, use in in_project()
+        if path.startswith(f"{ROOM}/")
     }
-    named = {found for part in PARTS for found in re.findall(r"textual\.(_\w+)", part.name)}
-    assert used == named
+    checked = {
+        (part.used_in, name)
+        for part in PARTS
+        for name in part.name.split(".")
+        if name.startswith("_") and not name.endswith("__")
+    }
+    # Textual calls it itself; what it sends is what matters here
+    assert used == checked - {("driver.py", "_set_pointer_shape")}
+
+
+def test_private_parts_of_textual_are_used_in_one_room_only() -> None:
+    outside = [
+        f"tui/{path}:{use.line}: {use.name}"
+        for path, use in in_project()
+        if not path.startswith(f"{ROOM}/")
+    ]
+    assert outside == [], "put it behind a function or a class in tui/terminal"
+
+
+PLANTED = {
+    "self.app._driver.write('x')": "_driver",
+    "event._no_default_action = True": "_no_default_action",
+    "getattr(app, '_loop')": "_loop",
+    "screen._compositor.cull_widgets": "_compositor",
+    "from textual._compositor import Compositor": "_compositor",
+    "import textual._xterm_parser": "_xterm_parser",
+    "from textual import _compositor": "_compositor",
+    "from textual.keys import _get_key_aliases": "_get_key_aliases",
+    "from textual.app import App\nApp.bell = print": "bell",
+    "from textual.app import App\nsetattr(App, 'bell', print)": "bell",
+    "class Panel(App):\n    def work(self): self._exit_renderables.clear()": "_exit_renderables",
+    "class Panel(App):\n    def _display(self): pass": "_display",
+    "class Panel(App):\n    def work(self): super()._handle_exception(0)": "_handle_exception",
+    "class Panel(App):\n    _driver = None": "_driver",
+    "class Panel(App):\n    _driver: object": "_driver",
+}
+
+
+@pytest.mark.parametrize("source", PLANTED)
+def test_a_use_of_a_private_part_is_found(source: str) -> None:
+    from textual.app import App
+
+    from .private_uses import of_textual
+
+    line = source.count("\n") + 1
+    assert uses(source, {"Panel": of_textual(App)}) == [Use(PLANTED[source], line)]
+
+
+OWN = [
+    "os._exit(1)",
+    "self._app.bell()",
+    "self.app.bell()",
+    "other._value_of_ours",
+    "class Panel(App):\n    def work(self): self._drives = self._value_of_ours",
+    "class Other:\n    def work(self): self._display()",
+    "from .lines import _row",
+    "from textual.app import App\nApp()",
+]
+
+
+@pytest.mark.parametrize("source", OWN)
+def test_a_private_name_of_ones_own_is_not_taken_for_textuals(source: str) -> None:
+    from textual.app import App
+
+    from .private_uses import of_textual
+
+    assert uses(f"import os\n{source}", {"Panel": of_textual(App)}) == []

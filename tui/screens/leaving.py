@@ -7,6 +7,8 @@ from collections.abc import Sequence
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
+from tui.terminal.loop import soon_in_loop
+
 from .app_port import Panel
 from .dialogs.confirm import Confirm
 from .dialogs.leave import Choice, Leave
@@ -107,9 +109,7 @@ class Leaving(Panel):
     def leave_now(self) -> None:
         """End the screen; may be called in any thread."""
         self.settled = True
-        loop = self._loop
-        if loop is not None and loop.is_running():
-            loop.call_soon_threadsafe(self.exit)
+        soon_in_loop(self, self.exit)
 
     def stop_motors(self) -> bool:
         """Stop every motor that runs by an order from here; True when none runs any more.

@@ -1,0 +1,17 @@
+"""The event loop of the app, for whoever calls from another thread.
+
+Textual's own `call_from_thread` waits until the loop has done it: a key that stops may not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from textual.app import App
+
+
+def soon_in_loop(app: App[None], work: Callable[..., object], *given: object) -> None:
+    """Do something in an app's loop, without waiting for it; nothing where no loop runs."""
+    loop = app._loop
+    if loop is not None and loop.is_running():
+        loop.call_soon_threadsafe(lambda: work(*given))
