@@ -24,8 +24,8 @@ from .private_uses import ROOM, Use, in_project, uses
 FOLDER = Path(tui.terminal.__file__).parent
 PROJECT = FOLDER.parents[1] / "pyproject.toml"
 
-VERSIONS = {"textual": "<9,>=8.2"}
-"""The versions that were looked at; a private part may be another one in the next."""
+VERSIONS = {"textual": "<8.3,>=8.2", "pymodbus": "<3.17,>=3.16"}
+"""The minors that were looked at; a private part may be another one in the next."""
 
 
 class Part(NamedTuple):
