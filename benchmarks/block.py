@@ -21,7 +21,8 @@ from statistics import median
 from rich.console import Console
 from rich.table import Table
 
-from tui.drive.blocks.assignment import empty, pick
+from tui.drive.blocks.assignment import empty
+from tui.drive.blocks.picking import pick
 from tui.drive.blocks.wire_cost import cost
 from tui.drive.profile.library import load
 from tui.drive.profile.profile import Profile

@@ -12,15 +12,10 @@ from hypothesis import strategies as st
 from tui.drive.errors import UnknownParameter, ValueRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
-from tui.drive.settings.edits import (
-    Edit,
-    Edits,
-    consequences,
-    cuts_line,
-    edit_problems,
-    limit_pairs,
-    ordered,
-)
+from tui.drive.settings.edits import Edit, Edits, consequences
+from tui.drive.settings.limits import edit_problems, limit_pairs
+from tui.drive.settings.writable import cuts_line
+from tui.drive.settings.write_sequence import ordered
 from tui.drive.shown import shown
 
 ATV71, ATV31, ATV312, ATV21 = (library.load(p) for p in ("atv71", "atv31", "atv312", "atv21"))

@@ -12,22 +12,19 @@ from tui.drive.blocks.assignment import (
     Assignment,
     MappingError,
     assignment,
-    assignment_problems,
-    choices,
     describe,
     empty,
     factory,
     has_blocks,
     no_blocks,
-    pick,
     place_of,
-    raw_named,
-    refusing,
     slot_changes,
     slot_target,
     steps,
 )
 from tui.drive.blocks.file import dump_blocks, load_blocks
+from tui.drive.blocks.picking import choices, pick, raw_named
+from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.blocks.user_words import UserWord, format_named, is_no_value, word_named
 from tui.drive.blocks.wire_cost import block_request, cost, microseconds, saving, stretches
 from tui.drive.errors import DriveError, UnknownParameter

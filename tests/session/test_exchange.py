@@ -12,7 +12,8 @@ from tests.blocks import block_of
 from tests.session.sets_bench import Bench, bench, state_known
 from tui.bus.errors import RequestRefused
 from tui.bus.line import Reply
-from tui.drive.blocks.assignment import Assignment, MappingError, empty, pick
+from tui.drive.blocks.assignment import Assignment, MappingError, empty
+from tui.drive.blocks.picking import pick
 from tui.drive.blocks.wire_cost import block_request, reach
 from tui.drive.errors import DriveError, ValueRefused
 from tui.session.blocks import exchange as module

@@ -14,7 +14,8 @@ from tests.blocks import block_of
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.line import Reply
-from tui.drive.blocks.assignment import Assignment, empty, factory, pick
+from tui.drive.blocks.assignment import Assignment, empty, factory
+from tui.drive.blocks.picking import pick
 from tui.drive.blocks.user_words import COUNT, UserWord
 from tui.drive.blocks.wire_cost import block_request, span
 from tui.drive.profile import library

@@ -166,7 +166,8 @@ def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
 
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.bus.errors import DeviceException
-    from tui.drive.blocks.assignment import assignment_problems, describe, refusing, slot_changes
+    from tui.drive.blocks.assignment import describe, slot_changes
+    from tui.drive.blocks.slot_rules import assignment_problems, refusing
     from tui.session.blocks.write import AssignmentRefused, write_assignment
     from tui.session.journal import Journal
     from tui.session.settings.write import NotTaken
@@ -209,7 +210,8 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
 
 async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int], list[Assignment]]:
     """What the slots hold, and the assignments that are wanted in their place."""
-    from tui.drive.blocks.assignment import MappingError, assignment, factory, pick, place_of
+    from tui.drive.blocks.assignment import MappingError, assignment, factory, place_of
+    from tui.drive.blocks.picking import pick
     from tui.session.blocks.mapping import Mapper
 
     profile = session.profile

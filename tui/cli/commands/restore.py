@@ -137,7 +137,7 @@ async def _tell(session: DriveSession, values: ParameterSet, options: Options) -
 
 def say_plan(session: DriveSession, plan: RestorePlan) -> None:
     """The plan: what is written in its order, and what is left out with its reason."""
-    from tui.drive.settings.edits import ordered
+    from tui.drive.settings.write_sequence import ordered
 
     items = {item.code: item for item in plan.of_kind("write")}
     held = {edit.code: edit.old for edit in plan.edits if edit.old is not None}

@@ -1,23 +1,19 @@
 """What the slots of an indirect block or a communication scanner stand for, and changing that.
 
-An assignment is a value: picking, moving and clearing make another one. Nothing is read or
-written here.
+An assignment is a value: moving and clearing make another one. Nothing is read or written here.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from ..errors import DriveError, UnknownParameter
-from ..profile.profile import Profile, is_verified, parse_address
+from ..errors import DriveError
+from ..profile.profile import Profile
 from ..profile.schema import Block, Parameter
-from ..values import word_count
 
 UNUSED = 0
 """The raw value of a slot that stands for nothing."""
-NONE = frozenset({"", "-", "--", "none", "off", "0", "w0", "16#0", "0x0"})
-"""How a person may write that a slot is unused."""
 
 
 class MappingError(DriveError):
@@ -65,16 +61,6 @@ class SlotChange:
     old: int | None
     """None where it could not be read."""
     new: int
-
-
-@dataclass(frozen=True, slots=True)
-class Problem:
-    """What is wrong with a slot of an assignment, as a sentence."""
-
-    slot: str
-    text: str
-    refuses: bool = True
-    """True where it must not be written so; else it is only to be known."""
 
 
 def has_blocks(profile: Profile) -> bool:
@@ -132,62 +118,6 @@ def no_blocks(profile: Profile) -> str:
     return f"{profile.name} has neither an indirect block nor a communication scanner.{instead}"
 
 
-def raw_of(profile: Profile, block: Block, parameter: Parameter) -> int:
-    """The raw value that makes a slot stand for a parameter.
-
-    Raises MappingError where the block cannot bring or take it.
-    """
-    if wrong := _against(profile, block, parameter):
-        raise MappingError(wrong)
-    if block.selects_by == "address":
-        return parameter.address
-    return next(c.raw for c in block.choices if c.parameter == parameter.code)
-
-
-def pick(profile: Profile, today: Assignment, place: int, text: str) -> Assignment:
-    """A slot standing for what a person names: a code, a number, an address, or `none`.
-
-    Raises MappingError and UnknownParameter.
-    """
-    return today.with_raw(place, raw_named(profile, today.block, text))
-
-
-def raw_named(profile: Profile, block: Block, text: str) -> int:
-    """The raw value of a slot for what a person names; raises MappingError, UnknownParameter."""
-    wanted = text.strip()
-    if wanted.casefold() in NONE:
-        return UNUSED
-    try:
-        parameter = profile.find(wanted)
-    except UnknownParameter:
-        address = parse_address(wanted)
-        if block.selects_by != "address" or address is None:
-            raise
-        raise MappingError(
-            f"{profile.name} has no parameter at {wanted} that is known here: what the drive"
-            " would copy there is not known. Type a code, or `none`."
-        ) from None
-    return raw_of(profile, block, parameter)
-
-
-def choices(profile: Profile, block: Block, search: str = "") -> list[Parameter]:
-    """The parameters that a slot of the block can stand for, those that fit a search first.
-
-    A search finds codes, numbers, addresses and names, and leaves out what holds none of its
-    words.
-    """
-    if block.selects_by == "choice":
-        offered = [profile[choice.parameter] for choice in block.choices]
-    else:
-        offered = sorted(profile.parameters, key=lambda parameter: parameter.address)
-    fitting = [p for p in offered if not _against(profile, block, p)]
-    wanted = search.casefold().split()
-    if not wanted:
-        return fitting
-    found = [p for p in fitting if all(word in _words_of(p) for word in wanted)]
-    return sorted(found, key=lambda p: not p.code.casefold().startswith(wanted[0]))
-
-
 def slot_changes(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
     """The slots that would be written, against raw values by slot as they are."""
     return [
@@ -217,118 +147,9 @@ def steps(before: Mapping[str, int], after: Assignment) -> list[SlotChange]:
     return first + sorted(rest, key=lambda change: change.new != UNUSED)
 
 
-def assignment_problems(
-    profile: Profile, plan: Assignment, unreadable: Collection[str] = ()
-) -> list[Problem]:
-    """What is wrong with an assignment, or should be known of it, in the order of the slots.
-
-    `unreadable` names parameters that this drive said it does not have.
-    """
-    found: list[Problem] = []
-    seen: dict[int, str] = {}
-    for slot, raw in plan.slots.items():
-        if raw == UNUSED:
-            continue
-        found += _of_slot(profile, plan.block, slot, raw, unreadable)
-        if raw in seen:
-            name = _name(profile, plan.block, raw)
-            found.append(
-                Problem(slot, f"{slot}: {name} stands in {seen[raw]} already.", _writes(plan))
-            )
-        seen.setdefault(raw, slot)
-    return found + _of_shape(plan)
-
-
-def refusing(found: Iterable[Problem]) -> list[Problem]:
-    """Those that keep an assignment from being written."""
-    return [problem for problem in found if problem.refuses]
-
-
-def _of_slot(
-    profile: Profile, block: Block, slot: str, raw: int, unreadable: Collection[str]
-) -> list[Problem]:
-    parameter = slot_target(profile, block, raw)
-    if parameter is None:
-        what = f"{raw} (16#{raw:04X})"
-        if block.selects_by == "choice":
-            return [Problem(slot, f"{slot}: {what} is none of its {len(block.choices)} choices.")]
-        text = f"{slot}: no parameter of {profile.name} is known at {what}."
-        return [Problem(slot, text)]
-    if wrong := _against(profile, block, parameter):
-        return [Problem(slot, f"{slot}: {wrong}")]
-    if parameter.code in unreadable:
-        return [Problem(slot, f"{slot}: this drive says that it has no {parameter.code}.")]
-    found = []
-    if not is_verified(parameter):
-        text = f"{slot}: {parameter.code} is unverified: no manual in hand confirms its address."
-        found.append(Problem(slot, text, _writes_block(block)))
-    if _writes_block(block) and parameter.access == "rw-stopped":
-        text = f"{slot}: {parameter.code} is taken by the drive with the motor stopped only."
-        found.append(Problem(slot, text, refuses=False))
-    return found
-
-
-def _of_shape(plan: Assignment) -> list[Problem]:
-    """What the shape of the requests makes of the slots in use."""
-    block, length = plan.block, plan.length
-    if not length or not block.fixed_start:
-        return []
-    found = []
-    holes = [slot for slot, raw in list(plan.slots.items())[:length] if raw == UNUSED]
-    if holes and _writes_block(block):
-        text = (
-            f"{holes[0]} is unused: the drive refuses every write to this block (exception 4)"
-            f" while {plan.block.slots[0]} stands for nothing."
-        )
-        found.append(Problem(holes[0], text))
-    elif holes:
-        text = f"{holes[0]} is unused: what stands behind it is not read through the block here."
-        found.append(Problem(holes[0], text, refuses=False))
-    if length < block.min_words:
-        done = "written" if _writes_block(block) else "read"
-        text = f"One slot alone is of no use: {block.min_words} words are {done} at least."
-        found.append(Problem(block.slots[length], text, refuses=False))
-    return found
-
-
-def _against(profile: Profile, block: Block, parameter: Parameter) -> str:
-    """Why a slot of this block cannot stand for a parameter; empty where it can."""
-    code = parameter.code
-    if block.selects_by == "choice" and code not in {c.parameter for c in block.choices}:
-        codes = ", ".join(choice.parameter for choice in block.choices)
-        return f"{code} is not in the list of {block.name.lower()}: {codes}."
-    if word_count(parameter) != 1:
-        return f"{code} takes two words; a slot carries one."
-    if parameter.address == UNUSED:
-        return f"{code} has the address 0, which stands for an unused slot."
-    if block.direction == "read" and parameter.access == "w":
-        return f"{code} can only be written; it cannot stand in {block.name.lower()}."
-    if block.direction == "write" and parameter.access == "r":
-        return f"{code} can only be read; it cannot stand in {block.name.lower()}."
-    if block.direction == "write" and parameter.forbidden:
-        return f"{code} is not written from here: {parameter.forbidden}"
-    own = {c for b in profile.data.blocks for c in (*b.slots, *b.values)}
-    if block.selects_by == "address" and code in own:
-        return f"{code} belongs to the scanner itself."
-    return ""
-
-
-def _writes(plan: Assignment) -> bool:
-    return _writes_block(plan.block)
-
-
-def _writes_block(block: Block) -> bool:
-    return block.direction == "write"
-
-
 def _name(profile: Profile, block: Block, raw: int) -> str:
     parameter = slot_target(profile, block, raw)
     return parameter.code if parameter else f"{raw} (16#{raw:04X})"
-
-
-def _words_of(parameter: Parameter) -> str:
-    spelled = (parameter.code, parameter.number, parameter.name, str(parameter.address))
-    return f"{' '.join(spelled)} 16#{parameter.address:04X}".casefold()
 
 
 def describe(profile: Profile, block: Block, raw: int | None) -> str:

@@ -12,7 +12,8 @@ import tomli
 from ..errors import DriveError
 from ..profile.profile import Profile
 from ..profile.schema import Block
-from .assignment import UNUSED, Assignment, MappingError, raw_named, slot_target
+from .assignment import UNUSED, Assignment, MappingError, slot_target
+from .picking import raw_named
 
 BLOCK_FILE_FORMAT = 1
 HEAD = "mapping"

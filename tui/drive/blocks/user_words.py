@@ -12,7 +12,8 @@ from typing import Literal, get_args
 
 from ..profile.profile import Profile, parse_address
 from ..values import NOT_AVAILABLE
-from .assignment import NONE, MappingError
+from .assignment import MappingError
+from .picking import NONE
 
 COUNT = 4
 WordFormat = Literal["hex", "signed", "unsigned"]

@@ -1,20 +1,18 @@
-"""Staged edits of one drive's settings: what was typed, what it becomes, in which order.
+"""Staged edits of one drive's settings: what was typed, and what it becomes.
 
-Everything here is pure: nothing is written. Applying them is session/applying.py.
+Everything here is pure: nothing is written. Applying them is session/settings/apply.py.
 """
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
-from decimal import Decimal
 
 from ..errors import ValueRefused
 from ..profile.profile import Profile
-from ..profile.schema import Parameter
-from ..shown import number_of, scale_sources, shown
+from ..shown import shown
 from ..values import check_raw, encode
-from .writable import CUTTING, line_setting, never_set, warning
+from .writable import never_set, warning
 
 
 @dataclass(frozen=True, slots=True)
@@ -181,44 +179,6 @@ def _encoded(
     )
 
 
-# Limits between parameters
-
-
-def limit_pairs(profile: Profile) -> list[tuple[str, str]]:
-    """Pairs of codes of which the first must never be above the second, in the same unit."""
-    pairs: dict[tuple[str, str], None] = {}
-    for parameter in profile.parameters:
-        if parameter.min_from:
-            pairs[parameter.min_from, parameter.code] = None
-        if parameter.max_from:
-            pairs[parameter.code, parameter.max_from] = None
-    return [(low, high) for low, high in pairs if profile[low].unit == profile[high].unit]
-
-
-def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, str]:
-    """By code, why an edit cannot be applied with the values after all of them."""
-    after = edits.after(raws)
-    found: dict[str, str] = {}
-    for low, high in limit_pairs(profile):
-        if low not in edits and high not in edits:
-            continue
-        least, most = (_engineering(profile, code, after) for code in (low, high))
-        if least is None or most is None or least <= most:
-            continue
-        code, other, side = (low, high, "above") if low in edits else (high, low, "below")
-        texts = [shown(profile, profile[c], after[c], after).display for c in (code, other)]
-        found[code] = (
-            f"{code} = {texts[0]} would be {side} {other} = {texts[1]}: change {other} too,"
-            " or another value."
-        )
-    return found
-
-
-def _engineering(profile: Profile, code: str, raws: Mapping[str, int]) -> Decimal | None:
-    raw = raws.get(code)
-    return None if raw is None else number_of(profile, profile[code], raw, raws)
-
-
 def consequences(
     profile: Profile, edits: Edits, raws: Mapping[str, int], absent: Collection[str] = ()
 ) -> list[str]:
@@ -240,68 +200,3 @@ def consequences(
                 f" {later.display}."
             )
     return told
-
-
-# The order of writing
-
-RESETS_OTHERS = ("cfg", "bfr", "lac")
-"""Codes, in small letters, whose writing changes other settings, in the order of writing:
-macro configuration, standard frequency of the motor, access level (Altivar 31, 312, 71)."""
-
-
-def ordered(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> list[Edit]:
-    """The edits in the order in which they are written.
-
-    First what changes other settings, then scale sources, then the rest in the profile's order
-    with each limit moved out of the way before what it limits, and the line's own settings last.
-    """
-    places = {parameter.code: place for place, parameter in enumerate(profile.parameters)}
-    sources = scale_sources(profile)
-    waiting = sorted(
-        edits, key=lambda edit: (_rank(profile, edit.code, sources), places[edit.code])
-    )
-    before = _before(profile, edits, raws)
-    done: list[Edit] = []
-    while waiting:
-        left = {edit.code for edit in waiting}
-        free = (edit for edit in waiting if not before.get(edit.code, set()) & left)
-        # a ring of limits can only come from values that contradict each other already
-        chosen = next(free, waiting[0])
-        waiting.remove(chosen)
-        done.append(chosen)
-    return done
-
-
-def _rank(profile: Profile, code: str, sources: Collection[str]) -> int:
-    folded = code.casefold()
-    if folded in RESETS_OTHERS:
-        return RESETS_OTHERS.index(folded)
-    setting = line_setting(profile, code)
-    if setting is not None:
-        late = {"address": 3, "baud": 2, "format": 2, "parity": 2, "protocol": 2}
-        return len(RESETS_OTHERS) + 2 + late.get(setting.role, 1)
-    return len(RESETS_OTHERS) + (0 if code in sources else 1)
-
-
-def _before(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, set[str]]:
-    """By code, which others must be written first."""
-    after = edits.after(raws)
-    found: dict[str, set[str]] = {}
-    for low, high in limit_pairs(profile):
-        if low not in edits or high not in edits:
-            continue
-        old_high, new_low = _engineering(profile, high, raws), _engineering(profile, low, after)
-        old_low, new_high = _engineering(profile, low, raws), _engineering(profile, high, after)
-        down = old_low is not None and new_high is not None and new_high < old_low
-        up = old_high is None or new_low is None or new_low > old_high
-        if down and not up:
-            found.setdefault(high, set()).add(low)
-        else:
-            found.setdefault(low, set()).add(high)
-    return found
-
-
-def cuts_line(profile: Profile, parameter: Parameter) -> bool:
-    """Whether writing it at once ends the conversation at the present line settings."""
-    setting = line_setting(profile, parameter.code)
-    return setting is not None and setting.role in CUTTING and parameter.effective == "at-once"

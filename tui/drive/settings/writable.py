@@ -155,6 +155,12 @@ def marks(profile: Profile, parameter: Parameter) -> tuple[str, ...]:
     return tuple(mark for mark in found if mark)
 
 
+def cuts_line(profile: Profile, parameter: Parameter) -> bool:
+    """Whether writing it at once ends the conversation at the present line settings."""
+    setting = line_setting(profile, parameter.code)
+    return setting is not None and setting.role in CUTTING and parameter.effective == "at-once"
+
+
 def waits_for_reset(profile: Profile, parameter: Parameter) -> bool:
     """Whether a written value comes into force only when the drive is reset or switched on."""
     block = slot_of(profile, parameter.code)

@@ -10,7 +10,7 @@ from textual.binding import Binding
 from textual.containers import Vertical
 from textual.widgets import Input, OptionList
 
-from tui.drive.blocks.assignment import choices
+from tui.drive.blocks.picking import choices
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
 from tui.widgets.drawing import cut

@@ -8,7 +8,8 @@ from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal
 
-from tui.drive.blocks.assignment import describe, no_blocks, refusing
+from tui.drive.blocks.assignment import describe, no_blocks
+from tui.drive.blocks.slot_rules import refusing
 from tui.drive.profile.schema import Block
 from tui.screens.blocks.view import (
     WIDE_SLOTS,

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from tui.drive.settings.edits import Edit, Edits, consequences, cuts_line, edit_problems, ordered
+from tui.drive.settings.edits import Edit, Edits, consequences
+from tui.drive.settings.limits import edit_problems
+from tui.drive.settings.writable import cuts_line
+from tui.drive.settings.write_sequence import ordered
 from tui.session.settings.editor import Editor
 
 EDITS_NAMED = 9

@@ -5,13 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from tui.drive.blocks.assignment import (
-    Assignment,
-    assignment_problems,
-    describe,
-    refusing,
-    slot_target,
-)
+from tui.drive.blocks.assignment import Assignment, describe, slot_target
+from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.blocks.wire_cost import reach
 from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
 from tui.drive.profile.schema import Parameter

@@ -11,15 +11,14 @@ from dataclasses import dataclass, field
 from tui.drive.blocks.assignment import (
     Assignment,
     MappingError,
-    Problem,
     SlotChange,
     assignment,
-    assignment_problems,
     factory,
-    pick,
     slot_changes,
     slots_of,
 )
+from tui.drive.blocks.picking import pick
+from tui.drive.blocks.slot_rules import Problem, assignment_problems
 from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
 from tui.drive.profile.schema import Block
 

@@ -10,15 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.bus.errors import DeviceException, RequestRefused
-from tui.drive.blocks.assignment import (
-    Assignment,
-    MappingError,
-    SlotChange,
-    assignment_problems,
-    describe,
-    refusing,
-    steps,
-)
+from tui.drive.blocks.assignment import Assignment, MappingError, SlotChange, describe, steps
+from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.profile.schema import Block
 from tui.drive.settings.writable import AT_REST
 

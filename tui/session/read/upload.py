@@ -10,7 +10,7 @@ import tui
 from tui.bus.line import Priority
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.parameter_set import ParameterSet, SetHead
-from tui.drive.settings.restore_plan import rating_codes
+from tui.drive.settings.rating import rating_codes
 from tui.drive.settings.writable import is_setting
 from tui.drive.shown import scale_sources
 

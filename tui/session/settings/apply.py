@@ -19,8 +19,10 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.drive.errors import DriveError
-from tui.drive.settings.edits import Edit, Edits, cuts_line, edit_problems, limit_pairs, ordered
-from tui.drive.settings.writable import option_code, waits_for_reset, write_refusal
+from tui.drive.settings.edits import Edit, Edits
+from tui.drive.settings.limits import edit_problems, limit_pairs
+from tui.drive.settings.writable import cuts_line, option_code, waits_for_reset, write_refusal
+from tui.drive.settings.write_sequence import ordered
 from tui.drive.shown import shown
 
 from ..arming import NotArmed

@@ -96,7 +96,8 @@ class Editor:
     async def plan(self) -> RestorePlan:
         """What it takes to make the drive hold the set; reads it. Raises the line's errors."""
         from tui.drive.profile import library
-        from tui.drive.settings.restore_plan import Options, plan_restore
+        from tui.drive.settings.restore_plan import Options
+        from tui.drive.settings.restore_planner import plan_restore
 
         from .restore import held_by
 

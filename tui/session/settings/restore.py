@@ -15,7 +15,8 @@ from tui.bus.errors import LineError, RequestRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.parameter_set import ParameterSet
-from tui.drive.settings.restore_plan import NO_OPTIONS, Held, Options, RestorePlan, plan_restore
+from tui.drive.settings.restore_plan import NO_OPTIONS, Held, Options, RestorePlan
+from tui.drive.settings.restore_planner import plan_restore
 from tui.drive.settings.writable import waits_for_reset
 
 from ..drive import DriveSession

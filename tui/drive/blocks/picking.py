@@ -1,0 +1,73 @@
+"""What a person names for a slot: a parameter of those that it can stand for, or none."""
+
+from __future__ import annotations
+
+from ..errors import UnknownParameter
+from ..profile.profile import Profile, parse_address
+from ..profile.schema import Block, Parameter
+from .assignment import UNUSED, Assignment, MappingError
+from .slot_rules import reason_against
+
+NONE = frozenset({"", "-", "--", "none", "off", "0", "w0", "16#0", "0x0"})
+"""How a person may write that a slot is unused."""
+
+
+def raw_of(profile: Profile, block: Block, parameter: Parameter) -> int:
+    """The raw value that makes a slot stand for a parameter.
+
+    Raises MappingError where the block cannot bring or take it.
+    """
+    if wrong := reason_against(profile, block, parameter):
+        raise MappingError(wrong)
+    if block.selects_by == "address":
+        return parameter.address
+    return next(c.raw for c in block.choices if c.parameter == parameter.code)
+
+
+def pick(profile: Profile, today: Assignment, place: int, text: str) -> Assignment:
+    """A slot standing for what a person names: a code, a number, an address, or `none`.
+
+    Raises MappingError and UnknownParameter.
+    """
+    return today.with_raw(place, raw_named(profile, today.block, text))
+
+
+def raw_named(profile: Profile, block: Block, text: str) -> int:
+    """The raw value of a slot for what a person names; raises MappingError, UnknownParameter."""
+    wanted = text.strip()
+    if wanted.casefold() in NONE:
+        return UNUSED
+    try:
+        parameter = profile.find(wanted)
+    except UnknownParameter:
+        address = parse_address(wanted)
+        if block.selects_by != "address" or address is None:
+            raise
+        raise MappingError(
+            f"{profile.name} has no parameter at {wanted} that is known here: what the drive"
+            " would copy there is not known. Type a code, or `none`."
+        ) from None
+    return raw_of(profile, block, parameter)
+
+
+def choices(profile: Profile, block: Block, search: str = "") -> list[Parameter]:
+    """The parameters that a slot of the block can stand for, those that fit a search first.
+
+    A search finds codes, numbers, addresses and names, and leaves out what holds none of its
+    words.
+    """
+    if block.selects_by == "choice":
+        offered = [profile[choice.parameter] for choice in block.choices]
+    else:
+        offered = sorted(profile.parameters, key=lambda parameter: parameter.address)
+    fitting = [p for p in offered if not reason_against(profile, block, p)]
+    wanted = search.casefold().split()
+    if not wanted:
+        return fitting
+    found = [p for p in fitting if all(word in _words_of(p) for word in wanted)]
+    return sorted(found, key=lambda p: not p.code.casefold().startswith(wanted[0]))
+
+
+def _words_of(parameter: Parameter) -> str:
+    spelled = (parameter.code, parameter.number, parameter.name, str(parameter.address))
+    return f"{' '.join(spelled)} 16#{parameter.address:04X}".casefold()

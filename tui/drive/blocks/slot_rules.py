@@ -1,0 +1,120 @@
+"""What a slot of a block or scanner may stand for, and what is wrong with an assignment."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable
+from dataclasses import dataclass
+
+from ..profile.profile import Profile, is_verified
+from ..profile.schema import Block, Parameter
+from ..values import word_count
+from .assignment import UNUSED, Assignment, describe, slot_target
+
+
+@dataclass(frozen=True, slots=True)
+class Problem:
+    """What is wrong with a slot of an assignment, as a sentence."""
+
+    slot: str
+    text: str
+    refuses: bool = True
+    """True where it must not be written so; else it is only to be known."""
+
+
+def assignment_problems(
+    profile: Profile, plan: Assignment, unreadable: Collection[str] = ()
+) -> list[Problem]:
+    """What is wrong with an assignment, or should be known of it, in the order of the slots.
+
+    `unreadable` names parameters that this drive said it does not have.
+    """
+    found: list[Problem] = []
+    seen: dict[int, str] = {}
+    for slot, raw in plan.slots.items():
+        if raw == UNUSED:
+            continue
+        found += _of_slot(profile, plan.block, slot, raw, unreadable)
+        if raw in seen:
+            name = describe(profile, plan.block, raw)
+            text = f"{slot}: {name} stands in {seen[raw]} already."
+            found.append(Problem(slot, text, _writes_block(plan.block)))
+        seen.setdefault(raw, slot)
+    return found + _of_shape(plan)
+
+
+def refusing(found: Iterable[Problem]) -> list[Problem]:
+    """Those that keep an assignment from being written."""
+    return [problem for problem in found if problem.refuses]
+
+
+def _of_slot(
+    profile: Profile, block: Block, slot: str, raw: int, unreadable: Collection[str]
+) -> list[Problem]:
+    parameter = slot_target(profile, block, raw)
+    if parameter is None:
+        what = f"{raw} (16#{raw:04X})"
+        if block.selects_by == "choice":
+            return [Problem(slot, f"{slot}: {what} is none of its {len(block.choices)} choices.")]
+        text = f"{slot}: no parameter of {profile.name} is known at {what}."
+        return [Problem(slot, text)]
+    if wrong := reason_against(profile, block, parameter):
+        return [Problem(slot, f"{slot}: {wrong}")]
+    if parameter.code in unreadable:
+        return [Problem(slot, f"{slot}: this drive says that it has no {parameter.code}.")]
+    found = []
+    if not is_verified(parameter):
+        text = f"{slot}: {parameter.code} is unverified: no manual in hand confirms its address."
+        found.append(Problem(slot, text, _writes_block(block)))
+    if _writes_block(block) and parameter.access == "rw-stopped":
+        text = f"{slot}: {parameter.code} is taken by the drive with the motor stopped only."
+        found.append(Problem(slot, text, refuses=False))
+    return found
+
+
+def _of_shape(plan: Assignment) -> list[Problem]:
+    """What the shape of the requests makes of the slots in use."""
+    block, length = plan.block, plan.length
+    if not length or not block.fixed_start:
+        return []
+    found = []
+    holes = [slot for slot, raw in list(plan.slots.items())[:length] if raw == UNUSED]
+    if holes and _writes_block(block):
+        text = (
+            f"{holes[0]} is unused: the drive refuses every write to this block (exception 4)"
+            f" while {plan.block.slots[0]} stands for nothing."
+        )
+        found.append(Problem(holes[0], text))
+    elif holes:
+        text = f"{holes[0]} is unused: what stands behind it is not read through the block here."
+        found.append(Problem(holes[0], text, refuses=False))
+    if length < block.min_words:
+        done = "written" if _writes_block(block) else "read"
+        text = f"One slot alone is of no use: {block.min_words} words are {done} at least."
+        found.append(Problem(block.slots[length], text, refuses=False))
+    return found
+
+
+def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
+    """Why a slot of this block cannot stand for a parameter; empty where it can."""
+    code = parameter.code
+    if block.selects_by == "choice" and code not in {c.parameter for c in block.choices}:
+        codes = ", ".join(choice.parameter for choice in block.choices)
+        return f"{code} is not in the list of {block.name.lower()}: {codes}."
+    if word_count(parameter) != 1:
+        return f"{code} takes two words; a slot carries one."
+    if parameter.address == UNUSED:
+        return f"{code} has the address 0, which stands for an unused slot."
+    if block.direction == "read" and parameter.access == "w":
+        return f"{code} can only be written; it cannot stand in {block.name.lower()}."
+    if block.direction == "write" and parameter.access == "r":
+        return f"{code} can only be read; it cannot stand in {block.name.lower()}."
+    if block.direction == "write" and parameter.forbidden:
+        return f"{code} is not written from here: {parameter.forbidden}"
+    own = {c for b in profile.data.blocks for c in (*b.slots, *b.values)}
+    if block.selects_by == "address" and code in own:
+        return f"{code} belongs to the scanner itself."
+    return ""
+
+
+def _writes_block(block: Block) -> bool:
+    return block.direction == "write"

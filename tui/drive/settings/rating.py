@@ -1,0 +1,49 @@
+"""Whether settings belong to one rating of drive and motor, and whether two drives are of one."""
+
+from __future__ import annotations
+
+from ..profile.profile import Profile
+from ..profile.schema import Parameter, Quantity
+from .parameter_set import ParameterSet
+from .restore_plan import Held
+
+RATED: frozenset[Quantity] = frozenset(
+    {
+        "rated_frequency",
+        "rated_voltage",
+        "rated_current",
+        "rated_speed",
+        "motor_poles",
+        "thermal_current",
+        "switching_frequency",
+    }
+)
+"""Quantities that belong to one rating of drive and motor."""
+
+
+def rating_codes(profile: Profile) -> list[str]:
+    """Codes of read-only words that tell the drive's model or rating."""
+    current = profile.quantity("drive_current")
+    own = current.code if current is not None and current.access == "r" else ""
+    return [code for code in (profile.data.identification.model_parameter, own) if code]
+
+
+def same_rating(
+    profile: Profile, held: Held, source: ParameterSet, *, across: bool = False
+) -> bool | None:
+    """Whether set and drive are of one rating; None where one of them does not tell."""
+    if across:
+        return False
+    told = source.head.identity.get("reference", "")
+    if told and held.reference:
+        return told == held.reference
+    codes = [c for c in rating_codes(profile) if c in held.raws and c in source.raws]
+    return all(held.raws[c] == source.raws[c] for c in codes) if codes else None
+
+
+def rated(parameter: Parameter) -> bool:
+    """Whether a setting belongs to one rating of drive and motor, or to one model."""
+    if parameter.quantity in RATED or parameter.unit in ("A", "kW", "HP"):
+        return True
+    told = parameter.factory_text.casefold() if parameter.factory is None else ""
+    return any(word in told for word in ("rating", "model", "mains voltage"))

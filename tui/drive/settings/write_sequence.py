@@ -1,0 +1,73 @@
+"""The order in which edits are written to a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from ..profile.profile import Profile
+from ..shown import scale_sources
+from .edits import Edit, Edits
+from .limits import limit_pairs, number_in
+from .writable import line_setting
+
+RESETS_OTHERS = ("cfg", "bfr", "lac")
+"""Codes, in small letters, whose writing changes other settings, in the order of writing:
+macro configuration, standard frequency of the motor, access level (Altivar 31, 312, 71)."""
+
+
+def ordered(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> list[Edit]:
+    """The edits in the order in which they are written.
+
+    First what changes other settings, then scale sources, then the rest in the profile's order
+    with each limit moved out of the way before what it limits, and the line's own settings last.
+    """
+    places = {parameter.code: place for place, parameter in enumerate(profile.parameters)}
+    sources = scale_sources(profile)
+    waiting = sorted(
+        edits, key=lambda edit: (_rank(profile, edit.code, sources), places[edit.code])
+    )
+    before = _before(profile, edits, raws)
+    done: list[Edit] = []
+    while waiting:
+        left = {edit.code for edit in waiting}
+        free = (edit for edit in waiting if not before.get(edit.code, set()) & left)
+        # a ring of limits can only come from values that contradict each other already
+        chosen = next(free, waiting[0])
+        waiting.remove(chosen)
+        done.append(chosen)
+    return done
+
+
+def _rank(profile: Profile, code: str, sources: Collection[str]) -> int:
+    folded = code.casefold()
+    if folded in RESETS_OTHERS:
+        return RESETS_OTHERS.index(folded)
+    setting = line_setting(profile, code)
+    if setting is not None:
+        late = {"address": 3, "baud": 2, "format": 2, "parity": 2, "protocol": 2}
+        return len(RESETS_OTHERS) + 2 + late.get(setting.role, 1)
+    return len(RESETS_OTHERS) + (0 if code in sources else 1)
+
+
+def _before(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, set[str]]:
+    """By code, which others must be written first."""
+    after = edits.after(raws)
+    found: dict[str, set[str]] = {}
+    for low, high in limit_pairs(profile):
+        if low not in edits or high not in edits:
+            continue
+        old_high, new_low = (
+            number_in(profile, high, raws),
+            number_in(profile, low, after),
+        )
+        old_low, new_high = (
+            number_in(profile, low, raws),
+            number_in(profile, high, after),
+        )
+        down = old_low is not None and new_high is not None and new_high < old_low
+        up = old_high is None or new_low is None or new_low > old_high
+        if down and not up:
+            found.setdefault(high, set()).add(low)
+        else:
+            found.setdefault(low, set()).add(high)
+    return found
