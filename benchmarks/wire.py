@@ -235,7 +235,7 @@ def serve() -> None:
             recording = Recording(RtuConversation(simulation.line, simulation.faults))
             simulation.start()
             endpoint = _plugged(recording)
-            waits = {drive.address: drive.turnaround for drive in simulation.drives}
+            waits = {drive.address: drive.station.turnaround for drive in simulation.drives}
             answer = {"path": endpoint.path, "turnarounds": waits}
         elif job["do"] == "take" and recording is not None:
             taken, recording.exchanges[:] = recording.exchanges[:], []

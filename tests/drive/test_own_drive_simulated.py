@@ -49,7 +49,7 @@ def test_a_simulated_one_keeps_its_functions_and_limits(own_file: Path) -> None:
     drive = SimulatedDrive(library.load(PUMP), DriveSpec(PUMP, ADDRESS, sets={"FREQ": 482}))
 
     def ask(function: int, first: int, second: int) -> bytes | None:
-        return drive.answer(ADDRESS, struct.pack(">BHH", function, first, second))
+        return drive.line_side.answer(ADDRESS, struct.pack(">BHH", function, first, second))
 
     assert ask(3, 101, 1) == struct.pack(">BBH", 3, 2, 482)
     assert ask(6, 200, 450) == struct.pack(">BHH", 6, 200, 450)

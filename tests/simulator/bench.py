@@ -21,7 +21,7 @@ class Bench:
 
     def ask(self, pdu: str) -> str | None:
         """A request and its reply, both PDUs in hexadecimal."""
-        reply = self.drive.answer(ADDRESS, bytes.fromhex(pdu))
+        reply = self.drive.line_side.answer(ADDRESS, bytes.fromhex(pdu))
         return None if reply is None else reply.hex().upper()
 
     def address(self, code: str) -> int:

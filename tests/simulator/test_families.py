@@ -101,7 +101,7 @@ def test_every_word_of_every_family_can_be_read(profile: str) -> None:
     run(simulated, 1)
     for parameter in simulated.profile.parameters:
         request = bytes([3]) + parameter.address.to_bytes(2, "big") + b"\0\1"
-        reply = simulated.answer(2, request)
+        reply = simulated.line_side.answer(2, request)
         assert reply is not None, parameter.code
         assert len(reply) == 4, parameter.code
 
@@ -115,10 +115,10 @@ def test_a_silent_line_stops_as_sll_says(profile: str, reaction: int, hertz: flo
     assert frequency is not None
     for address, word in ((frequency.address, 300), (8501, 6), (8501, 7), (8501, 15)):
         body = bytes([6]) + address.to_bytes(2, "big") + word.to_bytes(2, "big")
-        assert simulated.answer(2, body) == body
+        assert simulated.line_side.answer(2, body) == body
     for _ in range(8):
         run(simulated, 0.5)
-        simulated.answer(2, bytes.fromhex("030C810001"))
+        simulated.line_side.answer(2, bytes.fromhex("030C810001"))
     assert simulated.motor.frequency == pytest.approx(30)
     run(simulated, 1.6)
     assert simulated.motor.frequency == pytest.approx(hertz, abs=3)

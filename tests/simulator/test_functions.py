@@ -68,7 +68,7 @@ def test_frames_to_the_drive_are_counted_and_can_be_read_two_ways() -> None:
 
 def test_broadcasts_are_not_counted() -> None:
     bench = Bench("atv71")
-    bench.drive.obey(struct.pack(">BHH", 6, 9001, 5))
+    bench.drive.line_side.obey(struct.pack(">BHH", 6, 9001, 5))
     assert bench.ask("08000E0000") == "08000E0001"
     assert bench.word("ACC") == 5
 
@@ -77,7 +77,7 @@ def test_the_frame_counter_starts_again_after_65535_and_the_error_counter_stays(
     bench = Bench("atv71")
     counters = bench.drive.server.counters
     counters.frames = counters.checksum_errors = 0xFFFF
-    bench.drive.count_checksum_error()
+    bench.drive.line_side.count_checksum_error()
     assert bench.ask("08000E0000") == "08000E0000"
     assert bench.ask("08000C0000") == "08000CFFFF"
     assert bench.word("M1EC") == 0xFFFF
@@ -85,7 +85,7 @@ def test_the_frame_counter_starts_again_after_65535_and_the_error_counter_stays(
 
 def test_counters_are_reset_by_command_and_by_power_down() -> None:
     bench = Bench("atv71")
-    bench.drive.count_checksum_error()
+    bench.drive.line_side.count_checksum_error()
     assert bench.ask("08000A0000") == "08000A0000"
     assert bench.ask("08000C0000") == "08000C0000"
     bench.drive.power_cycle()

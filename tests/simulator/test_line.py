@@ -193,10 +193,10 @@ def test_time_passes_with_the_clock_only_while_the_line_runs() -> None:
 
 def test_the_turnaround_is_that_of_the_profile_or_of_the_drives_delay() -> None:
     on = line(DriveSpec("atv71", 2), DriveSpec("powerdrive", 3))
-    assert on.drive(2).turnaround == pytest.approx(0.005)
-    assert on.drive(3).turnaround == pytest.approx(0.010)
+    assert on.drive(2).station.turnaround == pytest.approx(0.005)
+    assert on.drive(3).station.turnaround == pytest.approx(0.010)
     asked(on, 3, write(1505, 40))
-    assert on.drive(3).turnaround == pytest.approx(0.040)
+    assert on.drive(3).station.turnaround == pytest.approx(0.040)
 
 
 def test_another_protocol_makes_an_altivar_21_deaf_after_the_next_power_up() -> None:

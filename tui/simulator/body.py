@@ -31,6 +31,32 @@ class Fallback(Enum):
 
 
 @dataclass
+class LineOrders:
+    """Which commands and references the line wrote since power-up, and in which order."""
+
+    _sequence: int = 0
+    _at: dict[str, int] = field(default_factory=dict)
+
+    def note(self, parameter: Parameter) -> None:
+        """Remember that the line wrote one."""
+        self._sequence += 1
+        self._at[parameter.code] = self._sequence
+
+    def given_at(self, parameter: Parameter | None) -> int:
+        """When the line last wrote this one, as a running number; 0: not since power-up."""
+        return self._at.get(parameter.code, 0) if parameter else 0
+
+    def forget(self) -> None:
+        """Forget them, as a power-down does."""
+        self._at.clear()
+
+    @property
+    def any_given(self) -> bool:
+        """Whether a command or a reference was written since power-up."""
+        return bool(self._at)
+
+
+@dataclass
 class Body:
     """The state of one simulated drive."""
 
@@ -39,6 +65,8 @@ class Body:
     registers: Registers
     rating: RatingPlate
     motor: MotorState = field(default_factory=MotorState)
+    powered: bool = True
+    """Whether the drive's supply is on; without it the drive is silent."""
     terminal_hz: float | None = None
     """Reference in Hz of a run order at the terminals; None: no order there."""
     fault: ActiveFault | None = None
@@ -47,9 +75,7 @@ class Body:
     """Alarm word as provoked, beside what the motor itself raises."""
     saving: float = 0.0
     """Time in s that an EEPROM save still takes; nothing can be written meanwhile."""
-    sequence: int = 0
-    _order: dict[str, int] = field(default_factory=dict)
-    """When a command or reference was last written by the line, by code."""
+    line_orders: LineOrders = field(default_factory=LineOrders)
 
     # Parameters by meaning
 
@@ -103,26 +129,6 @@ class Body:
         """Put a raw value into a word by its code, if the family has it."""
         if found := self.registers.named(code):
             self.registers.put(found, raw)
-
-    # Orders of the line
-
-    def note_order(self, parameter: Parameter) -> None:
-        """Remember that the line wrote an order."""
-        self.sequence += 1
-        self._order[parameter.code] = self.sequence
-
-    def ordered_at(self, parameter: Parameter | None) -> int:
-        """When the line last wrote this order, as a running number; 0: not since power-up."""
-        return self._order.get(parameter.code, 0) if parameter else 0
-
-    def forget_orders(self) -> None:
-        """Forget what the line ordered, as a power-down does."""
-        self._order.clear()
-
-    @property
-    def was_ordered(self) -> bool:
-        """Whether a command or a reference was written since power-up."""
-        return bool(self._order)
 
     # Ramps
 

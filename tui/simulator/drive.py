@@ -6,19 +6,16 @@ A drive may be asked and stepped from several threads; each public method holds 
 from __future__ import annotations
 
 import threading
-from collections.abc import Callable, Mapping
 from dataclasses import replace
 from random import Random
-from typing import Protocol
 
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Function, Parameter
+from tui.drive.profile.schema import Parameter
 from tui.drive.values import type_range
 
 from .body import ActiveFault, Body
 from .charts.altivar21 import EMERGENCY_FAULT, Altivar21Chart
-from .charts.drivecom import DrivecomChart
-from .charts.leroy import LeroySomerChart
+from .charts.families import CHARTS
 from .errors import SimulatorError
 from .plant.fault_history import FaultHistory, fault_raw
 from .plant.first_values import first_values
@@ -29,36 +26,15 @@ from .plant.monitoring import show_motor
 from .plant.motor import MotorDemand, MotorState, Stop, rating_of, step
 from .plant.watch import Consequence, SilenceWatch
 from .registers import Registers
-from .rules import ChartKind, traits_of
+from .rules import traits_of
 from .server.access import DriveWords
-from .server.cards import CardWords, card_word, card_words
+from .server.answering import Answering
 from .server.functions import Server, identity_of
 from .server.station import Station
 from .spec import DriveSpec, LineTiming
 
 WATCH_STARTERS = frozenset({"command_word", "command_frequency", "command_speed"})
 """Orders that start the watch where it needs one."""
-
-
-class PlayedChart(Protocol):
-    """What a family's state chart does for its drive."""
-
-    def power_up(self) -> None: ...
-    def terminal_order(self) -> None: ...
-    def written(self, parameter: Parameter, /) -> None: ...
-    def trip(self, stop: Stop, /) -> None: ...
-    def reset_fault(self) -> None: ...
-    def order(self) -> MotorDemand: ...
-    def show(self) -> None: ...
-    @property
-    def running(self) -> bool: ...
-
-
-CHARTS: Mapping[ChartKind, Callable[[Body], PlayedChart]] = {
-    "drivecom": DrivecomChart,
-    "altivar21": Altivar21Chart,
-    "leroy-somer": LeroySomerChart,
-}
 
 
 class SimulatedDrive:
@@ -77,7 +53,6 @@ class SimulatedDrive:
         self.spec = spec
         self.busy = False
         """While true, the drive refuses writes as it does when another task has hold of it."""
-        self._powered = True
         traits = traits_of(profile)
         identification = profile.data.identification
         identity = identity_of(identification, spec.name, spec.identity)
@@ -105,20 +80,13 @@ class SimulatedDrive:
             profile, traits, self.registers, blocked=self._blocked, written=self._written
         )
         self.server = Server(words, functions, traits.refusals, identification, identity)
-        self._cards: dict[str, tuple[CardWords, Server]] = {}
-        self._add_cards(functions)
+        self.line_side = Answering(
+            self._body, self.station, self.server, heard=self._watch.heard, lock=self._lock
+        )
         self._set_up(timing or LineTiming())
         self.power_on()
 
     # Setting up
-
-    def _add_cards(self, functions: Mapping[int, Function]) -> None:
-        known = {code: f for code, f in functions.items() if code in (3, 6, 16, 23)}
-        for server in self.profile.data.addresses.servers:
-            words = card_words(server.parameter, self._body.traits.refusals)
-            if words is not None:
-                own = Server(words, known, self._body.traits.refusals)
-                self._cards[server.parameter.casefold()] = (words, own)
 
     def _set_up(self, timing: LineTiming) -> None:
         self.station.settle(timing)
@@ -136,9 +104,7 @@ class SimulatedDrive:
         UnknownParameter, or SimulatorError where the value does not fit.
         """
         with self._lock:
-            card = card_word(code)
-            if card is not None and card[0] in self._cards and not self.registers.named(code):
-                self._cards[card[0]][0].words[card[1]] = raw & 0xFFFF
+            if not self.registers.named(code) and self.line_side.put_card_word(code, raw):
                 return
             parameter = self.profile.find(code)
             self.registers.settle(parameter, _typed(parameter, raw))
@@ -155,10 +121,10 @@ class SimulatedDrive:
     def power_on(self) -> None:
         """Switch the supply on: saved settings come into force, orders are forgotten."""
         with self._lock:
-            self._powered = True
             body = self._body
+            body.powered = True
             self.registers.restore()
-            body.forget_orders()
+            body.line_orders.forget()
             body.saving = 0.0
             body.fallback = None
             if body.fault is not None and not body.fault.persists:
@@ -178,7 +144,7 @@ class SimulatedDrive:
     def power_off(self) -> None:
         """Switch the supply off: the drive is silent and the motor coasts."""
         with self._lock:
-            self._powered = False
+            self._body.powered = False
 
     def power_cycle(self) -> None:
         """Switch the drive's supply off and on."""
@@ -255,7 +221,7 @@ class SimulatedDrive:
         """Let `dt` seconds pass."""
         with self._lock:
             body = self._body
-            if not self._powered:
+            if not body.powered:
                 body.motor = step(body.motor, body.rating, MotorDemand(), 0.0, 0.0, dt)
                 return
             body.saving = max(0.0, body.saving - dt)
@@ -286,7 +252,7 @@ class SimulatedDrive:
         """Bring motor and shown words up to date without letting time pass."""
         body = self._body
         order = self._chart.order()
-        mains = self._mains() if self._powered else 0.0
+        mains = self._mains() if body.powered else 0.0
         body.motor = step(body.motor, body.rating, order, self._load.torque, mains, 0.0)
         self._show()
 
@@ -304,64 +270,6 @@ class SimulatedDrive:
         """The address the drive answers at now."""
         return self.station.address
 
-    @property
-    def turnaround(self) -> float:
-        """Time from the end of a request to the start of the reply, in s."""
-        return self.station.turnaround
-
-    def hears(self, timing: LineTiming) -> bool:
-        """Whether the drive understands what is on the line."""
-        return self.station.hears(timing)
-
-    def answers_at(self, address: int) -> bool:
-        """Whether one of the drive's servers has this address and replies there."""
-        return self._powered and self._server_at(address) is not None
-
-    def _server_at(self, address: int) -> Server | None:
-        if address == 0:
-            return None
-        if address == self.address and not self.station.is_group:
-            return self.server
-        for code, (_, server) in self._cards.items():
-            if self._body.setting(code, 0) == address:
-                return server
-        return None
-
-    def is_called(self, address: int) -> bool:
-        """Whether a broadcast or group address means this drive too."""
-        return self._powered and self.station.is_called(address)
-
-    def answer(self, address: int, pdu: bytes) -> bytes | None:
-        """The reply of the server at an address; None where it stays silent."""
-        with self._lock:
-            server = self._server_at(address) if self._powered else None
-            if server is None:
-                return None
-            if server is self.server:
-                server.counters.count_frame()
-                self._watch.heard()
-                self._show_counters()
-            reply = server.answer(pdu)
-            self._show_counters()
-            return reply
-
-    def obey(self, pdu: bytes) -> None:
-        """Do what a broadcast or a call to a group says, without a word."""
-        with self._lock:
-            function = self.profile.function(pdu[0]) if pdu else None
-            if self._powered and function is not None and function.broadcast:
-                self.server.answer(pdu)
-
-    def count_checksum_error(self) -> None:
-        """A frame to this drive came with a wrong checksum."""
-        with self._lock:
-            self.server.counters.count_checksum_error()
-            self._show_counters()
-
-    def _show_counters(self) -> None:
-        self._body.show_code("M1CT", self.server.counters.frames)
-        self._body.show_code("M1EC", self.server.counters.checksum_errors)
-
     def _blocked(self, parameter: Parameter) -> bool:
         if self.busy or self._body.saving > 0:
             return True
@@ -369,7 +277,7 @@ class SimulatedDrive:
 
     def _written(self, parameter: Parameter) -> None:
         if parameter.quantity in WATCH_STARTERS:
-            self._body.note_order(parameter)
+            self._body.line_orders.note(parameter)
         self._memory.written(parameter)
         self._chart.written(parameter)
         self._refresh()

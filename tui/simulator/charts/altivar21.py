@@ -145,7 +145,9 @@ class Altivar21Chart:
     def _line_reference(self) -> float:
         body = self._body
         frequency, speed = body.parameter("command_frequency"), body.parameter("command_speed")
-        if speed is not None and body.ordered_at(speed) > body.ordered_at(frequency):
+        if speed is not None and body.line_orders.given_at(speed) > body.line_orders.given_at(
+            frequency
+        ):
             return body.engineering(speed) * self.poles / 120
         return body.engineering(frequency) if frequency is not None else 0.0
 

@@ -6,9 +6,7 @@ variables manual, control and status words.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import replace
-from enum import Enum
 
 from tui.drive.profile.schema import Parameter
 
@@ -17,47 +15,9 @@ from ..plant.motor import MotorDemand, Stop
 from ..rules import MODBUS_COMMAND, MODBUS_REFERENCE
 from .altivar_words import show_altivar_words
 from .drivecom_reference import DrivecomReference
+from .drivecom_states import TRANSITIONS, DrivecomCommand, DrivecomState, command_of
 from .drivecom_status import Appearance, extended_status_word, status_word
 from .io_profile import IoCommand, io_status, read_io_command
-
-
-class DrivecomState(Enum):
-    """States of the chart with the bits 0 to 6 of their status word, bit 4 left out."""
-
-    DISABLED = 0x40
-    READY = 0x21
-    SWITCHED_ON = 0x23
-    ENABLED = 0x27
-    QUICK_STOP = 0x07
-    REACTION = 0x0F
-    FAULT = 0x08
-
-
-class DrivecomCommand(Enum):
-    """Commands of the chart: mask and value of the command word."""
-
-    DISABLE_VOLTAGE = (0x0002, 0x0000)
-    QUICK_STOP = (0x0006, 0x0002)
-    SHUTDOWN = (0x0007, 0x0006)
-    SWITCH_ON = (0x000F, 0x0007)
-    ENABLE = (0x000F, 0x000F)
-
-
-TRANSITIONS: Mapping[tuple[DrivecomState, DrivecomCommand], DrivecomState] = {
-    (DrivecomState.DISABLED, DrivecomCommand.SHUTDOWN): DrivecomState.READY,
-    (DrivecomState.READY, DrivecomCommand.SWITCH_ON): DrivecomState.SWITCHED_ON,
-    (DrivecomState.READY, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
-    (DrivecomState.READY, DrivecomCommand.QUICK_STOP): DrivecomState.DISABLED,
-    (DrivecomState.SWITCHED_ON, DrivecomCommand.ENABLE): DrivecomState.ENABLED,
-    (DrivecomState.SWITCHED_ON, DrivecomCommand.SHUTDOWN): DrivecomState.READY,
-    (DrivecomState.SWITCHED_ON, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
-    (DrivecomState.SWITCHED_ON, DrivecomCommand.QUICK_STOP): DrivecomState.DISABLED,
-    (DrivecomState.ENABLED, DrivecomCommand.SHUTDOWN): DrivecomState.READY,
-    (DrivecomState.ENABLED, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
-    (DrivecomState.ENABLED, DrivecomCommand.QUICK_STOP): DrivecomState.QUICK_STOP,
-    (DrivecomState.QUICK_STOP, DrivecomCommand.DISABLE_VOLTAGE): DrivecomState.DISABLED,
-}
-"""Transitions that are made at once; Disable operation (16#0007) may wait for a ramp."""
 
 FAULT_RESET, HALT, STOP_STT, INJECTION, FAST = (1 << bit for bit in (7, 8, 12, 13, 14))
 CMI_SECOND_RAMP, CMI_FAST, CMI_INJECTION, CMI_LOCKED = (1 << bit for bit in (4, 10, 11, 15))
@@ -69,11 +29,6 @@ LINE, TERMINALS = 1 << 3, 1 << 0
 QSTD_LEAVES = 2
 COMMAND_BITS = 160
 """Assignment of an input to bit 0 of the command word (RSF and others); bit 1 is one more."""
-
-
-def command_of(word: int) -> DrivecomCommand | None:
-    """The command of a word; None where its bits 0 to 3 are none."""
-    return next((c for c in DrivecomCommand if word & c.value[0] == c.value[1]), None)
 
 
 class DrivecomChart:

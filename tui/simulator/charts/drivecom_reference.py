@@ -57,7 +57,7 @@ class DrivecomReference:
         """The later written of frequency and speed reference, in Hz; None if none was."""
         body = self._body
         frequency, speed = body.parameter("command_frequency"), body.parameter("command_speed")
-        at, speed_at = body.ordered_at(frequency), body.ordered_at(speed)
+        at, speed_at = body.line_orders.given_at(frequency), body.line_orders.given_at(speed)
         if speed is not None and speed_at > at:
             return body.engineering(speed) * self.poles / 120
         if frequency is None or not at:

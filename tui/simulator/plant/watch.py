@@ -90,7 +90,7 @@ class SilenceWatch:
             cmi = self._body.raw("extended_command_word")
             if cmi & NO_MONITORING:
                 return False
-        return self._spoken and (self._body.was_ordered or not self._data.needs_write)
+        return self._spoken and (self._body.line_orders.any_given or not self._data.needs_write)
 
     def step(self, dt: float) -> Consequence | None:
         """Let time pass; what has to happen if the time-out has just run out."""

@@ -70,11 +70,11 @@ class SimulatedLine:
 
     def receive(self, frame: bytes) -> PendingReply | None:
         """What comes back for what was received between two silences; None for silence."""
-        listening = [d for d in self.drives if d.hears(self.timing)]
+        listening = [d for d in self.drives if d.station.hears(self.timing)]
         if not is_sealed(frame):
             for drive in listening:
-                if len(frame) >= 4 and drive.answers_at(frame[0]):
-                    drive.count_checksum_error()
+                if len(frame) >= 4 and drive.line_side.answers_at(frame[0]):
+                    drive.line_side.count_checksum_error()
             return None
         address, pdu = frame[0], frame[1:-2]
         reply = self._ask(listening, address, pdu)
@@ -94,10 +94,10 @@ class SimulatedLine:
         self.advance(FRESH_VALUES)
         reply: PendingReply | None = None
         for drive in drives:
-            if drive.is_called(address):
-                drive.obey(pdu)
-            elif reply is None and drive.answers_at(address):
-                answer = drive.answer(address, pdu)
+            if drive.line_side.is_called(address):
+                drive.line_side.obey(pdu)
+            elif reply is None and drive.line_side.answers_at(address):
+                answer = drive.line_side.answer(address, pdu)
                 if answer is not None:
-                    reply = PendingReply(answer, drive.turnaround)
+                    reply = PendingReply(answer, drive.station.turnaround)
         return reply

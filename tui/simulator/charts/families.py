@@ -1,0 +1,36 @@
+"""Which state chart each family of drives has, and what each chart does."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Protocol
+
+from tui.drive.profile.schema import Parameter
+
+from ..body import Body
+from ..plant.motor import MotorDemand, Stop
+from ..rules import ChartKind
+from .altivar21 import Altivar21Chart
+from .drivecom import DrivecomChart
+from .leroy import LeroySomerChart
+
+
+class PlayedChart(Protocol):
+    """What a family's state chart does for its drive."""
+
+    def power_up(self) -> None: ...
+    def terminal_order(self) -> None: ...
+    def written(self, parameter: Parameter, /) -> None: ...
+    def trip(self, stop: Stop, /) -> None: ...
+    def reset_fault(self) -> None: ...
+    def order(self) -> MotorDemand: ...
+    def show(self) -> None: ...
+    @property
+    def running(self) -> bool: ...
+
+
+CHARTS: Mapping[ChartKind, Callable[[Body], PlayedChart]] = {
+    "drivecom": DrivecomChart,
+    "altivar21": Altivar21Chart,
+    "leroy-somer": LeroySomerChart,
+}
