@@ -1,0 +1,73 @@
+"""What is told of a motor that runs, as lines or as JSON."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from ..commands.orders import complain
+from ..commands.status import shown_values, values_json
+
+if TYPE_CHECKING:
+    from tui.session.drive import DriveSession
+    from tui.session.monitor.snapshot import Snapshot
+
+TOLD_EVERY = 1.0
+"""Seconds between two lines about the motor."""
+
+
+class RunTelling:
+    """Tells of one motor; `say` puts a line out."""
+
+    def __init__(self, session: DriveSession, say: Callable[[str], None], *, as_json: bool) -> None:
+        self._session = session
+        self._say = say
+        self._as_json = as_json
+        self._trouble = 0.0
+        """When the last cycle failed, time.monotonic()."""
+        self._told = 0.0
+
+    def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
+        """A line about the motor once a second; trouble on the line when it begins and ends.
+
+        `left_alone` gives what becomes of the motor where nobody asks its drive.
+        """
+        if latest.error:
+            if not self._trouble:
+                complain(f"{latest.error}\n{left_alone()} It is tried on.")
+            self._trouble = latest.time
+        elif self._trouble:
+            complain("The drive answers again.")
+            self._trouble = 0.0
+        if latest.time - self._told < TOLD_EVERY * 0.9:
+            return
+        self._told = latest.time
+        self.tell("state", self._state_line(latest), latest)
+
+    def _state_line(self, latest: Snapshot) -> str:
+        if latest.error:
+            return f"no answer: {latest.error}"
+        values = shown_values(self._session.profile, latest.readings)
+        return "  ".join([latest.state.headline, *(f"{k} {v}" for k, v in values.items())])
+
+    def tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
+        """One line, or one JSON object a line, about an event."""
+        from ..shared.output import iso_time, json_text
+
+        now = time.time()
+        if not self._as_json:
+            self._say(f"{time.strftime('%H:%M:%S', time.localtime(now))}  {text}")
+            return
+        data: dict[str, Any] = {"time": iso_time(now), "device": self._session.device}
+        data |= {"event": event, "text": text}
+        if latest is not None:
+            state = latest.state
+            data |= {
+                "state": None if latest.error else state.kind,
+                "direction": None if latest.error else state.direction,
+                "fault": state.fault.code if state.fault and not latest.error else None,
+                "values": values_json(self._session.profile, latest.readings),
+                "error": latest.error or None,
+            }
+        self._say(json_text(data))
