@@ -1,0 +1,87 @@
+"""No module and no class grows past what one head holds, unless a reason stands here."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+
+MOST_LINES = 310
+MOST_METHODS = 15
+"""Public methods and properties of one class; those of its bases count there."""
+
+EXCEPTIONS: dict[str, tuple[int, str]] = {
+    "app.py": (402, "being cut"),
+    "app.py:DrivePanelApp": (22, "being cut"),
+    "screens/connection/state.py:ConnectionView": (16, "being cut"),
+    "screens/monitor/screen.py": (321, "being cut"),
+    "screens/parameters/view.py": (327, "being cut"),
+    "session/blocks/proposals.py:Proposals": (16, "being cut"),
+}
+"""By module, or module and class: the size that is let pass, and why."""
+
+
+def sizes(source: str, module: str) -> Iterator[tuple[str, int, int]]:
+    """What a module and each of its classes come to, and the most of it."""
+    tree = ast.parse(source)
+    yield module, len(source.splitlines()), MOST_LINES
+    for node in ast.walk(tree):
+        if isinstance(node, ast.ClassDef):
+            public = {
+                part.name
+                for part in node.body
+                if isinstance(part, ast.FunctionDef | ast.AsyncFunctionDef)
+                and not part.name.startswith("_")
+            }
+            yield f"{module}:{node.name}", len(public), MOST_METHODS
+
+
+def of_project() -> list[tuple[str, int, int]]:
+    return [
+        size
+        for path in sorted((ROOT / "tui").rglob("*.py"))
+        for size in sizes(path.read_text("utf-8"), path.relative_to(ROOT / "tui").as_posix())
+    ]
+
+
+def too_large(found: list[tuple[str, int, int]]) -> list[str]:
+    """What is past the most, and past its exception where it has one."""
+    return [
+        f"{name}: {size}, and {EXCEPTIONS.get(name, (most, ''))[0]} at most"
+        for name, size, most in found
+        if size > EXCEPTIONS.get(name, (most, ""))[0]
+    ]
+
+
+def test_no_module_and_no_class_is_past_its_size() -> None:
+    assert too_large(of_project()) == [], "cut it along its reasons to change"
+
+
+def test_every_exception_is_needed_and_has_its_reason() -> None:
+    past = {name: size for name, size, most in of_project() if size > most}
+    assert EXCEPTIONS.keys() <= past.keys(), "it has become small: take its exception out"
+    assert all(reason for _, reason in EXCEPTIONS.values())
+
+
+@pytest.mark.parametrize(
+    ("source", "told"),
+    [
+        ("x = 1\n" * (MOST_LINES + 1), ["m.py: 311, and 310 at most"]),
+        ("x = 1\n" * MOST_LINES, []),
+        (
+            "class Big:\n" + "".join(f"    def m{n}(self): ...\n" for n in range(16)),
+            ["m.py:Big: 16, and 15 at most"],
+        ),
+        (
+            "class Big:\n" + "".join(f"    def _m{n}(self): ...\n" for n in range(16)),
+            [],
+        ),
+    ],
+    ids=["long", "just short enough", "many methods", "private methods"],
+)
+def test_what_is_too_large_is_told(source: str, told: list[str]) -> None:
+    assert too_large(list(sizes(source, "m.py"))) == told
