@@ -16,6 +16,7 @@ from tui.bus.errors import LineClosed
 from tui.drive.plain import plain
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.keys.table import bindings
+from tui.session.clock import Clock
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.events import EventLog
 from tui.session.paths import remember_line, state_folder
@@ -28,7 +29,6 @@ from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
 from tui.terminal.stroke import stroke_of
 from tui.terminal.type_ahead import TypeAhead
-from tui.widgets.clock import Clock
 from tui.widgets.palette import THEME
 
 from .screens.leaving import Leaving
@@ -355,8 +355,8 @@ class DrivePanelApp(LeanApp, LastWords, Places, Leaving):
         from tui.session.starts.keeper import StartKeeper
 
         # the motors of a simulated line end with it
-        starts = StartKeeper("panel") if self.opened.simulation is None else None
-        self.fleet = Fleet(self.opened.line, self.journal, starts, self.events)
+        starts = StartKeeper("panel", clock=self.clock) if self.opened.simulation is None else None
+        self.fleet = Fleet(self.opened.line, self.journal, starts, self.events, self.clock)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 

@@ -31,6 +31,8 @@ from tui.session.work import Outcome, OutcomeKind
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
+from .fake_clock import FakeClock, let_go_until
+
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 ALTIVARS = FAMILIES[:4]
 
@@ -73,6 +75,16 @@ class Bench(NamedTuple):
         self.commander.arm()
         await self.until(lambda: self.session.arming.armed)
 
+    @property
+    def clock(self) -> FakeClock:
+        """What the session and the drive count by."""
+        assert isinstance(self.session.clock, FakeClock)
+        return self.session.clock
+
+    async def let_go_until(self, holds: Callable[[], bool]) -> None:
+        """Let the time of the session and of the drive go by until something holds."""
+        await let_go_until(self.clock, holds)
+
     async def until(self, holds: Callable[[], bool], seconds: float = 20.0) -> None:
         end = time.monotonic() + seconds
         while not holds():
@@ -95,12 +107,14 @@ async def bench(
     family: str, *, armed: bool = True, read_only: bool = False, **spec: object
 ) -> AsyncIterator[Bench]:
     """A simulated drive with a monitor and a commander, armed."""
-    simulation = Simulation([DriveSpec(family, 1, **spec)])  # type: ignore[arg-type]
+    clock = FakeClock()
+    specs = [DriveSpec(family, 1, **spec)]  # type: ignore[arg-type]
+    simulation = Simulation(specs, clock=clock.monotonic)
     simulation.start()
     line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
     line.open(wait=5.0)
     journal = Journal()
-    console = DriveConsole(DriveSession(line, 1, library.load(family)), journal)
+    console = DriveConsole(DriveSession(line, 1, library.load(family), clock=clock), journal)
     console.monitor.start(period=0.1)
     made = Bench(simulation.drive(1), line, console, Stopper(line, journal), simulation)
     try:
@@ -298,7 +312,7 @@ async def test_a_fault_is_reset_and_starts_nothing(family: str) -> None:
         await made.until(lambda: made.drive.motor.frequency > 3)
         made.drive.provoke("OC1" if family == "atv21" else "OCF")
         await made.until(lambda: made.drive.fault is not None)
-        await made.until(lambda: made.drive.motor.rotor == 0)
+        await made.let_go_until(lambda: made.drive.motor.rotor == 0)
         if family != "atv21":
             assert "reset it first" in await made.order("forward", OutcomeKind.REFUSED)
         made.drive.clear_cause()

@@ -14,6 +14,7 @@ from tui.drive.settings.selection import FILTERS, rows
 from tui.drive.settings.set_file import read_set, write_file
 from tui.session.read.upload import Upload
 from tui.session.settings.editor import Editor
+from tui.session.settings.watched_values import WAS_OFF
 
 from .test_command import FAMILIES, Bench, bench
 
@@ -212,7 +213,8 @@ async def test_what_waits_for_a_reset_is_told_until_the_drive_was_off() -> None:
         assert editor.waits_for_reset == {"F875"}
         editor.values.visible = ("F875",)
         made.drive.power_off()
-        await made.until(lambda: "did not answer" in editor.values.trouble)
+        await made.let_go_until(lambda: "did not answer" in editor.values.trouble)
+        made.clock.advance(WAS_OFF)
         assert editor.waits_for_reset == {"F875"}
         made.drive.power_on()
-        await made.until(lambda: editor.waits_for_reset == set(), 40.0)
+        await made.let_go_until(lambda: editor.waits_for_reset == set())

@@ -16,6 +16,7 @@ from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
 from tui.session.arming import Arming
+from tui.session.clock import Clock
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.open_line import OpenLine
 from tui.session.console import DriveConsole
@@ -29,7 +30,6 @@ from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.reading import Quality, Reading
-from tui.widgets.clock import Clock
 
 NOW = 1000.0
 CONNECTED = LineState(LineStatus.CONNECTED, "", NOW - 60)

@@ -14,12 +14,12 @@ if TYPE_CHECKING:
     from textual.widget import AwaitMount
 
     from tui.drive.profile.schema import OrderId
+    from tui.session.clock import Clock
     from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
     from tui.session.events import EventLog
     from tui.session.fleet import Fleet
     from tui.terminal.stroke import Stroke
-    from tui.widgets.clock import Clock
 
 
 class Panel(App[None]):

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-import time
 
 from tui.bus.line import Line, LineStatus
 from tui.drive.orders import OrderRefused
+
+from .clock import REAL_CLOCK, Clock
 
 ARMED_FOR = 60.0
 """Seconds without a key after which a drive is no longer armed."""
@@ -22,8 +23,9 @@ class NotArmed(OrderRefused):
 class Arming:
     """Lets writes to one drive through for a while; whatever writes asks here."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: Line, clock: Clock = REAL_CLOCK) -> None:
         self._line = line
+        self._clock = clock
         self._until: float | None = None
         self._span = ARMED_FOR
         self._why = ""
@@ -40,7 +42,7 @@ class Arming:
             raise OrderRefused("The line is read-only: nothing is written.")
         self._span, self._why = seconds, ""
         self.times += 1
-        self._until = time.monotonic() + seconds
+        self._until = self._clock.monotonic() + seconds
 
     def disarm(self, why: str = "") -> None:
         """Let no write through any more."""
@@ -50,7 +52,7 @@ class Arming:
     def touch(self) -> None:
         """A key was pressed, or work goes on: an armed drive stays armed."""
         if self.armed_for is not None:
-            self._until = time.monotonic() + self._span
+            self._until = self._clock.monotonic() + self._span
 
     @property
     def armed_for(self) -> float | None:
@@ -58,13 +60,13 @@ class Arming:
         until = self._until
         if until is None:
             return None
-        if until <= time.monotonic():
+        if until <= self._clock.monotonic():
             self.disarm("No key for a minute: no longer armed.")
             return None
         if self._line.state.status is not LineStatus.CONNECTED:
             self.disarm("The line was lost: no longer armed.")
             return None
-        return math.inf if until == math.inf else until - time.monotonic()
+        return math.inf if until == math.inf else until - self._clock.monotonic()
 
     @property
     def armed(self) -> bool:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
@@ -77,7 +76,7 @@ class DriveConsole:
 
     def _state(self) -> DriveState | None:
         latest = self.monitor.latest
-        if latest is None or latest.error or latest.is_stale(time.monotonic()):
+        if latest is None or latest.error or latest.is_stale(self.session.clock.monotonic()):
             return None
         return latest.state
 

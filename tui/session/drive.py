@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 
 from tui.bus.line import Line
 from tui.bus.link import label
@@ -11,6 +10,7 @@ from tui.drive.chart import UNKNOWN, ChartState, read_chart
 from tui.drive.profile.profile import Profile
 
 from .arming import Arming
+from .clock import REAL_CLOCK, Clock
 from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
 from .image import RegisterImage
@@ -26,17 +26,24 @@ class DriveSession:
     """
 
     def __init__(
-        self, line: Line, device: int, profile: Profile, identity: DriveIdentity | None = None
+        self,
+        line: Line,
+        device: int,
+        profile: Profile,
+        identity: DriveIdentity | None = None,
+        clock: Clock = REAL_CLOCK,
     ) -> None:
         self.line = line
         self.device = device
         self.profile = profile
         self.identity = identity
-        self.image = RegisterImage()
+        self.clock = clock
+        """What everything that is done with the drive counts by."""
+        self.image = RegisterImage(clock)
         """What is known of its registers."""
-        self.arming = Arming(line)
+        self.arming = Arming(line, clock)
         """Whether it may be written to from here."""
-        self.work = WorkQueue(line, device, self.arming)
+        self.work = WorkQueue(line, device, self.arming, clock)
         """What is being done to it; a stop ends it."""
         self.work.on_change = self.stir
         self.ratings: dict[str, Rating] = {}
@@ -65,7 +72,7 @@ class DriveSession:
 
     def note_command(self) -> None:
         """A command or reference was sent."""
-        self.commanded_at = time.monotonic()
+        self.commanded_at = self.clock.monotonic()
 
     def stir(self) -> None:
         """Something was done to the drive: whoever watches it looks at all of it again."""

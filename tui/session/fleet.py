@@ -14,6 +14,7 @@ from types import MappingProxyType
 from tui.bus.line import Line
 from tui.drive.profile.schema import OrderId
 
+from .clock import REAL_CLOCK, Clock
 from .command.stop import Stopper
 from .connect.identify import DriveIdentity
 from .console import DriveConsole
@@ -52,13 +53,16 @@ class Fleet:
         journal: Journal,
         starts: StartKeeper | None = None,
         events: EventLog | None = None,
+        clock: Clock = REAL_CLOCK,
     ) -> None:
         self.line = line
+        self.clock = clock
+        """What the sessions with its drives count by."""
         self.journal = journal
         self.starts = starts
         """Where starts of motors are put on record; None where none are."""
         self.line_watch = LineWatch(line)
-        self.events = events or EventLog()
+        self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.stopper = Stopper(line, journal, self.events)
         self._lock = threading.Lock()

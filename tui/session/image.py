@@ -7,11 +7,12 @@ from __future__ import annotations
 
 import math
 import threading
-import time
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from types import MappingProxyType
+
+from .clock import REAL_CLOCK, Clock
 
 
 class Origin(StrEnum):
@@ -55,7 +56,8 @@ class RegisterImage:
     A newer reply counts, however late an older one is handed in.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock = REAL_CLOCK) -> None:
+        self._clock = clock
         self._lock = threading.Lock()
         self._now = _EMPTY
         self._doubted: dict[str, float] = {}
@@ -89,11 +91,11 @@ class RegisterImage:
     def age(self, code: str) -> float:
         """Seconds since a register's value was on the wire; infinite where it is not known."""
         held = self._now.held.get(code)
-        return math.inf if held is None else max(0.0, time.monotonic() - held.time)
+        return math.inf if held is None else max(0.0, self._clock.monotonic() - held.time)
 
     def fresh(self, longest: float) -> dict[str, int]:
         """Trusted raw values no older than so many seconds."""
-        state, oldest = self._now, time.monotonic() - longest
+        state, oldest = self._now, self._clock.monotonic() - longest
         return {c: raw for c, raw in state.trusted.items() if state.held[c].time >= oldest}
 
     def take(self, found: Mapping[str, Raw], origin: Origin = Origin.READ) -> None:
@@ -121,7 +123,7 @@ class RegisterImage:
     def doubt(self, code: str) -> None:
         """A word is being written: what it holds is unknown until it is read again."""
         with self._lock:
-            self._doubted = {**self._doubted, code: time.monotonic()}
+            self._doubted = {**self._doubted, code: self._clock.monotonic()}
             held = {c: one for c, one in self._now.held.items() if c != code}
             self._set(held, self._now.refused)
 
@@ -135,7 +137,7 @@ class RegisterImage:
     def distrust(self) -> None:
         """The drive may have been reset: no decision rests on what was read before now."""
         with self._lock:
-            self._trusted_from = time.monotonic()
+            self._trusted_from = self._clock.monotonic()
             silent = {c: one for c, one in self._now.refused.items() if one.silent}
             self._set(self._now.held, silent)
 

@@ -28,7 +28,7 @@ class Quality(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One parameter as last read; `time` is when its reply was complete, time.monotonic()."""
+    """One parameter as last read; `time` is when its reply was complete (monotonic)."""
 
     parameter: Parameter
     raw: int | None

@@ -9,7 +9,6 @@ from __future__ import annotations
 import asyncio
 import logging
 import threading
-import time
 from collections import deque
 from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
@@ -21,6 +20,7 @@ from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
 from .arming import Arming, NotArmed
+from .clock import REAL_CLOCK, Clock
 
 log = logging.getLogger(__name__)
 
@@ -46,7 +46,7 @@ class OutcomeKind(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What the last work on a drive has come to; `time` is time.monotonic()."""
+    """What the last work on a drive has come to; `time` is monotonic."""
 
     kind: OutcomeKind
     text: str
@@ -96,7 +96,7 @@ class Task:
 class WorkQueue:
     """Takes the work on one drive from any thread; knows its stops and its last outcome."""
 
-    def __init__(self, line: Line, device: int, arming: Arming) -> None:
+    def __init__(self, line: Line, device: int, arming: Arming, clock: Clock = REAL_CLOCK) -> None:
         self.arming = arming
         self.outcome: Outcome | None = None
         """What the last work has come to: the one truth about this drive."""
@@ -110,6 +110,7 @@ class WorkQueue:
         """Called in the line's thread when a task has ended: the drive may hold other values."""
         self._line = line
         self._device = device
+        self._clock = clock
         self._lock = threading.RLock()
         self._waiting: deque[tuple[Task, Permit]] = deque()
         self._doing: Task | None = None
@@ -121,7 +122,7 @@ class WorkQueue:
 
     def tell(self, kind: OutcomeKind, text: str, error: Exception | None = None) -> None:
         """Say what work on the drive has come to."""
-        self.outcome = outcome = Outcome(kind, text, time.monotonic(), error)
+        self.outcome = outcome = Outcome(kind, text, self._clock.monotonic(), error)
         self.on_tell(outcome)
 
     # Work

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Mapping, Sequence
+import time
+from collections.abc import Callable, Mapping, Sequence
 from types import TracebackType
 
 from tui.drive.profile.library import load
@@ -25,8 +26,9 @@ class Simulation:
     """Simulated drives on one line, with the ways to reach it.
 
     The drives' time passes from `start` to `stop`, in a thread of its own; every endpoint has
-    a thread too. `profiles` takes the place of the installed profiles, by id. Raises
-    SimulatorError for two drives with one address, UnknownProfile, UnknownParameter.
+    a thread too. `profiles` takes the place of the installed profiles, by id; the drives' time is
+    that of `clock`, in s. Raises SimulatorError for two drives with one address, UnknownProfile,
+    UnknownParameter.
     """
 
     def __init__(
@@ -37,6 +39,7 @@ class Simulation:
         faults: FaultRates | None = None,
         seed: int = 0,
         profiles: Mapping[str, Profile] | None = None,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self.timing = timing or LineTiming()
         addresses = [spec.address for spec in drives]
@@ -55,6 +58,7 @@ class Simulation:
                 for spec in drives
             ],
             self.timing,
+            clock,
         )
         self.faults = FaultPlan(faults or FaultRates(), seed)
         self._endpoints: list[Endpoint] = []

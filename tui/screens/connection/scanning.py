@@ -111,7 +111,7 @@ class Scanning(ConnectionView):
             fleet.note(identity)
             self.fail(error)
             return
-        session = DriveSession(fleet.line, identity.device, profile, identity)
+        session = DriveSession(fleet.line, identity.device, profile, identity, fleet.clock)
         fleet.take(session, guessed=not typed and identity.profile is None)
 
     @work(exclusive=True, group="open", exit_on_error=False)

@@ -97,10 +97,10 @@ class BlockEditor:
                 await self._look()
             except (LineError, DriveError) as error:
                 self.trouble = str(error)
-                await asyncio.sleep(LOOK_AFTER_ERROR)
+                await self.session.clock.sleep(LOOK_AFTER_ERROR)
             else:
                 self.trouble = ""
-                await asyncio.sleep(0.0 if self._verify else LOOK_EVERY)
+                await self.session.clock.sleep(0.0 if self._verify else LOOK_EVERY)
 
     async def _look(self) -> None:
         verify, self._verify = self._verify, False

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import time
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
@@ -83,10 +81,10 @@ class CommandAccess:
 
     async def wait_for(self, chart: Chart, goals: Collection[str]) -> State:
         """The state, as soon as it is one of those, or when its time is up."""
-        end = time.monotonic() + STEP_TIME
+        end = self.session.clock.monotonic() + STEP_TIME
         state = await self.state(chart)
-        while state.id not in goals and time.monotonic() < end:
-            await asyncio.sleep(STATE_POLL_INTERVAL)
+        while state.id not in goals and self.session.clock.monotonic() < end:
+            await self.session.clock.sleep(STATE_POLL_INTERVAL)
             state = await self.state(chart)
         return state
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from dataclasses import dataclass
 
 from tui.drive.chart import read_chart
@@ -64,7 +63,7 @@ class MotorStart:
         if turns is None or turns == id:
             return
         for _ in range(LOOKS):
-            await asyncio.sleep(STATE_POLL_INTERVAL)
+            await self.session.clock.sleep(STATE_POLL_INTERVAL)
             await access.read([chart.direction.parameter] if chart.direction else [])
             turns = read_chart(self.session.profile, access.raws).direction
             if turns == id:

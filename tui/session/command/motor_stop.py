@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
@@ -130,9 +128,9 @@ class MotorStop:
 
     async def _follow(self, chart: Chart, order: Order) -> str | None:
         """See the motor stop; returns why it does not, or nothing."""
-        progress, before = time.monotonic(), None
+        progress, before = self.session.clock.monotonic(), None
         ending = last_word(chart, order)
-        while (now := time.monotonic()) - self.ordered < SEEN_FOR:
+        while (now := self.session.clock.monotonic()) - self.ordered < SEEN_FOR:
             kind, hertz = await self._motion(chart)
             if not hertz and kind in STANDING:
                 self.say(self.session, Phase.STOPPED, f"stopped{self._instead()}", self.ordered)
@@ -141,7 +139,7 @@ class MotorStop:
             if hertz == 0 and kind == "running" and ending is not None:
                 # at 0 Hz and enabled by the very word that has stopped it
                 await self._send(chart, ending)
-                progress, ending = time.monotonic(), None
+                progress, ending = self.session.clock.monotonic(), None
                 continue
             if kind != "running" or (None not in (hertz, before) and (hertz or 0) < (before or 0)):
                 progress = now
@@ -151,7 +149,7 @@ class MotorStop:
             speed = f", {hertz:g} Hz" if hertz else ""
             text = f"{order.name}{speed}{self._instead()}"
             self.say(self.session, Phase.STOPPING, text, self.ordered)
-            await asyncio.sleep(STANDSTILL_POLL_INTERVAL)
+            await self.session.clock.sleep(STANDSTILL_POLL_INTERVAL)
         return "it still turns after a minute."
 
     def _instead(self) -> str:

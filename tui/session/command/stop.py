@@ -61,8 +61,8 @@ class Stopper:
         A stop whose word has not gone out yet is not begun anew: a key that is held down would
         keep every one of them from going out.
         """
-        ordered = time.monotonic()
         wanted = list(sessions)
+        ordered = wanted[0].clock.monotonic() if wanted else 0.0
         for session in wanted:
             session.work.stop(by)
             if session.starts is not None:
@@ -90,6 +90,7 @@ class Stopper:
     def wait(self, sessions: Iterable[DriveSession], seconds: float) -> StopSummary:
         """Wait from another thread until these stops have ended, or the time is up."""
         devices = {session.device for session in sessions}
+        # the thread that waits does so by the real clock, whichever the drives have
         end = time.monotonic() + seconds
         while True:
             reports = [one for device, one in self._reports.items() if device in devices]
@@ -101,7 +102,7 @@ class Stopper:
     def _say(self, session: DriveSession, phase: Phase, text: str, ordered: float) -> None:
         before = self._reports.get(session.device)
         same = before is not None and (before.phase, before.time) == (phase, ordered)
-        since = before.since if same and before is not None else time.monotonic()
+        since = before.since if same and before is not None else session.clock.monotonic()
         report = StopReport(session.device, phase, text, ordered, since)
         self._reports = {**self._reports, session.device: report}
         if not same:

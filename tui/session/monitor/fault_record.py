@@ -38,7 +38,7 @@ class FaultRecord:
     """A trip and the seconds before it."""
 
     time: float
-    """When it was seen, time.monotonic()."""
+    """When it was seen (monotonic)."""
     wall: float
     fault: FaultCode | None
     codes: tuple[str, ...]

@@ -7,11 +7,9 @@ before an operator's own requests. Other requests tell the state of the drives i
 
 from __future__ import annotations
 
-import asyncio
 import logging
-import time
 from collections.abc import Awaitable, Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 from tui.bus.errors import LineError
 from tui.bus.line import Line, Priority, Worker
@@ -54,7 +52,7 @@ class _Kept:
     session: DriveSession
     monitor: Monitor
     reader: Reader
-    since: float = field(default_factory=time.monotonic)
+    since: float
     watch: TimeoutWatch | None = None
     learned: float | None = None
     workers: tuple[Worker, ...] = ()
@@ -138,24 +136,24 @@ class LineWatch:
 
     def warnings(self) -> list[TimeoutWarning]:
         """Drives that are about to act on their time-out, or have, for want of an answer."""
-        now = time.monotonic()
         found = []
         for device, kept in self._kept.items():
             watch = self._watch(kept)
             if watch is None or not watch.active:
                 continue
-            silent = now - self._heard(kept)
+            silent = kept.session.clock.monotonic() - self._heard(kept)
             if silent > TOLD_SHARE * watch.timeout:
                 found.append(TimeoutWarning(device, kept.session.profile, silent, watch))
         return found
 
     def _heard(self, kept: _Kept) -> float:
-        return self._line.device_state(kept.session.device).heard or kept.since
+        heard = self._line.device_state(kept.session.device).heard
+        return kept.session.clock.of_line(heard) if heard else kept.since
 
     def keep(self, session: DriveSession, monitor: Monitor) -> None:
         """Look after a drive from now on; its monitor, while it runs, spares the looks."""
         device = session.device
-        kept = _Kept(session, monitor, Reader(session))
+        kept = _Kept(session, monitor, Reader(session), session.clock.monotonic())
         if device in self._kept:
             self._let_go(self._kept[device])
         self._kept = {**self._kept, device: kept}
@@ -186,7 +184,7 @@ class LineWatch:
                 # what goes wrong with one drive must not leave the others alone
                 log.exception("looking after device %s failed", kept.session.device)
                 rest = GLANCE
-            await asyncio.sleep(max(SHORTEST, rest))
+            await kept.session.clock.sleep(max(SHORTEST, rest))
 
     @staticmethod
     def _after_failure(kept: _Kept) -> float:
@@ -195,13 +193,13 @@ class LineWatch:
 
     async def _feed(self, kept: _Kept) -> float:
         """Ask a drive that watches the line, if nobody else does often enough."""
-        now = time.monotonic()
+        now = kept.session.clock.monotonic()
         if kept.learned is None or now - kept.learned > LEARN_AGAIN:
             await self._learn(kept)
         if kept.watch is None:
             return LEARN_AGAIN
         period = kept.watch.timeout / ASKED_PER_TIMEOUT
-        silent = time.monotonic() - self._heard(kept)
+        silent = kept.session.clock.monotonic() - self._heard(kept)
         if silent < period:
             return period - silent
         # past its time-out it has acted: it need no longer go before the others
@@ -225,14 +223,15 @@ class LineWatch:
         watch = self._watch(kept)
         timeout = watch.timeout if watch and watch.active else None
         if self._kept.get(device) is kept:
-            self._looks = {**self._looks, device: Look(state, error, time.monotonic(), timeout)}
+            look = Look(state, error, kept.session.clock.monotonic(), timeout)
+            self._looks = {**self._looks, device: look}
         return GLANCE if kept.learned is not None else GLANCE / 10
 
     async def _learn(self, kept: _Kept) -> None:
         """Read the drive's time-out and its reaction."""
         rules = kept.session.profile.data.communication_fault
         if rules is None or not rules.timeout:
-            kept.learned, kept.watch = time.monotonic(), None
+            kept.learned, kept.watch = kept.session.clock.monotonic(), None
             return
         codes = [code for code in (rules.timeout, rules.reaction) if code]
         codes += deciding_codes(kept.session.profile)
@@ -241,7 +240,7 @@ class LineWatch:
         raw = readings[rules.reaction].raw if rules.reaction else None
         reaction = next((one for one in rules.reactions if one.raw == raw), None)
         kept.watch = None if timeout is None else TimeoutWatch(timeout, reaction)
-        kept.learned = time.monotonic()
+        kept.learned = kept.session.clock.monotonic()
 
 
 def _any_word(profile: Profile) -> int:

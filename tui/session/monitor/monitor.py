@@ -6,9 +6,7 @@ a screen, so a terminal that is not read costs the drive nothing.
 
 from __future__ import annotations
 
-import asyncio
 import logging
-import time
 from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -132,13 +130,15 @@ class Monitor:
                 self.restarts += 1
                 told = f"Watching failed ({type(error).__name__}: {error}) and is begun anew."
                 self._tell_failure(told)
-                await asyncio.sleep(RESTART_AFTER)
+                await self.session.clock.sleep(RESTART_AFTER)
 
     def _tell_failure(self, text: str) -> None:
         """The values of before, as old as they are, with why there are no new ones."""
         if (latest := self._latest) is None:
             return
-        snapshot = replace(latest, time=time.monotonic(), wall=time.time(), rate=0.0, error=text)
+        clock = self.session.clock
+        now, wall = clock.monotonic(), clock.wall()
+        snapshot = replace(latest, time=now, wall=wall, rate=0.0, error=text)
         self._latest = snapshot
         self._hand_out(snapshot)
 
@@ -158,7 +158,7 @@ class Monitor:
         cycle = failures = 0
         try:
             while True:
-                started = time.monotonic()
+                started = self.session.clock.monotonic()
                 cycle += 1
                 error = ""
                 period = self._period(rates)
@@ -185,8 +185,8 @@ class Monitor:
                 self._publish(cycle, readings, rates, _span(begun, period), error)
                 if not error:
                     await self._learn(cycle)
-                rest = started + period - time.monotonic()
-                await asyncio.sleep(period if error else max(0.0, rest))
+                rest = started + period - self.session.clock.monotonic()
+                await self.session.clock.sleep(period if error else max(0.0, rest))
         finally:
             self.line.pace.release(self)
 
@@ -234,7 +234,7 @@ class Monitor:
         span: float,
         error: str,
     ) -> None:
-        now = time.monotonic()
+        now = self.session.clock.monotonic()
         limit = STALE_CYCLES * span
         aged = {
             code: reading.aged(now, limit if code in rates.fast else limit * SLOW_FACTOR)
@@ -243,7 +243,7 @@ class Monitor:
         snapshot = Snapshot(
             cycle=cycle,
             time=now,
-            wall=time.time(),
+            wall=self.session.clock.wall(),
             readings=aged,
             state=drive_state(self.profile, aged),
             rate=0.0 if error else 1.0 / span,

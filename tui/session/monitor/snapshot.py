@@ -22,7 +22,7 @@ class Snapshot:
 
     cycle: int
     time: float
-    """When it was taken, time.monotonic()."""
+    """When it was taken (monotonic)."""
     wall: float
     """The same as time.time()."""
     readings: Mapping[str, Reading]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -51,7 +50,7 @@ class Reader:
     _slots: Slots = field(init=False)
 
     def __post_init__(self) -> None:
-        self._slots = Slots(self.line, self.device, self.profile)
+        self._slots = Slots(self.line, self.device, self.profile, self.session.clock)
 
     @property
     def line(self) -> Line:
@@ -135,7 +134,8 @@ class Reader:
 
     async def _read_sources(self, codes: list[str], priority: Priority) -> None:
         sources = {source for code in codes for source in sources_of(self.profile[code])}
-        oldest = time.monotonic() - SOURCE_AGE if priority >= Priority.POLL else math.inf
+        now = self.session.clock.monotonic()
+        oldest = now - SOURCE_AGE if priority >= Priority.POLL else math.inf
         due = frozenset(code for code in sources - set(codes) if not self._is_known(code, oldest))
         if due:
             await self._raws(due, priority)
@@ -196,12 +196,12 @@ class Reader:
                 raise
             await self.line.read(self.device, status.address, 1, priority=Priority.OPERATOR_READ)
             text = "no answer: perhaps this drive has no such word"
-            nothing = Raw(time.monotonic(), None, text, silent=True)
+            nothing = Raw(self.session.clock.monotonic(), None, text, silent=True)
             return {place.code: nothing for place in request.places}
 
     def _still_refused(self, codes: frozenset[str]) -> dict[str, Raw]:
         """Refusals young enough that a poll need not ask again."""
-        oldest = time.monotonic() - ASK_AGAIN
+        oldest = self.session.clock.monotonic() - ASK_AGAIN
         refused = self.session.image.refused
         return {c: r for c, r in refused.items() if c in codes and (r.silent or r.time > oldest)}
 
@@ -251,7 +251,7 @@ class Reader:
             words = reply.words[place.offset : place.offset + word_count(parameter)]
             alone = request.count == word_count(parameter) and block is None
             if alone or unknown not in words:
-                found[place.code] = Raw(reply.time, from_words(parameter, words))
+                found[place.code] = Raw(self._when(reply), from_words(parameter, words))
         return found
 
     def _block_of(self, request: ReadRequest) -> Block | None:
@@ -270,8 +270,11 @@ class Reader:
             )
         except DeviceException as refusal:
             return self._refusal(refusal)
-        return Raw(reply.time, from_words(parameter, reply.words))
+        return Raw(self._when(reply), from_words(parameter, reply.words))
+
+    def _when(self, reply: Reply) -> float:
+        return self.session.clock.of_line(reply.time)
 
     def _refusal(self, refusal: DeviceException) -> Raw:
         absent = refusal.code == self.profile.data.reading.unknown_exception
-        return Raw(time.monotonic(), None, str(refusal), absent)
+        return Raw(self.session.clock.monotonic(), None, str(refusal), absent)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -80,7 +79,7 @@ class RetryingReader:
                     raise
                 # only behind everything else a drive that fell silent is left alone for a while
                 if self.priority >= Priority.POLL and isinstance(error, NoAnswer):
-                    await asyncio.sleep(min(error.retry_in or 0.0, LONGEST_REST))
+                    await self.session.clock.sleep(min(error.retry_in or 0.0, LONGEST_REST))
             else:
                 return readings
         raise AssertionError  # the last try returns or raises

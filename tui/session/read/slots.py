@@ -8,7 +8,6 @@ parameters at a time, with direct reads of everything that could stand in it.
 
 from __future__ import annotations
 
-import time
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -18,6 +17,7 @@ from tui.bus.line import Line, Priority
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block
 
+from ..clock import Clock
 from ..reading import Reading
 from .proof import SURE, SlotEvidence
 
@@ -46,11 +46,10 @@ class _Comparison:
     todo: deque[str] = field(default_factory=deque)
     next_time: float = 0.0
 
-    def choose(self, slots: Mapping[str, int]) -> None:
+    def choose(self, slots: Mapping[str, int], now: float) -> None:
         """Take the slots as they were read, and begin to compare where that is due."""
         known = {choice.raw for choice in self.block.choices}
         chosen = {s: slots[s] for s in self.block.slots if slots.get(s) in known}
-        now = time.monotonic()
         if chosen == self.chosen and (self.todo or now < self.next_time):
             return
         self.chosen, self.next_time = chosen, now + TRY_AGAIN
@@ -84,6 +83,7 @@ class Slots:
     line: Line
     device: int
     profile: Profile
+    clock: Clock
     _known: dict[str, int] = field(default_factory=dict)
     _comparisons: dict[str, _Comparison] = field(default_factory=dict)
     """By the id of the block; forgotten whenever the drive may have been reset."""
@@ -94,12 +94,12 @@ class Slots:
 
     def in_force(self) -> dict[str, int]:
         """Raw values by slot of what surely stands in each place now."""
-        awake = time.monotonic() - self._heard <= ASLEEP
+        awake = self.clock.monotonic() - self._heard <= ASLEEP
         return self._known | self._in_force if awake else dict(self._known)
 
     def heard(self) -> None:
         """The drive has answered: it was not switched off since it did so before, or long ago."""
-        now = time.monotonic()
+        now = self.clock.monotonic()
         if now - self._heard > ASLEEP:
             self._drop_proofs()
         self._heard = now
@@ -107,7 +107,7 @@ class Slots:
     def distrust(self) -> None:
         """The drive may be reset now: what counts from then on is not what was proved."""
         self._drop_proofs()
-        self._doubted = time.monotonic()
+        self._doubted = self.clock.monotonic()
 
     def forget(self) -> None:
         """Nothing is sure any more: the drive was silent, or another one answers now."""
@@ -128,9 +128,9 @@ class Slots:
             raws = {c: r.raw for c, r in readings.items() if r.raw is not None}
             if block.effective == "at-once":
                 self._known.update(raws)
-            elif time.monotonic() - self._doubted > CALM:
+            elif self.clock.monotonic() - self._doubted > CALM:
                 fresh = _Comparison(block, SlotEvidence(self.profile, block))
-                self._comparisons.setdefault(block.id, fresh).choose(raws)
+                self._comparisons.setdefault(block.id, fresh).choose(raws, self.clock.monotonic())
         self._conclude()
 
     async def compare(self, ask: ReadCodes) -> None:

@@ -119,7 +119,9 @@ def head_of(session: DriveSession) -> SetHead:
         profile=profile.id,
         profile_version=profile.data.profile.version,
         family=profile.name,
-        time=datetime.now().astimezone().isoformat(timespec="seconds"),
+        time=datetime.fromtimestamp(session.clock.wall())
+        .astimezone()
+        .isoformat(timespec="seconds"),
         line=session.line_text,
         device=session.device,
         panel=tui.__version__,

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
-import time
 from collections.abc import Collection
 
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
@@ -119,8 +117,8 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
     profile = retrying.session.profile
     status = profile.quantity("extended_status_word")
     codes = [order.parameter, *([status.code] if status else [])]
-    end = time.monotonic() + SAVING_LONGEST
-    while time.monotonic() < end:
+    end = retrying.session.clock.monotonic() + SAVING_LONGEST
+    while retrying.session.clock.monotonic() < end:
         try:
             raws = await retrying.ask_raws(codes)
         except NoAnswer:
@@ -132,7 +130,7 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
         word = raws.get(status.code, busy) if status is not None and known else 0
         if raws and not pending and not word & busy:
             return
-        await asyncio.sleep(SAVE_POLL_INTERVAL)
+        await retrying.session.clock.sleep(SAVE_POLL_INTERVAL)
     raise MemoryRefused(
         f"The drive is not done after {SAVING_LONGEST:g} s: look at its display, and read"
         f" {order.parameter} before anything is written."

@@ -6,8 +6,6 @@ is looked at is read again and again, so that another's change is noticed.
 
 from __future__ import annotations
 
-import asyncio
-import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
@@ -103,28 +101,28 @@ class WatchedValues:
             try:
                 if due := self._due():
                     await first.ask(due)
-                    self._asked |= dict.fromkeys(due, time.monotonic())
+                    self._asked |= dict.fromkeys(due, self.session.clock.monotonic())
                 elif waiting:
                     await later.ask(waiting[0])
-                    self._asked |= dict.fromkeys(waiting.pop(0), time.monotonic())
+                    self._asked |= dict.fromkeys(waiting.pop(0), self.session.clock.monotonic())
                 elif (part := next(parts, None)) is not None:
                     known, absent = self.raws, self.absent
                     left = [c for c in part if c not in known and c not in absent]
                     waiting = [tuple(group) for group in later.reader.groups(left)]
                 else:
-                    await asyncio.sleep(IDLE_POLL_INTERVAL)
+                    await self.session.clock.sleep(IDLE_POLL_INTERVAL)
                 self.trouble = ""
                 self._look_for_a_reset()
             except LineError as error:
                 if isinstance(error, NoAnswer) and self._silent is None:
-                    self._silent = time.monotonic()
+                    self._silent = self.session.clock.monotonic()
                 self.trouble = str(error)
-                await asyncio.sleep(REREAD_AFTER_ERROR)
+                await self.session.clock.sleep(REREAD_AFTER_ERROR)
 
     def _look_for_a_reset(self) -> None:
         """A drive that was silent, or starts, was switched off: everything may be another value."""
         since, self._silent = self._silent, None
-        off = since is not None and time.monotonic() - since > WAS_OFF
+        off = since is not None and self.session.clock.monotonic() - since > WAS_OFF
         before, self._starting = self._starting, self.state() == "starting"
         if not off and (before or not self._starting):
             return
@@ -134,7 +132,7 @@ class WatchedValues:
 
     def _due(self) -> list[str]:
         """What is looked at and was not read lately."""
-        oldest = time.monotonic() - REREAD_AFTER
+        oldest = self.session.clock.monotonic() - REREAD_AFTER
         due = [code for code in self.visible if self._asked.get(code, 0.0) < oldest]
         if not due:
             return []

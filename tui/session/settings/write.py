@@ -106,7 +106,8 @@ class Writer:
         except DeviceException:
             return None
         back = from_words(parameter, reply.words)
-        self.session.image.confirm(parameter.code, back, reply.time)
+        when = self.session.clock.of_line(reply.time)
+        self.session.image.confirm(parameter.code, back, when)
         return back
 
     def text(self, parameter: Parameter, raw: int | None) -> str:

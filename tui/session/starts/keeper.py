@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import math
-import time
 from typing import TYPE_CHECKING, Literal, Protocol
 
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
+from ..clock import REAL_CLOCK, Clock
 from .record import StartRecord, offer
 from .starts import StartNotRecorded, StartOvertaken, Starts
 
@@ -53,13 +53,16 @@ class StartKeeper:
     None of its methods but `begin`, `found` and `take_over` waits for the disk.
     """
 
-    def __init__(self, program: str, starts: Starts | None = None) -> None:
+    def __init__(
+        self, program: str, starts: Starts | None = None, clock: Clock = REAL_CLOCK
+    ) -> None:
+        self._clock = clock
         self.unrecorded = False
         """Whether a start that cannot be put on record is let through; a person's word."""
         self.left_running = False
         """Whether what is started now is meant to go on when the program ends."""
         self._program = program
-        self._starts = starts or Starts()
+        self._starts = starts or Starts(clock=clock)
         self._begun: dict[int, StartRecord] = {}
         self._sent: dict[int, float] = {}
         self._left: dict[int, StartRecord] = {}
@@ -90,7 +93,7 @@ class StartKeeper:
 
     def sent(self, session: Startable) -> None:
         """The run frame went out: a standstill seen from now on ends the record."""
-        self._sent = {**self._sent, session.device: time.monotonic()}
+        self._sent = {**self._sent, session.device: self._clock.monotonic()}
         self._starts.sent(session.line_text, session.device)
 
     def standing(self, session: Startable, seen: float) -> None:

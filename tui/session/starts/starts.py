@@ -10,7 +10,6 @@ import logging
 import math
 import os
 import threading
-import time
 from collections import deque
 from dataclasses import dataclass, field, replace
 from datetime import datetime
@@ -19,6 +18,7 @@ from typing import TYPE_CHECKING, Literal
 
 from tui.drive.errors import DriveError
 
+from ..clock import REAL_CLOCK, Clock
 from ..connect.line_key import line_key
 from ..paths import state_folder
 from .files import StartFiles
@@ -77,7 +77,13 @@ class Starts:
     waits for each drive, so a disk that hangs piles nothing up.
     """
 
-    def __init__(self, folder: Path | None = None, processes: Processes | None = None) -> None:
+    def __init__(
+        self,
+        folder: Path | None = None,
+        processes: Processes | None = None,
+        clock: Clock = REAL_CLOCK,
+    ) -> None:
+        self._clock = clock
         self._files = StartFiles((folder or state_folder()) / "starts")
         self._processes = processes or Processes()
         self._changed = threading.Condition()
@@ -157,7 +163,7 @@ class Starts:
         """The run frame went out, answered or not: a standstill seen from now on counts."""
         with self._changed:
             if (line, device) in self._sent:
-                self._sent[line, device] = time.monotonic()
+                self._sent[line, device] = self._clock.monotonic()
 
     def end(self, line: str, device: int, seen: float | None = None) -> None:
         """The motor stands: its record goes. Returns at once and never raises.
@@ -166,7 +172,7 @@ class Starts:
         read before the run frame went out is the rest before the start, and changes nothing.
         """
         with self._changed:
-            if (time.monotonic() if seen is None else seen) > self._sent.get(
+            if (self._clock.monotonic() if seen is None else seen) > self._sent.get(
                 (line, device), -math.inf
             ):
                 self._take_away((line, device))

@@ -1,0 +1,92 @@
+"""The clock of a session: what counts by it, and the one that tests move on."""
+
+from __future__ import annotations
+
+import ast
+import asyncio
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import cast
+
+import pytest
+
+import tui.session
+from tui.bus.line import Line
+from tui.drive.profile import library
+from tui.session.arming import ARMED_FOR
+from tui.session.drive import DriveSession
+
+from .fake_clock import FakeClock
+from .test_work import Loop
+
+OWN_TIME = {"clock.py", "journal.py", "events.py", "command/stop.py"}
+"""Modules that look at the real clock: the journal's own thread, a thread that waits for a stop."""
+SESSION = Path(tui.session.__file__).parent
+
+
+def real_times(tree: ast.Module) -> Iterator[str]:
+    """Where a module asks the real clock, or sleeps by it."""
+    for node in ast.walk(tree):
+        match node:
+            case ast.Attribute(
+                value=ast.Name(id="time"), attr="monotonic" | "time" | "sleep" as name
+            ):
+                yield f"line {node.lineno}: time.{name}"
+            case ast.Attribute(value=ast.Name(id="asyncio"), attr="sleep"):
+                yield f"line {node.lineno}: asyncio.sleep"
+
+
+def test_a_session_counts_by_the_clock_that_it_was_given() -> None:
+    found = {
+        name: list(real_times(ast.parse(path.read_text("utf-8"))))
+        for path in sorted(SESSION.rglob("*.py"))
+        if (name := path.relative_to(SESSION).as_posix()) not in OWN_TIME
+    }
+    assert {name: places for name, places in found.items() if places} == {}
+
+
+@pytest.fixture
+def session() -> DriveSession:
+    """A drive on a line that sends nothing, by a clock that the test moves on."""
+    line = cast("Line", Loop())
+    return DriveSession(line, 1, library.load("atv71"), clock=FakeClock())
+
+
+def clock_of(session: DriveSession) -> FakeClock:
+    assert isinstance(session.clock, FakeClock)
+    return session.clock
+
+
+def test_arming_ends_after_a_minute_without_a_key(session: DriveSession) -> None:
+    clock = clock_of(session)
+    session.arming.arm()
+    clock.advance(ARMED_FOR - 5)
+    assert session.arming.armed
+    session.arming.touch()
+    clock.advance(ARMED_FOR - 5)
+    assert session.arming.armed
+    clock.advance(10)
+    assert not session.arming.armed
+    assert "No key for a minute" in session.arming.why_disarmed
+
+
+def test_what_is_known_grows_old(session: DriveSession) -> None:
+    clock = clock_of(session)
+    session.image.confirm("ACC", 30, clock.of_line(time.monotonic()))
+    assert session.image.fresh(5.0) == {"ACC": 30}
+    clock.advance(60)
+    assert session.image.fresh(5.0) == {}
+    assert session.image.age("ACC") >= 60
+    # what the line has told before is as old as it is, however late it is asked for
+    session.image.confirm("DEC", 40, clock.of_line(time.monotonic()))
+    assert session.image.age("DEC") < 60
+
+
+async def test_a_sleeper_wakes_when_the_clock_is_moved_on() -> None:
+    clock = FakeClock()
+    sleeper = asyncio.create_task(clock.sleep(3600))
+    await asyncio.sleep(0.02)
+    assert not sleeper.done()
+    clock.advance(3600)
+    await asyncio.wait_for(sleeper, 20)
