@@ -12,13 +12,13 @@ from typing import cast
 import pytest
 
 import tui.session
-from tui.bus.line import Line
+from tui.bus.limits import Limits
+from tui.bus.line import Line, LineState, LineStatus
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR
 from tui.session.drive import DriveSession
 
 from .fake_clock import FakeClock
-from .test_work import Loop
 
 OWN_TIME = {"clock.py", "journal.py", "events.py", "command/stop.py"}
 """Modules that look at the real clock: the journal's own thread, a thread that waits for a stop."""
@@ -46,10 +46,20 @@ def test_a_session_counts_by_the_clock_that_it_was_given() -> None:
     assert {name: places for name, places in found.items() if places} == {}
 
 
+class ConnectedLine:
+    """A line on which nothing happens."""
+
+    read_only = False
+    state = LineState(LineStatus.CONNECTED, "", 0.0)
+
+    def describe(self, _device: int, _limits: Limits) -> None:
+        """What a device may be sent does not matter here."""
+
+
 @pytest.fixture
 def session() -> DriveSession:
     """A drive on a line that sends nothing, by a clock that the test moves on."""
-    line = cast("Line", Loop())
+    line = cast("Line", ConnectedLine())
     return DriveSession(line, 1, library.load("atv71"), clock=FakeClock())
 
 

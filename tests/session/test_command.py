@@ -9,7 +9,6 @@ from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
 from decimal import Decimal
 from pathlib import Path
-from types import SimpleNamespace
 from typing import NamedTuple
 
 import pytest
@@ -19,7 +18,6 @@ from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
-from tui.session import arming
 from tui.session.arming import ARMED_FOR
 from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
@@ -192,16 +190,13 @@ async def test_nothing_is_commanded_before_arming() -> None:
         assert made.writes() == []
 
 
-async def test_arming_ends_by_itself(monkeypatch: pytest.MonkeyPatch) -> None:
-    later = [0.0]
-    clock = SimpleNamespace(monotonic=lambda: time.monotonic() + later[0])
-    monkeypatch.setattr(arming, "time", clock)
+async def test_arming_ends_by_itself() -> None:
     async with bench("atv71") as made:
-        later[0] += ARMED_FOR - 20
+        made.clock.advance(ARMED_FOR - 20)
         made.session.arming.touch()
-        later[0] += ARMED_FOR - 20
+        made.clock.advance(ARMED_FOR - 20)
         assert made.commander.armed_for is not None
-        later[0] += 20
+        made.clock.advance(20)
         assert made.commander.armed_for is None
         assert "No key" in made.session.arming.why_disarmed
         with pytest.raises(OrderRefused, match="No key"):

@@ -19,6 +19,8 @@ from tui.session.journal import Journal
 from tui.session.read.reader import Reader
 from tui.simulator import DriveSpec, Simulation
 
+from .fake_clock import FakeClock, let_go_until
+
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 Start = Callable[..., tuple[Simulation, Line]]
 
@@ -50,14 +52,15 @@ def journal() -> Iterator[Journal]:
     made.close()
 
 
-async def ended(stopper: Stopper, device: int, seconds: float = 30.0) -> StopReport:
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
+async def ended(stopper: Stopper, device: int, clock: FakeClock | None = None) -> StopReport:
+    """The report of a stop that has ended; with a clock, its time is let go by."""
+
+    def over() -> bool:
         report = stopper.reports.get(device)
-        if report and report.phase in (Phase.STOPPED, Phase.FAILED):
-            return report
-        await asyncio.sleep(0.02)
-    raise AssertionError(f"the stop did not end: {stopper.reports.get(device)}")
+        return report is not None and report.phase in (Phase.STOPPED, Phase.FAILED)
+
+    await let_go_until(clock or FakeClock(), over)
+    return stopper.reports[device]
 
 
 def writes(line: Line) -> list[tuple[int, int]]:
@@ -157,9 +160,9 @@ async def test_a_locked_leroy_somer_is_not_unlocked_by_a_stop(
 async def test_a_drive_commanded_from_elsewhere_is_told_of(start: Start, journal: Journal) -> None:
     simulation, line = start(DriveSpec("powerdrive", 1, run_hz=20.0))
     await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
-    stopper = Stopper(line, journal)
-    stopper.stop([DriveSession(line, 1, library.load("powerdrive"))])
-    report = await ended(stopper, 1)
+    stopper, clock = Stopper(line, journal), FakeClock()
+    stopper.stop([DriveSession(line, 1, library.load("powerdrive"), clock=clock)])
+    report = await ended(stopper, 1, clock)
     assert report.phase is Phase.FAILED
     assert "commanded from elsewhere" in report.text
 

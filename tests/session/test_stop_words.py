@@ -21,6 +21,7 @@ from tui.session.settings.write import Writer
 from tui.session.work import Stopped
 from tui.simulator import DriveSpec
 
+from .fake_clock import FakeClock
 from .test_stop import Start, ended, journal, start, wait_for, writes
 
 __all__ = ["journal", "start"]
@@ -124,13 +125,14 @@ async def test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped(
     """Run at the terminals with reference 0: the next touch of the potentiometer turns it."""
     simulation, line = start(DriveSpec("atv71", 1, sets={"FR1": 1}))
     simulation.drive(1).run(0.0)
-    session = DriveSession(line, 1, ATV71)
+    clock = FakeClock()
+    session = DriveSession(line, 1, ATV71, clock=clock)
     chart = session.profile.data.charts[0]
     await Reader(session).read([chart.status])
     assert session.state(5.0).kind == "running"
     stopper = Stopper(line, journal)
     stopper.stop([session])
-    report = await ended(stopper, 1)
+    report = await ended(stopper, 1, clock)
     assert report.phase is Phase.FAILED
     assert "0 Hz" in report.text
     assert "still enabled from its terminals or keypad" in report.text
