@@ -32,12 +32,11 @@ from .requests import (
     WriteOne,
     diagnostic_of,
     objects_of,
-    words_of,
 )
 from .schedule.engine import Engine
 from .schedule.pace import Pace
 from .schedule.patience import Devices
-from .schedule.queue import Answer, Job
+from .schedule.queue import Job
 from .schedule.worker import ThreadWork, Worker
 from .trace import Frame
 
@@ -131,8 +130,7 @@ class Line:
         self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
     ) -> Reply:
         """Read `count` registers by function 3."""
-        answer = await self._ask(Read(device, address, count), priority)
-        return Reply(words_of(answer.pdu), answer.time)
+        return await self._ask(Read(device, address, count), priority)
 
     async def write(
         self,
@@ -156,8 +154,8 @@ class Line:
         """
         limits = self._devices[device].limits
         request = _write(device, address, values, multiple, limits.functions)
-        answer = await self._ask(request, priority, replaceable=replaceable, forbidden=forbidden)
-        return answer.time
+        reply = await self._ask(request, priority, replaceable=replaceable, forbidden=forbidden)
+        return reply.time
 
     async def read_write(
         self,
@@ -172,8 +170,7 @@ class Line:
     ) -> Reply:
         """Write registers, then read `count` others, by function 23, once; see `write`."""
         request = ReadWrite(device, read_address, count, write_address, tuple(values))
-        answer = await self._ask(request, priority, forbidden=forbidden)
-        return Reply(words_of(answer.pdu), answer.time)
+        return await self._ask(request, priority, forbidden=forbidden)
 
     async def diagnose(
         self,
@@ -184,8 +181,7 @@ class Line:
         priority: Priority = Priority.OPERATOR_READ,
     ) -> int:
         """Ask by function 8; returns the data word of the answer."""
-        answer = await self._ask(Diagnose(device, subfunction, data), priority)
-        return diagnostic_of(answer.pdu)
+        return diagnostic_of((await self._ask(Diagnose(device, subfunction, data), priority)).pdu)
 
     async def identify(
         self, device: int, *, priority: Priority = Priority.OPERATOR_READ
@@ -237,8 +233,8 @@ class Line:
         *,
         replaceable: bool = False,
         forbidden: Callable[[], str] | None = None,
-    ) -> Answer:
-        """Check a request, queue it, await its answer."""
+    ) -> Reply:
+        """Check a request, queue it, await its reply."""
         limits = limits or self._devices[request.device].limits
         reason = send_refusal(request, limits, read_only=self.read_only)
         if reason:

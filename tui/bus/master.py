@@ -32,16 +32,6 @@ class Sending:
     skip: int = 0
 
 
-@dataclass(frozen=True, slots=True)
-class Exchange:
-    """How a request ended; `sent` when its last byte left, `end` when the last byte came."""
-
-    verdict: ExchangeResult
-    sent: float
-    end: float
-    turnaround: float = 0.0
-
-
 @dataclass(slots=True)
 class LineContext:
     """What a master notes its doings in."""
@@ -65,14 +55,14 @@ class Master(Protocol):
     async def quiet(self) -> None:
         """Wait until the next request may be sent. Raises LineLost."""
 
-    async def exchange(self, sending: Sending) -> Exchange:
+    async def exchange(self, sending: Sending) -> ExchangeResult:
         """Send a request and await its end. Raises LineLost."""
 
     def close(self) -> None:
         """Give the line back."""
 
 
-def settle(future: asyncio.Future[ExchangeResult] | None, verdict: ExchangeResult) -> None:
-    """Give a verdict to whoever waits for it."""
+def settle(future: asyncio.Future[ExchangeResult] | None, result: ExchangeResult) -> None:
+    """Give a result to whoever waits for it."""
     if future is not None and not future.done():
-        future.set_result(verdict)
+        future.set_result(result)

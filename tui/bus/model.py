@@ -61,10 +61,13 @@ class DeviceState:
 
 @dataclass(frozen=True, slots=True)
 class Reply:
-    """Words of a checked reply; `time` when its last byte was on the wire."""
+    """A checked reply; `time` when its last byte was on the wire."""
 
     words: tuple[int, ...]
+    """What it brings, where that is registers."""
     time: float
+    pdu: bytes = b""
+    """Function and data as they came; empty where nobody answers a broadcast."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -56,6 +56,10 @@ class Request(ABC):
         """Whether the request changes anything in the device; such a request is sent once."""
         return False
 
+    def words(self, _pdu: bytes) -> tuple[int, ...]:
+        """The registers that a checked reply brings; none where the function reads none."""
+        return ()
+
     def pdu(self) -> bytes:
         """Function code and data as they go on the wire."""
         return bytes([self.function]) + self.message().encode()
@@ -74,6 +78,9 @@ class Read(Request):
 
     def expectation(self) -> Expectation:
         return _words_expected(self.function, self.count)
+
+    def words(self, pdu: bytes) -> tuple[int, ...]:
+        return words_of(pdu)
 
     @property
     def register(self) -> int:
@@ -149,6 +156,9 @@ class ReadWrite(Request):
 
     def expectation(self) -> Expectation:
         return _words_expected(self.function, self.count)
+
+    def words(self, pdu: bytes) -> tuple[int, ...]:
+        return words_of(pdu)
 
     @property
     def register(self) -> int:

@@ -38,7 +38,7 @@ class ResultKind(Enum):
 
 @dataclass(slots=True)
 class ExchangeResult:
-    """The end of an exchange, with everything that was received."""
+    """The end of an exchange, with everything that was received; times on the line's clock."""
 
     kind: ResultKind
     pdu: bytes = b""
@@ -51,3 +51,9 @@ class ExchangeResult:
     """Whether the reply was found behind or between other bytes."""
     recognised: bool = False
     """Of damaged bytes: whether they are surely what is left of the reply."""
+    sent: float = 0.0
+    """When the last byte of the request left."""
+    end: float = 0.0
+    """When the last byte came, or the time was up."""
+    turnaround: float = 0.0
+    """Seconds from the end of the request to the start of its reply."""

@@ -47,7 +47,7 @@ class RtuExchange:
         return self._expectation is not None
 
     def feed(self, data: bytes) -> ExchangeResult | None:
-        """Take received bytes; the verdict once the reply is whole."""
+        """Take received bytes; the result once the reply is whole."""
         self.buffer += data
         if self._expectation is None:
             return None
@@ -59,10 +59,10 @@ class RtuExchange:
             return self._answered(match)
         return None
 
-    def pass_over(self, verdict: ExchangeResult) -> ExchangeResult | None:
+    def pass_over(self, result: ExchangeResult) -> ExchangeResult | None:
         """The reply just found cannot be that of this request; the next one, if it is there."""
         assert self._expectation is not None
-        self._skipped_to = self.buffer.find(verdict.pdu, self._skipped_to) + len(verdict.pdu) + 2
+        self._skipped_to = self.buffer.find(result.pdu, self._skipped_to) + len(result.pdu) + 2
         return self.feed(b"")
 
     def _find(self, expectation: Expectation) -> Match | None:
@@ -150,21 +150,21 @@ class RtuExchange:
         elif not self.buffer:
             self.echo = False
         loose = self._loose()
-        verdict = ExchangeResult(
+        result = ExchangeResult(
             ResultKind.NOTHING,
             received=bytes(self.buffer),
             strays=[piece for piece in loose if piece.whole],
         )
         if self._expectation is None:
-            return verdict
-        own = [piece for piece in verdict.strays if piece.device == self._device]
+            return result
+        own = [piece for piece in result.strays if piece.device == self._device]
         if own:
-            verdict.kind = ResultKind.WRONG
-            verdict.detail = self._expectation.mismatch(own[0].pdu)
+            result.kind = ResultKind.WRONG
+            result.detail = self._expectation.mismatch(own[0].pdu)
         elif any(not piece.whole and len(piece.data) >= NOISE for piece in loose):
-            verdict.kind = ResultKind.DAMAGED
+            result.kind = ResultKind.DAMAGED
         elif self._mirrored and copied and self.echo is None:
-            verdict.kind = ResultKind.UNSURE
+            result.kind = ResultKind.UNSURE
         elif self._mirrored and copied:
-            verdict.detail = "only the adapter's echo of it came back"
-        return verdict
+            result.detail = "only the adapter's echo of it came back"
+        return result

@@ -10,7 +10,7 @@ from tui.wire.frames import MAX_FRAME, frame
 
 from ..errors import LineLost
 from ..link import Link, RtuTcpLink, character_time, silence
-from ..master import Exchange, LineContext, Sending, settle
+from ..master import LineContext, Sending, settle
 from ..result import ExchangeResult, ResultKind
 from ..transport.base import Transport
 from .exchange import RtuExchange
@@ -74,23 +74,23 @@ class RtuMaster:
             del self._idle[:-IDLE_LIMIT]
             self._start_timer(self._gap, self._sort_idle)
             return
-        verdict = self._exchange.feed(data)
-        while verdict is not None and self._came_too_early(verdict, time):
-            verdict = self._exchange.pass_over(verdict)
-        if verdict is not None:
-            settle(self._done, verdict)
+        result = self._exchange.feed(data)
+        while result is not None and self._came_too_early(result, time):
+            result = self._exchange.pass_over(result)
+        if result is not None:
+            settle(self._done, result)
         elif self._exchange.expected:
             # the echo of a long request may come in lumps while it is still being sent
             self._start_timer(max(time, self._sent) + self._gap - time, self._fell_silent)
 
-    def _came_too_early(self, verdict: ExchangeResult, time: float) -> bool:
+    def _came_too_early(self, result: ExchangeResult, time: float) -> bool:
         """Whether a reply began before its request was over: then it is that of another one.
 
         Only where the line is known to keep the time of its baud: a pseudo-terminal does not.
         """
-        if verdict.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
+        if result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
             return False
-        begun = time - (len(verdict.pdu) + 3) * self._character
+        begun = time - (len(result.pdu) + 3) * self._character
         early = begun < self._sent - TOLERANCE
         self._early.append(early)
         seldom = sum(self._early) <= len(self._early) * SELDOM
@@ -122,7 +122,7 @@ class RtuMaster:
             await self._transport.rest(min(until, give_up))
         raise self.failure
 
-    async def exchange(self, sending: Sending) -> Exchange:
+    async def exchange(self, sending: Sending) -> ExchangeResult:
         """Send a request and await its reply, its remains, or the end of its time."""
         clock, tally = self._around.clock, self._around.tally
         data = frame(sending.device, sending.pdu)
@@ -141,17 +141,19 @@ class RtuMaster:
             tally.requests += 1
             tally.bytes_out += len(data)
             self._around.trace.add(begun, "out", data)
-            verdict = await self._verdict(exchange, sending)
+            result = await self._result(exchange, sending)
         finally:
             self._exchange = self._done = None
             self._stop_timer()
         self.echo = exchange.echo
-        end = clock() if verdict.kind is ResultKind.NOTHING else self._last
+        end = clock() if result.kind is ResultKind.NOTHING else self._last
         tally.busy_seconds += clock() - begun
-        tally.resyncs += verdict.resynchronised
-        self._log(verdict, data, sending.device, end)
-        reply = (len(verdict.pdu) + 3) * self._character
-        return Exchange(verdict, self._sent, end, max(0.0, end - self._sent - reply))
+        tally.resyncs += result.resynchronised
+        self._log(result, data, sending.device, end)
+        reply = (len(result.pdu) + 3) * self._character
+        result.sent, result.end = self._sent, end
+        result.turnaround = max(0.0, end - self._sent - reply)
+        return result
 
     async def _send(self, data: bytes) -> None:
         try:
@@ -162,8 +164,8 @@ class RtuMaster:
                 self.lost(str(error.strerror or error))
             raise self.failure or LineLost("The line was lost.") from error
 
-    async def _verdict(self, exchange: RtuExchange, sending: Sending) -> ExchangeResult:
-        """Wait for the verdict; while bytes are coming in, a little over the time-out."""
+    async def _result(self, exchange: RtuExchange, sending: Sending) -> ExchangeResult:
+        """Wait for the result; while bytes are coming in, a little over the time-out."""
         assert self._done is not None
         clock, expectation = self._around.clock, sending.expectation
         if expectation is None:
@@ -187,9 +189,9 @@ class RtuMaster:
     def _fell_silent(self) -> None:
         self._timer = None
         if self._exchange is not None:
-            verdict = self._exchange.silent()
-            if verdict is not None:
-                settle(self._done, verdict)
+            result = self._exchange.silent()
+            if result is not None:
+                settle(self._done, result)
 
     def _sort_idle(self) -> None:
         """Look at what came in while nothing was due."""
@@ -204,22 +206,22 @@ class RtuMaster:
                 self._around.tally.stale += 1
                 self._around.stray(piece, self._last)
 
-    def _log(self, verdict: ExchangeResult, request: bytes, device: int, time: float) -> None:
+    def _log(self, result: ExchangeResult, request: bytes, device: int, time: float) -> None:
         trace = self._around.trace
-        if not verdict.received:
+        if not result.received:
             return
-        if verdict.pdu and len(verdict.received) == len(verdict.pdu) + 3:
-            trace.add(time, "in", verdict.received)
+        if result.pdu and len(result.received) == len(result.pdu) + 3:
+            trace.add(time, "in", result.received)
             return
-        for piece in pieces(verdict.received):
-            if piece.data == request and piece.pdu != verdict.pdu:
-                note = "echo or answer" if verdict.kind is ResultKind.UNSURE else "echo"
+        for piece in pieces(result.received):
+            if piece.data == request and piece.pdu != result.pdu:
+                note = "echo or answer" if result.kind is ResultKind.UNSURE else "echo"
             elif not piece.whole:
-                note = "damaged" if verdict.kind is ResultKind.DAMAGED else "noise"
+                note = "damaged" if result.kind is ResultKind.DAMAGED else "noise"
             elif piece.device != device:
                 note = f"of device {piece.device}"
             else:
-                note = "" if piece.pdu == verdict.pdu else "not the reply"
+                note = "" if piece.pdu == result.pdu else "not the reply"
             trace.add(time, "in", piece.data, note)
 
     def _start_timer(self, delay: float, action: Callable[[], None]) -> None:

@@ -16,13 +16,13 @@ from ..errors import (
     WrongReply,
 )
 from ..limits import STANDARD_EXCEPTIONS
-from ..master import Exchange, Master, MonotonicClock, Sending
+from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import BROADCAST, Read
-from ..result import Piece, ResultKind
+from ..result import ExchangeResult, Piece, ResultKind
 from ..tally import Tally
 from .patience import Devices
-from .queue import Answer, Job, JobQueue
+from .queue import Job, JobQueue
 
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""
@@ -128,11 +128,11 @@ class Dispatcher:
             return
         begun = self._clock()
         try:
-            outcome = await master.exchange(self._sending(job))
-            if outcome.verdict.kind is ResultKind.UNSURE:
-                outcome = await self._resolve_echo(master, job, outcome)
-            if self._is_repeat(job, outcome):
-                outcome = await self._ask_again(master, job, outcome)
+            result = await master.exchange(self._sending(job))
+            if result.kind is ResultKind.UNSURE:
+                await self._resolve_echo(master, job, result)
+            if self._is_repeat(job, result):
+                result = await self._ask_again(master, job, result)
         except LineLost:
             # failed with the others, once the line's state says that it is lost
             self._queue.put_back(job)
@@ -146,7 +146,7 @@ class Dispatcher:
         except BaseException as error:
             job.fail(LineError(_with_fate(job, f"The request failed: {error!r}.")))
             raise
-        self._conclude(job, outcome)
+        self._conclude(job, result)
 
     def _sending(self, job: Job) -> Sending:
         request = job.request
@@ -162,9 +162,9 @@ class Dispatcher:
             skip,
         )
 
-    async def _resolve_echo(self, master: Master, job: Job, outcome: Exchange) -> Exchange:
+    async def _resolve_echo(self, master: Master, job: Job, result: ExchangeResult) -> None:
         """Tell an echo from an answer that repeats its request: see what a read comes back as."""
-        request, verdict = job.request, outcome.verdict
+        request = job.request
         if Read.function in job.limits.functions:
             probe = Read(request.device, request.register, 1)
             await master.quiet()
@@ -173,81 +173,75 @@ class Dispatcher:
                 Sending(request.device, probe.pdu(), probe.expectation(), time_out)
             )
         if master.echo is False:
-            verdict.kind, verdict.pdu = ResultKind.REPLY, job.pdu
+            result.kind, result.pdu = ResultKind.REPLY, job.pdu
         else:
-            verdict.kind = ResultKind.NOTHING
-            verdict.detail = "only the adapter's echo of it came back"
-        return outcome
+            result.kind = ResultKind.NOTHING
+            result.detail = "only the adapter's echo of it came back"
 
-    def _is_repeat(self, job: Job, outcome: Exchange) -> bool:
+    def _is_repeat(self, job: Job, result: ExchangeResult) -> bool:
         """Whether a reply may be a copy of the one before."""
-        verdict = outcome.verdict
-        return verdict.kind is ResultKind.REPLY and self._devices.is_repeat(
-            job.request.device, job.pdu, verdict.pdu, outcome.turnaround
+        return result.kind is ResultKind.REPLY and self._devices.is_repeat(
+            job.request.device, job.pdu, result.pdu, result.turnaround
         )
 
-    async def _ask_again(self, master: Master, job: Job, doubted: Exchange) -> Exchange:
+    async def _ask_again(self, master: Master, job: Job, doubted: ExchangeResult) -> ExchangeResult:
         """The same once more: whichever of its two replies comes first, it is the right one."""
         await master.quiet()
-        outcome = await master.exchange(self._sending(job))
-        if outcome.verdict.pdu != doubted.verdict.pdu and job.expectation is not None:
+        result = await master.exchange(self._sending(job))
+        if result.pdu != doubted.pdu and job.expectation is not None:
             # it was a copy: one more reply to this request is on its way
             device, now = job.request.device, self._clock()
-            self._devices.may_come(device, job.expectation, outcome.sent, now)
-        self._note_strays(doubted.verdict.strays, doubted.end)
-        return outcome
+            self._devices.may_come(device, job.expectation, result.sent, now)
+        self._note_strays(doubted.strays, doubted.end)
+        return result
 
-    def _conclude(self, job: Job, outcome: Exchange) -> None:
+    def _conclude(self, job: Job, result: ExchangeResult) -> None:
         """Note what became of a request, and hand it back or send it again."""
-        request, verdict, now = job.request, outcome.verdict, self._clock()
+        request, now = job.request, self._clock()
         if job.expectation is None:
-            self._note_strays(verdict.strays, outcome.end)
-            job.finish(Answer(b"", outcome.sent))
+            self._note_strays(result.strays, result.end)
+            job.finish(b"", result.sent)
             return
-        if verdict.kind is ResultKind.EXCEPTION and self._is_gateways(job, verdict.exception):
-            verdict.kind, verdict.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
-        if verdict.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
+        if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
+            result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
+        if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
             self._tally.replies += 1
-            exchanged = (job.pdu, verdict.pdu)
+            exchanged = (job.pdu, result.pdu)
             self._devices.answered(
-                request.device, job.expectation, outcome.turnaround, now, exchanged
+                request.device, job.expectation, result.turnaround, now, exchanged
             )
-        unexplained = self._note_strays(verdict.strays, outcome.end)
-        if (
-            verdict.kind is ResultKind.WRONG
-            and verdict.strays
-            and request.device not in unexplained
-        ):
-            verdict.kind = ResultKind.NOTHING
-        match verdict.kind:
+        unexplained = self._note_strays(result.strays, result.end)
+        if result.kind is ResultKind.WRONG and result.strays and request.device not in unexplained:
+            result.kind = ResultKind.NOTHING
+        match result.kind:
             case ResultKind.REPLY:
-                job.finish(Answer(verdict.pdu, outcome.end))
+                job.finish(result.pdu, result.end)
             case ResultKind.EXCEPTION:
                 self._tally.exceptions += 1
-                job.fail(self._exception(job, verdict.exception))
+                job.fail(self._exception(job, result.exception))
             case _:
-                self._failed(job, outcome, now)
+                self._failed(job, result, now)
 
-    def _failed(self, job: Job, outcome: Exchange, now: float) -> None:
-        request, verdict, expectation = job.request, outcome.verdict, job.expectation
+    def _failed(self, job: Job, result: ExchangeResult, now: float) -> None:
+        request, expectation = job.request, job.expectation
         assert expectation is not None
         place = (request.device, request.function, request.register)
         error: LineError
-        match verdict.kind:
+        match result.kind:
             case ResultKind.DAMAGED:
                 self._tally.checksum += 1
-                if not verdict.recognised:
-                    self._devices.may_come(request.device, expectation, outcome.sent, now)
-                error = ChecksumFault(*place, received=verdict.received)
+                if not result.recognised:
+                    self._devices.may_come(request.device, expectation, result.sent, now)
+                error = ChecksumFault(*place, received=result.received)
             case ResultKind.WRONG:
                 self._tally.wrong += 1
-                self._devices.may_come(request.device, expectation, outcome.sent, now)
-                error = WrongReply(*place, verdict.detail, verdict.received)
+                self._devices.may_come(request.device, expectation, result.sent, now)
+                error = WrongReply(*place, result.detail, result.received)
             case _:
                 self._tally.timeouts += 1
-                self._devices.silent(request.device, expectation, outcome.sent, now)
-                error = NoAnswer(*place, self._no_answer(job, verdict.detail))
-        if self._is_repeated(job, verdict.kind):
+                self._devices.silent(request.device, expectation, result.sent, now)
+                error = NoAnswer(*place, self._no_answer(job, result.detail))
+        if self._is_repeated(job, result.kind):
             job.repeats += 1
             self._queue.put_back(job)
             self._wake.set()

@@ -10,16 +10,8 @@ from dataclasses import dataclass, field
 from ..errors import LineBusy, LineError, Superseded
 from ..expectation import Expectation
 from ..limits import Limits
-from ..model import Priority
+from ..model import Priority, Reply
 from ..requests import BROADCAST, Request
-
-
-@dataclass(frozen=True, slots=True)
-class Answer:
-    """A checked reply without device and checksum; `time` when its last byte was there."""
-
-    pdu: bytes
-    time: float
 
 
 @dataclass(eq=False, slots=True)
@@ -29,7 +21,7 @@ class Job:
     request: Request
     priority: Priority
     limits: Limits
-    answer: Future[Answer] = field(default_factory=Future)
+    answer: Future[Reply] = field(default_factory=Future)
     repeats: int = 0
     """How often it has been sent again."""
     pdu: bytes = b""
@@ -55,9 +47,9 @@ class Job:
             self.begun = True
             self.answer.set_exception(error)
 
-    def finish(self, answer: Answer) -> None:
-        """Hand back the answer."""
-        self.answer.set_result(answer)
+    def finish(self, pdu: bytes, time: float) -> None:
+        """Hand back a checked reply, without device and checksum."""
+        self.answer.set_result(Reply(self.request.words(pdu), time, pdu))
 
 
 class JobQueue:

@@ -10,7 +10,7 @@ from pymodbus.pdu import DecodePDU
 
 from ..errors import LineLost
 from ..expectation import exception_code
-from ..master import Exchange, LineContext, Sending, settle
+from ..master import LineContext, Sending, settle
 from ..result import ExchangeResult, ResultKind
 from ..transport.base import Transport
 
@@ -67,10 +67,10 @@ class TcpMaster:
             self._around.tally.stale += 1
             self._around.trace.add(time, "in", unit, "late or repeated")
             return
-        verdict = _verdict(unit, sending)
-        note = "" if verdict.kind in (ResultKind.REPLY, ResultKind.EXCEPTION) else "not the reply"
+        result = _result(unit, sending)
+        note = "" if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION) else "not the reply"
         self._around.trace.add(time, "in", unit, note)
-        settle(self._done, verdict)
+        settle(self._done, result)
 
     def _is_ours(self, unit: bytes) -> bool:
         awaited = self._done is not None and not self._done.done()
@@ -96,7 +96,7 @@ class TcpMaster:
         if self.failure is not None:
             raise self.failure
 
-    async def exchange(self, sending: Sending) -> Exchange:
+    async def exchange(self, sending: Sending) -> ExchangeResult:
         """Send a request and await the reply of its transaction."""
         clock, tally = self._around.clock, self._around.tally
         self._transaction = self._transaction % 0xFFFF + 1
@@ -109,15 +109,16 @@ class TcpMaster:
             tally.requests += 1
             tally.bytes_out += len(data)
             self._around.trace.add(begun, "out", data)
-            verdict = await self._verdict(sending)
+            result = await self._result(sending)
         finally:
             self._sending = self._done = None
-        end = clock() if verdict.kind is ResultKind.NOTHING else self._last
+        end = clock() if result.kind is ResultKind.NOTHING else self._last
         tally.busy_seconds += clock() - begun
-        if verdict.kind is ResultKind.NOTHING and self._buffer:
+        if result.kind is ResultKind.NOTHING and self._buffer:
             # half a reply, or a length that is wrong: what follows could not be told apart
             self._reset("a reply broke off")
-        return Exchange(verdict, begun, end, max(0.0, end - begun))
+        result.sent, result.end, result.turnaround = begun, end, max(0.0, end - begun)
+        return result
 
     async def _send(self, data: bytes) -> None:
         try:
@@ -126,7 +127,7 @@ class TcpMaster:
             self.lost(str(error.strerror or error))
             raise self.failure or LineLost("The line was lost.") from error
 
-    async def _verdict(self, sending: Sending) -> ExchangeResult:
+    async def _result(self, sending: Sending) -> ExchangeResult:
         assert self._done is not None
         if sending.expectation is None:
             self._hold = self._around.clock() + self._around.timing.turnaround_delay
@@ -137,7 +138,7 @@ class TcpMaster:
         return self._done.result() if self._done.done() else ExchangeResult(ResultKind.NOTHING)
 
 
-def _verdict(unit: bytes, sending: Sending) -> ExchangeResult:
+def _result(unit: bytes, sending: Sending) -> ExchangeResult:
     """What a reply with the right transaction id is."""
     expectation = sending.expectation
     assert expectation is not None
