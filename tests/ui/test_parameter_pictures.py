@@ -17,7 +17,7 @@ from tui.screens.parameters.screen import ParametersScreen
 from tui.screens.parameters.view import news_lines
 from tui.session.console import DriveConsole
 from tui.session.drive_state import DriveState
-from tui.session.image import Raw
+from tui.session.reading import Reading
 from tui.session.settings.apply import EditOutcome, Result
 from tui.session.settings.editor import Editor
 from tui.session.settings.favourites import Marks
@@ -64,9 +64,10 @@ def editor_of(
     editor.marks = Marks(favourites=("ACC", "HSP"))
     rest = {} if reading else {p.code: 0 for p in profile.parameters if p.access != "w"}
     image = console.session.image
-    image.take({code: Raw(fakes.NOW, raw) for code, raw in {**rest, **state, **HELD}.items()})
+    for code, raw in {**rest, **state, **HELD}.items():
+        image.confirm(code, raw, fakes.NOW)
     if not reading:
-        image.take({"SPAT": Raw(fakes.NOW, None, "exception 2")})
+        image.take({"SPAT": Reading.bad(profile["SPAT"], fakes.NOW, "exception 2")})
     console.editor = editor
     return console
 
@@ -197,7 +198,9 @@ def test_another_hands_value_is_told_as_the_drive_counts_it() -> None:
     console = fakes.console_of(None, family="atv31")
     editor = still_editor(console, lambda: None)
     image = console.session.image
-    image.take({"ACC": Raw(1.0, 50), "Inr": Raw(1.0, None, "exception 2", absent=True)})
+    image.confirm("ACC", 50, 1.0)
+    increment = console.session.profile["Inr"]
+    image.take({"Inr": Reading.bad(increment, 1.0, "exception 2", absent=True)})
     editor.staging.stage("ACC", "7 s")
     image.confirm("ACC", 30, 2.0)
     said = "\n".join(line.plain for line in news_lines(editor, "ACC", Text(""), 100))

@@ -39,7 +39,7 @@ class DriveSession:
         self.identity = identity
         self.clock = clock
         """What everything that is done with the drive counts by."""
-        self.image = RegisterImage(clock)
+        self.image = RegisterImage(profile, clock)
         """What is known of its registers."""
         self.arming = Arming(line, clock)
         """Whether it may be written to from here."""

@@ -1,6 +1,7 @@
 """What is known of a drive's registers: raw values that the drive itself has told, and when.
 
-Only replies of the drive come in here. A write makes its word unknown until it is read back.
+Only replies of the drive come in here, as readings without a value: what scales them may change.
+A write makes its word unknown until it is read back.
 """
 
 from __future__ import annotations
@@ -8,43 +9,23 @@ from __future__ import annotations
 import math
 import threading
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
-from enum import StrEnum
+from dataclasses import dataclass
 from types import MappingProxyType
 
+from tui.drive.profile.profile import Profile
+
 from .clock import REAL_CLOCK, Clock
-
-
-class Origin(StrEnum):
-    """Why a register was read."""
-
-    POLL = "poll"
-    READ = "read"
-    READ_BACK = "read back"
-
-
-@dataclass(frozen=True, slots=True)
-class Raw:
-    """A raw value with the time it was on the wire (monotonic), or why there is none."""
-
-    time: float
-    raw: int | None
-    error: str = ""
-    absent: bool = False
-    """True where the drive itself said that it has no such word."""
-    silent: bool = False
-    """True where the drive met the request with silence while it answers others."""
-    origin: Origin = Origin.READ
+from .reading import Origin, Reading
 
 
 @dataclass(frozen=True, slots=True)
 class _State:
     """Everything at one moment; replaced as a whole, so that any thread may look."""
 
-    held: Mapping[str, Raw]
+    held: Mapping[str, Reading]
     raws: Mapping[str, int]
     trusted: Mapping[str, int]
-    refused: Mapping[str, Raw]
+    refused: Mapping[str, Reading]
 
 
 _EMPTY = _State({}, MappingProxyType({}), MappingProxyType({}), {})
@@ -56,7 +37,8 @@ class RegisterImage:
     A newer reply counts, however late an older one is handed in.
     """
 
-    def __init__(self, clock: Clock = REAL_CLOCK) -> None:
+    def __init__(self, profile: Profile, clock: Clock = REAL_CLOCK) -> None:
+        self._profile = profile
         self._clock = clock
         self._lock = threading.Lock()
         self._now = _EMPTY
@@ -75,7 +57,7 @@ class RegisterImage:
         return self._now.trusted
 
     @property
-    def refused(self) -> Mapping[str, Raw]:
+    def refused(self) -> Mapping[str, Reading]:
         """The registers that the drive refused, or met with silence, when they were last read."""
         return self._now.refused
 
@@ -84,21 +66,21 @@ class RegisterImage:
         """Codes that the drive itself said it does not have."""
         return frozenset(code for code, one in self._now.refused.items() if one.absent)
 
-    def get(self, code: str) -> Raw | None:
+    def get(self, code: str) -> Reading | None:
         """What is held of a register; None where it was never read, or is unknown by now."""
         return self._now.held.get(code)
 
     def age(self, code: str) -> float:
         """Seconds since a register's value was on the wire; infinite where it is not known."""
         held = self._now.held.get(code)
-        return math.inf if held is None else max(0.0, self._clock.monotonic() - held.time)
+        return math.inf if held is None else held.age(self._clock.monotonic())
 
     def fresh(self, longest: float) -> dict[str, int]:
         """Trusted raw values no older than so many seconds."""
         state, oldest = self._now, self._clock.monotonic() - longest
         return {c: raw for c, raw in state.trusted.items() if state.held[c].time >= oldest}
 
-    def take(self, found: Mapping[str, Raw], origin: Origin = Origin.READ) -> None:
+    def take(self, found: Mapping[str, Reading]) -> None:
         """Keep replies of the drive: values, and refusals."""
         with self._lock:
             held, refused = dict(self._now.held), dict(self._now.refused)
@@ -113,12 +95,12 @@ class RegisterImage:
                 if one.raw is None:
                     refused[code] = one
                 else:
-                    held[code] = replace(one, origin=origin)
+                    held[code] = one
             self._set(held, refused)
 
     def confirm(self, code: str, raw: int, time: float, origin: Origin = Origin.READ_BACK) -> None:
         """Keep one raw value that was read at a time on the monotonic clock."""
-        self.take({code: Raw(time, raw)}, origin)
+        self.take({code: Reading.undecoded(self._profile[code], raw, time, origin)})
 
     def doubt(self, code: str) -> None:
         """A word is being written: what it holds is unknown until it is read again."""
@@ -127,7 +109,7 @@ class RegisterImage:
             held = {c: one for c, one in self._now.held.items() if c != code}
             self._set(held, self._now.refused)
 
-    def believe(self, code: str, before: Raw | None) -> None:
+    def believe(self, code: str, before: Reading | None) -> None:
         """The write of a word was never sent: what was known of it before still holds."""
         with self._lock:
             self._doubted = {c: at for c, at in self._doubted.items() if c != code}
@@ -149,7 +131,7 @@ class RegisterImage:
             kept = {} if gone is None else {c: one for c, one in held if c not in gone}
             self._set(kept, {} if gone is None else self._now.refused)
 
-    def _set(self, held: Mapping[str, Raw], refused: Mapping[str, Raw]) -> None:
+    def _set(self, held: Mapping[str, Reading], refused: Mapping[str, Reading]) -> None:
         raws = {code: one.raw for code, one in held.items() if one.raw is not None}
         since = self._trusted_from
         trusted = {code: raw for code, raw in raws.items() if held[code].time >= since}

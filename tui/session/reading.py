@@ -26,9 +26,21 @@ class Quality(StrEnum):
     BAD = "bad"
 
 
+class Origin(StrEnum):
+    """Why a register was read."""
+
+    POLL = "poll"
+    READ = "read"
+    READ_BACK = "read back"
+
+
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One parameter as last read; `time` is when its reply was complete (monotonic)."""
+    """One parameter as last read; `time` is when its reply was complete (monotonic).
+
+    `raw` is None where there is none, and `error` tells why. `value` follows words that may be
+    others a moment later, so it is worked out for whoever asked and not kept.
+    """
 
     parameter: Parameter
     raw: int | None
@@ -38,6 +50,11 @@ class Reading:
     error: str = ""
     physical: Value | None = None
     """The value of a percentage in the unit of its rating, once that is known."""
+    origin: Origin = Origin.READ
+    absent: bool = False
+    """True where the drive itself said that it has no such word."""
+    silent: bool = False
+    """True where the drive met the request with silence while it answers others."""
 
     @property
     def text(self) -> str:
@@ -66,7 +83,24 @@ class Reading:
             return replace(self, quality=Quality.STALE)
         return self
 
+    def decoded(self, value: Value, physical: Value | None) -> Reading:
+        """The same reading with what its raw value comes to now."""
+        return replace(self, value=value, physical=physical)
+
     @classmethod
-    def bad(cls, parameter: Parameter, time: float, error: str) -> Reading:
+    def undecoded(cls, parameter: Parameter, raw: int, time: float, origin: Origin) -> Reading:
+        """A raw value as it came."""
+        return cls(parameter, raw, None, Quality.GOOD, time, origin=origin)
+
+    @classmethod
+    def bad(
+        cls,
+        parameter: Parameter,
+        time: float,
+        error: str,
+        *,
+        absent: bool = False,
+        silent: bool = False,
+    ) -> Reading:
         """A parameter without a value, and why."""
-        return cls(parameter, None, None, Quality.BAD, time, error)
+        return cls(parameter, None, None, Quality.BAD, time, error, absent=absent, silent=silent)

@@ -8,7 +8,7 @@ from tui.bus.line import LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 from tui.session.monitor.line_watch import GLANCE, Look
-from tui.session.monitor.snapshot import STALE_CYCLES, Snapshot
+from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.reading import Quality
 
 from .drive_signs import STATE_SIGNS, STATE_STYLES, age_text
@@ -34,7 +34,7 @@ def motor_now(
     age = max(0.0, now - snapshot.time)
     cycle = max(period, 1 / snapshot.rate if snapshot.rate else period)
     heard = not snapshot.error and snapshot.line.status is LineStatus.CONNECTED
-    if not heard or age > STALE_CYCLES * cycle or snapshot.state.kind == "unknown":
+    if not heard or age > stale_after(cycle) or snapshot.state.kind == "unknown":
         return _not_known(snapshot.state.headline, age)
     text = _state(snapshot.state.headline, snapshot.state.kind)
     for quantity in QUANTITIES_NOW:
@@ -56,7 +56,7 @@ def _by_look(look: Look | None, now: float) -> Text:
     if look is None or look.state is None:
         return _not_known("", None)
     age = max(0.0, now - look.time)
-    if look.error or age > STALE_CYCLES * GLANCE or look.state.kind == "unknown":
+    if look.error or age > stale_after(GLANCE) or look.state.kind == "unknown":
         return _not_known(look.state.headline, age)
     return _state(look.state.headline, look.state.kind)
 

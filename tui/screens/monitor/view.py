@@ -10,8 +10,7 @@ from tui.drive.profile.schema import MonitoringValue
 from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
 from tui.session.connect.identify import DriveIdentity
-from tui.session.monitor.rates import SLOW_FACTOR
-from tui.session.monitor.snapshot import STALE_CYCLES, Snapshot
+from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import TrendPoint
 from tui.session.reading import Reading
@@ -62,7 +61,7 @@ class View:
         rate = self.snapshot.rate
         cycle = max(self.period, 1 / rate if rate else self.period)
         often = self.lost or not (self.slow(code) or self.rare(code))
-        return reading.aged(self.now, STALE_CYCLES * cycle * (1 if often else SLOW_FACTOR))
+        return reading.aged(self.now, stale_after(cycle, often=often))
 
     def slow(self, code: str) -> bool:
         """Whether the value is one that need not come with every cycle."""

@@ -24,8 +24,8 @@ from tui.drive.values import from_words
 
 from ..drive import DriveSession
 from ..drive_state import STATE_FRESH
-from ..image import Raw
 from ..read.reader import Reader
+from ..reading import Reading
 from ..settings.write import Writer
 from .stop_report import Phase
 
@@ -57,7 +57,7 @@ class MotorStop:
     sent: bool = False
     """Whether its words have gone out."""
     reader: Reader = field(init=False)
-    held: dict[str, Raw] = field(default_factory=dict)
+    held: dict[str, Reading] = field(default_factory=dict)
     """What command words held before they were written here: option bits are kept from it."""
 
     def __post_init__(self) -> None:

@@ -23,7 +23,7 @@ from ..read.reader import Reader
 from ..read.rotation import Rotation
 from ..reading import Reading
 from .rates import SLOW_FACTOR, Rates, rates_of
-from .snapshot import STALE_CYCLES, Snapshot
+from .snapshot import Snapshot, stale_after
 from .trend import Trend, TrendPoint
 
 log = logging.getLogger(__name__)
@@ -235,9 +235,8 @@ class Monitor:
         error: str,
     ) -> None:
         now = self.session.clock.monotonic()
-        limit = STALE_CYCLES * span
         aged = {
-            code: reading.aged(now, limit if code in rates.fast else limit * SLOW_FACTOR)
+            code: reading.aged(now, stale_after(span, often=code in rates.fast))
             for code, reading in readings.items()
         }
         snapshot = Snapshot(

@@ -9,11 +9,20 @@ from tui.bus.line import LineState
 
 from ..drive_state import DriveState
 from ..reading import Reading
+from .rates import SLOW_FACTOR
 
 STALE_CYCLES = 3
 """Cycles after which a value is no longer taken for the present one."""
 STALE_LEAST = 1.5
 """Seconds for which a snapshot counts however fast the cycles are."""
+
+
+def stale_after(cycle: float, *, often: bool = True) -> float:
+    """Seconds after which a value is no longer the present one, for a cycle of so many seconds.
+
+    What is not read in every cycle has as many times longer.
+    """
+    return STALE_CYCLES * cycle * (1 if often else SLOW_FACTOR)
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,4 +48,4 @@ class Snapshot:
 
     def is_stale(self, now: float) -> bool:
         """Whether no cycle has ended for so long that nothing here is the present any more."""
-        return now - self.time > max(STALE_CYCLES * self.period, STALE_LEAST)
+        return now - self.time > max(stale_after(self.period), STALE_LEAST)

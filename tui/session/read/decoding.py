@@ -10,8 +10,7 @@ from tui.drive.shown import depends_on, shown
 from tui.drive.values import Value, percent_of
 
 from ..drive import DriveSession
-from ..image import Raw
-from ..reading import Quality, Rating, Reading
+from ..reading import Rating, Reading
 
 
 @dataclass(slots=True)
@@ -27,13 +26,12 @@ class Decoding:
         self._raws = self.session.image.trusted
         self._lacking = self.session.image.lacking
 
-    def reading(self, parameter: Parameter, raw: Raw) -> Reading:
-        """One parameter as a person reads it."""
-        if raw.raw is None:
-            return Reading.bad(parameter, raw.time, raw.error)
-        value = self._value(parameter, raw.raw)
-        physical = self._physical(parameter, value)
-        return Reading(parameter, raw.raw, value, Quality.GOOD, raw.time, physical=physical)
+    def decode(self, reading: Reading) -> Reading:
+        """A reading with its value, as a person reads it."""
+        if reading.raw is None:
+            return reading
+        value = self._value(reading.parameter, reading.raw)
+        return reading.decoded(value, self._physical(reading.parameter, value))
 
     def _value(self, parameter: Parameter, raw: int) -> Value:
         return shown(self.session.profile, parameter, raw, self._raws, self._lacking)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Mapping
+from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tui.bus.errors import DeviceException, NoAnswer
@@ -16,8 +16,7 @@ from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
 from tui.drive.values import from_words, word_count
 
 from ..drive import DriveSession
-from ..image import Origin, Raw
-from ..reading import Reading
+from ..reading import Origin, Reading
 from .decoding import Decoding, sources_of
 from .slots import Slots
 
@@ -73,10 +72,10 @@ class Reader:
         """Readings by code, in the order asked for."""
         wanted = list(dict.fromkeys(codes))
         await self._read_sources(wanted, priority)
-        raws = await self._raws(frozenset(wanted), priority)
+        found = await self._take(frozenset(wanted), priority)
         self._note_state(wanted)
         decoding = Decoding(self.session)
-        return {code: decoding.reading(self.profile[code], raws[code]) for code in wanted}
+        return {code: decoding.decode(found[code]) for code in wanted}
 
     def _note_state(self, codes: Iterable[str]) -> None:
         """Tell the session when the motor was seen at rest."""
@@ -138,7 +137,7 @@ class Reader:
         oldest = now - SOURCE_AGE if priority >= Priority.POLL else math.inf
         due = frozenset(code for code in sources - set(codes) if not self._is_known(code, oldest))
         if due:
-            await self._raws(due, priority)
+            await self._take(due, priority)
 
     def _is_known(self, code: str, oldest: float) -> bool:
         """Whether a word that others' values depend on was read, or refused, since a time."""
@@ -146,7 +145,8 @@ class Reader:
         held = image.get(code) if code in image.trusted else image.refused.get(code)
         return held is not None and held.time >= oldest
 
-    async def _raws(self, codes: frozenset[str], priority: Priority) -> dict[str, Raw]:
+    async def _take(self, codes: frozenset[str], priority: Priority) -> dict[str, Reading]:
+        """Read into the image; the readings have no value yet."""
         found = self._still_refused(codes) if priority >= Priority.POLL else {}
         image = self.session.image
         sure, unsure = self._by_trust(codes.difference(image.refused, found))
@@ -156,12 +156,12 @@ class Reader:
             found.update(await self._exchange_unsure(request, priority))
         for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
-        image.take(found, Origin.POLL if priority >= Priority.POLL else Origin.READ)
+        image.take(found)
         return found
 
-    async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Raw]:
+    async def _follow(self, plan: ReadPlan, priority: Priority) -> dict[str, Reading]:
         """Values of a plan; those of a block whose slots have changed meanwhile are left out."""
-        found: dict[str, Raw] = {}
+        found: dict[str, Reading] = {}
         if priority >= Priority.POLL:
             used = (self._block_of(request) for request in plan.requests)
             self.using = next((block.name for block in used if block), "")
@@ -184,7 +184,9 @@ class Reader:
         sure = frozenset(c for c in codes if c in self._met or is_verified(self.profile[c]))
         return sure, codes - sure
 
-    async def _exchange_unsure(self, request: ReadRequest, priority: Priority) -> dict[str, Raw]:
+    async def _exchange_unsure(
+        self, request: ReadRequest, priority: Priority
+    ) -> dict[str, Reading]:
         """A read of words that the drive may not have: its silence there is no dead drive."""
         try:
             found = await self._exchange(request, priority)
@@ -196,10 +198,11 @@ class Reader:
                 raise
             await self.line.read(self.device, status.address, 1, priority=Priority.OPERATOR_READ)
             text = "no answer: perhaps this drive has no such word"
-            nothing = Raw(self.session.clock.monotonic(), None, text, silent=True)
-            return {place.code: nothing for place in request.places}
+            now = self.session.clock.monotonic()
+            parameters = (self.profile[place.code] for place in request.places)
+            return {p.code: Reading.bad(p, now, text, silent=True) for p in parameters}
 
-    def _still_refused(self, codes: frozenset[str]) -> dict[str, Raw]:
+    def _still_refused(self, codes: frozenset[str]) -> dict[str, Reading]:
         """Refusals young enough that a poll need not ask again."""
         oldest = self.session.clock.monotonic() - ASK_AGAIN
         refused = self.session.image.refused
@@ -228,7 +231,7 @@ class Reader:
             return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
         return WireTiming(character_time(link), silence(link), turnaround)
 
-    async def _exchange(self, request: ReadRequest, priority: Priority) -> dict[str, Raw]:
+    async def _exchange(self, request: ReadRequest, priority: Priority) -> dict[str, Reading]:
         """The raw values of one planned request.
 
         Where the drive refuses a longer read, or answers a word with the one that stands for
@@ -243,15 +246,16 @@ class Reader:
         except DeviceException as refusal:
             if several:
                 return {}
-            return {p.code: self._refusal(refusal) for p in request.places}
+            parameters = (self.profile[place.code] for place in request.places)
+            return {p.code: self._refusal(p, refusal) for p in parameters}
         unknown = self.profile.data.reading.unknown_word
-        found: dict[str, Raw] = {}
+        found: dict[str, Reading] = {}
         for place in request.places:
             parameter = self.profile[place.code]
             words = reply.words[place.offset : place.offset + word_count(parameter)]
             alone = request.count == word_count(parameter) and block is None
             if alone or unknown not in words:
-                found[place.code] = Raw(self._when(reply), from_words(parameter, words))
+                found[place.code] = self._reading(parameter, words, reply.time, priority)
         return found
 
     def _block_of(self, request: ReadRequest) -> Block | None:
@@ -262,19 +266,24 @@ class Reader:
         blocks = self.profile.data.blocks
         return next((b for b in blocks if 0 <= request.address - b.address < b.max_words), None)
 
-    async def _alone(self, parameter: Parameter, priority: Priority) -> Raw:
+    async def _alone(self, parameter: Parameter, priority: Priority) -> Reading:
         count = word_count(parameter)
         try:
             reply: Reply = await self.line.read(
                 self.device, parameter.address, count, priority=priority
             )
         except DeviceException as refusal:
-            return self._refusal(refusal)
-        return Raw(self._when(reply), from_words(parameter, reply.words))
+            return self._refusal(parameter, refusal)
+        return self._reading(parameter, reply.words, reply.time, priority)
 
-    def _when(self, reply: Reply) -> float:
-        return self.session.clock.of_line(reply.time)
+    def _reading(
+        self, parameter: Parameter, words: Sequence[int], told: float, priority: Priority
+    ) -> Reading:
+        origin = Origin.POLL if priority >= Priority.POLL else Origin.READ
+        time = self.session.clock.of_line(told)
+        return Reading.undecoded(parameter, from_words(parameter, words), time, origin)
 
-    def _refusal(self, refusal: DeviceException) -> Raw:
+    def _refusal(self, parameter: Parameter, refusal: DeviceException) -> Reading:
         absent = refusal.code == self.profile.data.reading.unknown_exception
-        return Raw(self.session.clock.monotonic(), None, str(refusal), absent)
+        now = self.session.clock.monotonic()
+        return Reading.bad(parameter, now, str(refusal), absent=absent)
