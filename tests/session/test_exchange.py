@@ -283,7 +283,7 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
         commander = Commander(here.session, here.journal)
         here.permit()
         block_editor.proposals.propose(plan_of(here, "read", EXAMPLE_IN))
-        block_editor.write()
+        block_editor.write_proposals()
         commander.order("forward")
         assert here.session.work.busy_for(commander)
         stopper = Stopper(here.session.line, here.journal)
@@ -298,11 +298,11 @@ async def test_a_stop_ends_the_writing_of_slots_and_an_order_behind_it() -> None
         assert here.drive.raw("NMA8") != 7121
         # what was proposed stays, against what the drive holds now
         assert block_editor.proposals.changes(plan_of(here, "read", []).block)
-        block_editor.write()
+        block_editor.write_proposals()
         assert "no longer armed" in await settled(block_editor)
         assert here.drive.raw("NMA8") != here.profile["LFT"].address
         here.permit()
-        block_editor.write()
+        block_editor.write_proposals()
         assert "Written and read back" in await settled(block_editor)
         assert here.drive.raw("NMA8") == here.profile["LFT"].address
         block_editor.stop()
@@ -331,7 +331,7 @@ async def test_what_a_stop_cuts_short_is_said_to_stay() -> None:
         async with at_desk(here) as block_editor:
             here.after_writes(2, lambda: here.session.work.stop("F12"))
             block_editor.proposals.propose(plan_of(here, "read", EXAMPLE_IN))
-            block_editor.write()
+            block_editor.write_proposals()
             assert await settled(block_editor) == "Ended by a stop. What was written stays."
             assert len(here.writes()) == 2
 
@@ -340,7 +340,7 @@ async def test_where_nothing_was_written_nothing_is_said_to_stay() -> None:
     with bench("atv71", run_hz=20.0) as here:
         async with at_desk(here) as block_editor:
             block_editor.proposals.propose(plan_of(here, "read", EXAMPLE_IN))
-            block_editor.write()
+            block_editor.write_proposals()
             assert (await settled(block_editor)).endswith("Nothing was written.")
             assert here.writes() == []
 
@@ -360,7 +360,7 @@ async def test_slots_written_in_part_wait_for_a_reset_all_the_same() -> None:
         here.permit()
         disarm = here.session.arming.disarm
         here.after_writes(1, lambda: disarm("No key for a minute: no longer armed."))
-        block_editor.write()
+        block_editor.write_proposals()
         assert "no longer armed" in await settled(block_editor)
         assert (here.drive.raw("F870"), here.drive.raw("F871")) == (4, 3)
         with pytest.raises(MappingError, match="F870: in force after the drive's next reset"):

@@ -43,7 +43,7 @@ async def test_a_refused_write_of_the_profile_does_not_choose_the_next_stop_word
     await Reader(session).read(["CHCF", "ETA"])
     writer = Writer(session, journal, session.work.permit())
     with pytest.raises(DeviceException):
-        await writer.write(ATV71["CHCF"], 1, why="setting")
+        await writer.write_parameter(ATV71["CHCF"], 1, why="setting")
     sent = len(writes(line))
     stopper = Stopper(line, journal)
     stopper.stop([session])

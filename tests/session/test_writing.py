@@ -95,7 +95,7 @@ async def test_a_value_that_the_drive_keeps_is_known_and_recorded(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     await Reader(session).read(["ACC"])
-    await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert line.written == [(10, 50)]
     assert session.image.raws["ACC"] == 50
     (entry,) = journal.recent
@@ -108,7 +108,7 @@ async def test_another_value_than_was_written_is_told_and_known(
 ) -> None:
     line.keeps = lambda _address, _word: kept
     with pytest.raises(NotTaken, match=r"ACC: written 5\.0 s, the drive holds"):
-        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert session.image.raws["ACC"] == kept
     (entry,) = journal.recent
     assert (entry.answer, entry.read_back) == ("holds another value", kept)
@@ -118,9 +118,9 @@ async def test_only_the_bits_that_are_checked_must_be_held(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     line.keeps = lambda _address, word: word | 0x8000
-    await writer(session, journal).write(PROFILE["INR"], 1, why="bits", check=0x00FF)
+    await writer(session, journal).write_parameter(PROFILE["INR"], 1, why="bits", check=0x00FF)
     with pytest.raises(NotTaken):
-        await writer(session, journal).write(PROFILE["INR"], 1, why="bits", check=0x80FF)
+        await writer(session, journal).write_parameter(PROFILE["INR"], 1, why="bits", check=0x80FF)
 
 
 async def test_a_refused_write_leaves_nothing_known(
@@ -130,7 +130,7 @@ async def test_a_refused_write_leaves_nothing_known(
     await Reader(session).read(["ACC"])
     line.answer = DeviceException(1, 6, 10, 4, "not in this state")
     with pytest.raises(DeviceException):
-        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert "ACC" not in session.image.raws
     await Reader(session).read(["ACC"])
     assert session.image.raws["ACC"] == 30
@@ -142,7 +142,7 @@ async def test_an_unanswered_write_makes_the_word_unknown(
     await Reader(session).read(["ACC"])
     line.answer = NoAnswer(1, 6, 10)
     with pytest.raises(NoAnswer):
-        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert "ACC" not in session.image.raws
     (entry,) = journal.recent
     assert "did not answer" in entry.answer
@@ -158,7 +158,7 @@ async def test_a_write_that_was_never_sent_changes_nothing_of_what_is_known(
     await Reader(session).read(["ACC"])
     line.answer = answer
     with pytest.raises(type(answer)):
-        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert session.image.raws["ACC"] == 30
     assert line.written == []
 
@@ -169,7 +169,7 @@ async def test_a_reply_from_before_the_write_is_not_taken_for_the_word_after_it(
     held = (await Reader(session).read(["ACC"]))["ACC"]
     line.answer = NoAnswer(1, 6, 10)
     with pytest.raises(NoAnswer):
-        await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert held.raw is not None
     session.image.confirm("ACC", held.raw, held.time)
     assert "ACC" not in session.image.raws
@@ -178,7 +178,7 @@ async def test_a_reply_from_before_the_write_is_not_taken_for_the_word_after_it(
 async def test_what_cannot_be_read_back_is_not_known(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
-    await writer(session, journal).write(PROFILE["CMD"], 7, why="command")
+    await writer(session, journal).write_parameter(PROFILE["CMD"], 7, why="command")
     assert "CMD" not in session.image.raws
     assert line.requests == []
 
@@ -186,7 +186,7 @@ async def test_what_cannot_be_read_back_is_not_known(
 async def test_the_journal_tells_units_though_the_scale_was_never_read(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
-    await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert journal.recent[0].new == "5.0 s"
 
 
@@ -196,7 +196,7 @@ async def test_nothing_is_written_unarmed(
     permit = session.work.permit()
     session.arming.disarm()
     with pytest.raises(NotArmed):
-        await writer(session, journal, permit).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal, permit).write_parameter(PROFILE["ACC"], 50, why="setting")
     with pytest.raises(NotArmed):
         session.work.permit()
     assert line.written == []
@@ -209,7 +209,7 @@ async def test_nothing_is_written_behind_a_stop(
     session.work.stop("the stop key")
     session.arming.arm(seconds=math.inf)
     with pytest.raises(Stopped, match="the stop key"):
-        await writer(session, journal, permit).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal, permit).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert line.written == []
 
 
@@ -219,7 +219,7 @@ async def test_a_stop_while_the_frame_waits_for_the_line_keeps_it_from_going_out
     permit = session.work.permit()
     line.before = lambda: session.work.stop("the stop key")
     with pytest.raises(RequestRefused, match="stop came after"):
-        await writer(session, journal, permit).write(PROFILE["ACC"], 50, why="setting")
+        await writer(session, journal, permit).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert line.written == []
 
 
@@ -238,5 +238,5 @@ async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
     line.read = slow  # type: ignore[method-assign, assignment]
     line.before = lambda: order.append("write")
     await Reader(session).read(["INR"])
-    await writer(session, journal).write(PROFILE["ACC"], 50, why="setting")
+    await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert order == ["read", "write", "read"]

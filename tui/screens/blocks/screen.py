@@ -211,7 +211,13 @@ class BlocksScreen(BlockKeys):
             return
 
         yes, no = "writes, each slot read back", "writes nothing"
-        self._ask(f"Write {proposals.count} slots?", self._follows(), yes, no, block_editor.write)
+        self._ask(
+            f"Write {proposals.count} slots?",
+            self._follows(),
+            yes,
+            no,
+            block_editor.write_proposals,
+        )
 
     def _follows(self) -> str:
         """What would be written, and what that means for others."""

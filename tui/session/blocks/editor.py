@@ -140,7 +140,7 @@ class BlockEditor:
             return ""
         return at_rest_only(block, latest.state.headline or latest.state.kind)
 
-    def write(self, stamp: int | None = None) -> None:
+    def write_proposals(self, stamp: int | None = None) -> None:
         """Write what is proposed; returns at once."""
         proposals = self.proposals
         plans = [proposals.plans[b.id] for b in proposals.blocks if b.id in proposals.plans]

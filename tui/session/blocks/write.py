@@ -132,7 +132,7 @@ class _Writing:
         profile = self.session.profile
         parameter = profile[step.slot]
         try:
-            await self.writer.write(parameter, step.new, why=self.plan.block.name.lower())
+            await self.writer.write_parameter(parameter, step.new, why=self.plan.block.name.lower())
         except DeviceException as error:
             text = device_refusal(profile, parameter, error, self.retrying.headline)
             raise AssignmentRefused(self._so_far(text)) from error

@@ -95,12 +95,16 @@ class CommandAccess:
             if parameter.code == chart.command:
                 await self.write_command(chart, word, order.name)
             else:
-                await self.writer.write(parameter, from_words(parameter, [word]), why=order.name)
+                await self.writer.write_parameter(
+                    parameter, from_words(parameter, [word]), why=order.name
+                )
 
     async def write_command(self, chart: Chart, word: int, why: str) -> None:
         """Write a command word; it is watched from then on."""
         parameter = self.session.profile[chart.command]
         # the state of the drive tells whether it was taken; the word itself is kept on record
-        await self.writer.write(parameter, from_words(parameter, [word]), why=why, check=0)
+        await self.writer.write_parameter(
+            parameter, from_words(parameter, [word]), why=why, check=0
+        )
         self.session.note_command()
         self.given.note_command(parameter.code, word)

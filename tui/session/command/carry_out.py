@@ -51,7 +51,9 @@ async def step_reference(access: CommandAccess, hertz: Decimal) -> str:
 
 
 async def _write_reference(access: CommandAccess, reference: Reference) -> str:
-    await access.writer.write(reference.parameter, reference.raw, why="reference", replaceable=True)
+    await access.writer.write_parameter(
+        reference.parameter, reference.raw, why="reference", replaceable=True
+    )
     access.session.note_command()
     access.given.note_reference(reference)
     rounded = ", rounded to what the drive can hold" if reference.rounded else ""
@@ -69,7 +71,7 @@ async def set_option(access: CommandAccess, option: CommandOption, bits: int) ->
     if option.stopped_only and (await access.state(chart)).id in running:
         raise OrderRefused(f"{option.name} is changed with the motor stopped only.")
     word = reading.raw & 0xFFFF & ~option.mask | bits
-    await access.writer.write(
+    await access.writer.write_parameter(
         parameter, from_words(parameter, [word]), why=option.name, check=option.mask
     )
     access.session.note_command()

@@ -33,7 +33,7 @@ async def configure(session: DriveSession, writer: Writer, source: ControlSource
             continue
         scale = profile.scale(parameter, raws)
         check_raw(parameter, setting.value, profile.names(parameter), scale)
-        await writer.write(parameter, setting.value, why=f"control source: {source.name}")
+        await writer.write_parameter(parameter, setting.value, why=f"control source: {source.name}")
         written.append(parameter.code)
     left = source_changes(profile, source, await _raws(session))
     if left:

@@ -85,7 +85,9 @@ class MotorStart:
         reading = (await access.read([parameter.code]))[parameter.code]
         raw = wanted.raw if wanted is not None else reading.raw
         if raw is not None:
-            await access.writer.write(parameter, raw, why="reference before the run order")
+            await access.writer.write_parameter(
+                parameter, raw, why="reference before the run order"
+            )
             self.session.note_command()
 
     def _goes_out(self) -> None:

@@ -121,7 +121,7 @@ class MotorStop:
         for word in with_options(chart, order, kept):
             raw = from_words(parameter, [word])
             why = f"stopped: {order.name}"
-            await self.writer.write(
+            await self.writer.write_parameter(
                 parameter, raw, why=why, priority=Priority.STOP, read_back=False
             )
         self.sent = True

@@ -236,7 +236,7 @@ class _Work:
         change = link_change(profile, session.line.link, session.device, edit)
         cut = cuts_line(profile, parameter)
         try:
-            await self.writer.write(parameter, edit.new, why=self.why, read_back=not cut)
+            await self.writer.write_parameter(parameter, edit.new, why=self.why, read_back=not cut)
         except DeviceException as error:
             text = device_refusal(profile, parameter, error, self.retrying.headline)
             return Result(edit, EditOutcome.DRIVE_REFUSED, text, edit.old)

@@ -83,7 +83,7 @@ async def _carry_out(
     raw = from_words(parameter, [word])
     try:
         # the drive takes the order back by itself: what it holds afterwards proves nothing
-        await writer.write(parameter, raw, why=why, read_back=False)
+        await writer.write_parameter(parameter, raw, why=why, read_back=False)
     except DeviceException as error:
         text = device_refusal(profile, parameter, error, retrying.headline).rstrip(".")
         raise DeviceException(

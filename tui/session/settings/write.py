@@ -30,7 +30,7 @@ class Writer:
     journal: Journal
     permit: Permit | None
 
-    async def write(
+    async def write_parameter(
         self,
         parameter: Parameter,
         raw: int,

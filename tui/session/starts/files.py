@@ -29,7 +29,7 @@ class StartFiles:
     def __init__(self, folder: Path) -> None:
         self.folder = folder
 
-    def write(self, record: StartRecord, wanted: Callable[[], bool]) -> None:
+    def write_record(self, record: StartRecord, wanted: Callable[[], bool]) -> None:
         """Put a record on the disk, flushed; not if it is no longer `wanted` at the last moment.
 
         Raises OSError; an older record of the same start then stays as it was.

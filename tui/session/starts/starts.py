@@ -264,7 +264,7 @@ class Starts:
             if task.record is None:
                 self._remove(*task.drive)
             elif not task.void:
-                self._files.write(task.record, lambda: not task.void)
+                self._files.write_record(task.record, lambda: not task.void)
         except OSError as error:
             return error.strerror or str(error)
         except Exception as error:
