@@ -45,13 +45,12 @@ class MotorStart:
                 await self._walk(chart, same[0])
             else:
                 order = choose(chart, id, access.raws)
-                self._goes_out()
+                self.sent = True
                 await access.send(chart, order)
+            reached = await self._until_running(chart)
         finally:
-            if not self.sent and self.session.starts is not None:
-                self.session.starts.never_sent(self.session)
+            self._is_over()
         name = same[0].name
-        reached = await self._until_running(chart)
         if at_rest:
             await self._check_direction(chart, id)
         return f"{name}: {reached}"
@@ -90,11 +89,14 @@ class MotorStart:
             )
             self.session.note_command()
 
-    def _goes_out(self) -> None:
-        """From here on a standstill says that the motor was stopped."""
-        self.sent = True
-        if self.session.starts is not None:
-            self.session.starts.sent(self.session)
+    def _is_over(self) -> None:
+        """From here on a standstill says that the motor was stopped.
+
+        Not from the run frame on: a drive that takes its time shows the rest before it for a while.
+        """
+        starts = self.session.starts
+        if starts is not None:
+            (starts.sent if self.sent else starts.never_sent)(self.session)
 
     async def _walk(self, chart: Chart, run: Order) -> None:
         """From the state now to the running one, each state seen before the next command."""
@@ -106,7 +108,7 @@ class MotorStart:
         for goal, word in way:
             last = goal == ENABLED
             if last:
-                self._goes_out()
+                self.sent = True
             await access.write_command(chart, run.words[-1] if last else word, run.name)
             reached = await access.wait_for(chart, {goal, ENABLED})
             if reached.id not in (goal, ENABLED):
@@ -116,7 +118,7 @@ class MotorStart:
                     f" on 16#{word:04X}."
                 )
         if not way:
-            self._goes_out()
+            self.sent = True
             await access.write_command(chart, run.words[-1], run.name)
 
     async def _until_running(self, chart: Chart) -> str:
