@@ -6,6 +6,7 @@ import asyncio
 import time
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
+from dataclasses import replace
 from typing import Any, cast
 
 import pytest
@@ -17,6 +18,7 @@ from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.rotation import Rotation
+from tui.session.reading import Quality
 
 from .fakes import FakeLine, parameter, profile_of
 
@@ -171,6 +173,38 @@ async def test_a_drive_in_fault_may_be_reset_by_the_failure(bench: Bench) -> Non
     cycles = await bench.fail(silence(), cycles=10)
     assert [bool(s.error) for s, _ in cycles] == [True] + [False] * 9
     assert any(REFUSED in addresses for _, addresses in cycles)
+
+
+async def test_a_snapshot_is_stale_after_three_of_its_cycles(bench: Bench) -> None:
+    ((snapshot, _),) = await bench.run(1)
+    slow = replace(snapshot, period=2.0)
+    assert not slow.is_stale(slow.time + 5.9)
+    assert slow.is_stale(slow.time + 6.1)
+    # however fast the cycles are, a terminal is a moment behind them
+    fast = replace(snapshot, period=0.05)
+    assert not fast.is_stale(fast.time + 1.4)
+    assert fast.is_stale(fast.time + 1.6)
+
+
+async def test_values_of_failed_cycles_are_stale_after_three(bench: Bench) -> None:
+    await bench.run(3)
+    bench.line.silent = True
+    cycles = await bench.run(12)
+    for snapshot, _ in cycles:
+        reading = snapshot.readings["SPEED"]
+        stale = reading.quality is Quality.STALE
+        assert stale is (snapshot.time - reading.time > 3 * snapshot.period)
+    assert reading.quality is Quality.STALE
+    # stale words tell no state
+    assert snapshot.state.kind == "unknown"
+
+
+async def test_a_failed_cycle_leaves_a_gap_in_the_trend(bench: Bench) -> None:
+    bench.monitor._trend_codes = ["SPEED"]
+    await bench.run(2)
+    await bench.fail(silence(), cycles=1)
+    await bench.run(1)
+    assert [point.values for point in bench.monitor.trend[:4]] == [(500,), (500,), (None,), (500,)]
 
 
 def one_each(codes: Iterable[str]) -> list[tuple[str, ...]]:

@@ -120,6 +120,18 @@ async def test_a_percentage_in_amperes_once_the_rating_is_known() -> None:
     assert (again.text, again.physical.display) == ("50.00", "4.6 A")
 
 
+@pytest.mark.parametrize("priority", [Priority.POLL, Priority.OPERATOR_READ])
+async def test_whatever_was_read_is_known_of_the_drive(priority: Priority) -> None:
+    """What Monitor polls is what parameters, commands and stops go by."""
+    line = FakeLine({10: 7, 11: 8})
+    session = DriveSession(line.as_line(), 1, profile_of(parameter("A", 10), parameter("B", 11)))
+    await Reader(session).read(["A", "B"], priority=priority)
+    assert session.image.raws == {"A": 7, "B": 8}
+    line.registers[10] = 9
+    await Reader(session).read(["A"], priority=priority)
+    assert session.image.trusted == {"A": 9, "B": 8}
+
+
 async def test_silence_is_an_error_not_a_value() -> None:
     line = FakeLine({1: 1})
     line.silent = True

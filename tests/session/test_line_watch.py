@@ -1,0 +1,144 @@
+"""Looking after a drive that watches the line: asked in time, before the polls, and told of."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Callable, Coroutine
+from contextlib import suppress
+from dataclasses import replace
+from typing import Any, cast
+
+import pytest
+
+from tui.bus.line import DeviceState, LineState, LineStatus, Priority, Reply, Worker
+from tui.session.drive import DriveSession
+from tui.session.monitor.line_watch import LineWatch
+from tui.session.monitor.monitor import Monitor
+
+from .fakes import FakeLine, parameter, profile_of
+
+STATE, TIME_OUT = 10, 50
+PROFILE = profile_of(
+    parameter("STATE", STATE),
+    parameter("TTO", TIME_OUT, unit="s", scale="0.1"),
+    communication_fault={
+        "timeout": "TTO",
+        "off": 0,
+        "starts": "With the first request.",
+        "source": "manual",
+    },
+    charts=[
+        {
+            "id": "drivecom",
+            "name": "Drivecom",
+            "kind": "drivecom",
+            "status": "STATE",
+            "states": [{"id": "run", "name": "Run", "kind": "running", "mask": 3, "value": 1}],
+        }
+    ],
+)
+
+
+class HeardLine(FakeLine):
+    """Knows when the drive was last heard, and runs workers in the test's loop."""
+
+    def __init__(self, tenths: int) -> None:
+        super().__init__({STATE: 1, TIME_OUT: tenths})
+        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
+        self.heard: float | None = None
+        self.asked: list[tuple[int, Priority]] = []
+        self.workers: list[asyncio.Task[Any]] = []
+
+    def device_state(self, device: int) -> DeviceState:
+        return replace(super().device_state(device), heard=self.heard)
+
+    async def read(
+        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+    ) -> Reply:
+        self.asked.append((address, priority))
+        reply = await super().read(device, address, count, priority=priority)
+        self.heard = reply.time
+        return reply
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, None]], _: str) -> Worker:
+        self.workers.append(asyncio.ensure_future(work()))
+        return cast("Worker", self.workers[-1])
+
+
+async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not come to that"
+        await asyncio.sleep(0.005)
+
+
+class Kept:
+    """A drive with so many tenths of a second to its time-out, looked after."""
+
+    def __init__(self, tenths: int) -> None:
+        self.line = HeardLine(tenths)
+        session = DriveSession(self.line.as_line(), 1, PROFILE)
+        self.watch = LineWatch(self.line.as_line())
+        self.watch.keep(session, Monitor(session))
+
+    async def end(self) -> None:
+        self.watch.stop()
+        for worker in self.line.workers:
+            with suppress(asyncio.CancelledError):
+                await worker
+
+
+@pytest.fixture
+async def keep() -> AsyncIterator[Callable[[int], Kept]]:
+    """Looks after drives until the test has ended."""
+    made: list[Kept] = []
+
+    def one(tenths: int) -> Kept:
+        made.append(Kept(tenths))
+        return made[-1]
+
+    yield one
+    for kept in made:
+        await kept.end()
+
+
+async def test_a_drive_is_asked_before_its_time_is_up_and_before_the_polls(
+    keep: Callable[[int], Kept],
+) -> None:
+    line = keep(20).line
+    # behind its time-out it has acted already and would be asked as a poll
+    await until(lambda: (STATE, Priority.FEED) in line.asked)
+
+
+async def test_a_drive_that_was_just_heard_is_not_asked(keep: Callable[[int], Kept]) -> None:
+    kept = keep(10_000)
+    await until(lambda: kept.watch.watch(1) is not None)
+    await asyncio.sleep(0.1)
+    assert Priority.FEED not in [priority for _, priority in kept.line.asked]
+
+
+@pytest.mark.parametrize(("silent", "told"), [(40.0, False), (60.0, True), (150.0, True)])
+async def test_a_drive_that_was_not_heard_for_half_its_time_is_told_of(
+    keep: Callable[[int], Kept], silent: float, told: bool
+) -> None:
+    kept = keep(1000)
+    await until(lambda: kept.watch.watch(1) is not None)
+    kept.line.heard = time.monotonic() - silent
+    warnings = kept.watch.warnings()
+    assert bool(warnings) is told
+    for warning in warnings:
+        assert warning.device == 1
+        assert warning.watch.timeout == 100.0
+        assert warning.left == pytest.approx(100.0 - silent, abs=10.0)
+
+
+async def test_a_drive_that_watches_nothing_is_neither_fed_nor_told_of(
+    keep: Callable[[int], Kept],
+) -> None:
+    kept = keep(0)
+    await until(lambda: (TIME_OUT, Priority.POLL) in kept.line.asked)
+    kept.line.heard = time.monotonic() - 1000
+    assert kept.watch.watch(1) is None
+    assert kept.watch.warnings() == []
+    assert kept.watch.left_alone() == {}
