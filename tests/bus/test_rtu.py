@@ -39,6 +39,16 @@ def test_cut_or_damaged_reply_is_not_found(cut: int, bit: int) -> None:
     assert find_reply(damaged, 1, READ.expectation()) is None
 
 
+def test_the_reply_of_another_device_is_not_found() -> None:
+    """The same to the last word, and its checksum is right."""
+    theirs = frame(7, honest_pdu(READ.pdu()))
+    assert find_reply(theirs, 1, READ.expectation()) is None
+    match = find_reply(theirs + REPLY, 1, READ.expectation())
+    assert match is not None
+    assert match.start == len(theirs)
+    assert exchange_of(READ).feed(theirs) is None
+
+
 def test_identification_is_found_by_its_object_lengths() -> None:
     request = Identify(1)
     whole = frame(1, honest_pdu(request.pdu()))

@@ -229,6 +229,12 @@ def test_a_ramp_under_another_scale_is_the_same_ramp() -> None:
     assert [row.code for row in compare_settings(profile, a, c)] == ["INR", "ACC"]
 
 
+def test_a_difference_behind_the_point_is_one() -> None:
+    profile = library.load("atv71")
+    a, b = Side("a", {"INR": 1, "ACC": 30}), Side("b", {"INR": 1, "ACC": 31})
+    assert [(row.a, row.b) for row in compare_settings(profile, a, b)] == [("3.0 s", "3.1 s")]
+
+
 def test_what_one_side_could_not_read_differs_and_what_it_does_not_know_does_not() -> None:
     profile = library.load("atv71")
     a = Side("a", SMALL)

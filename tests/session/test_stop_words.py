@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 
 import pytest
 
@@ -10,6 +11,7 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Priority, Reply
 from tui.drive.orders import OrderRefused, stop_in_any
 from tui.drive.profile import library
+from tui.session.command import stop as stop_module
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
 from tui.session.connect.limits import limits_of
@@ -22,6 +24,7 @@ from tui.session.work import Stopped
 from tui.simulator import DriveSpec
 
 from .fake_clock import FakeClock
+from .slow_drive import FREQUENCY, STATUS, SWITCHED_ON, SlowBench
 from .test_stop import Start, ended, journal, start, wait_for, writes
 
 __all__ = ["journal", "start"]
@@ -167,3 +170,23 @@ async def test_a_stop_disarms_and_voids_what_was_typed_before_it(
     with pytest.raises(Stopped, match="F9"):
         session.work.permit(typed)
     assert "F9" in permit.refusal()
+
+
+async def test_a_motor_that_coasts_is_not_stopped_before_it_stands(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its state says so at once: nothing drives it any more, and it turns for a while."""
+    monkeypatch.setattr(stop_module, "STANDSTILL_POLL_INTERVAL", 0.01)
+    here = SlowBench(tmp_path, looks=0)
+    await here.start()
+    here.line.registers[FREQUENCY] = 500
+    stopper = Stopper(here.line.as_line(), here.journal)
+    stopper.stop([here.session])
+    await wait_for(lambda: here.line.registers[STATUS] == SWITCHED_ON)
+    looks = len(here.line.requests)
+    await wait_for(lambda: len(here.line.requests) > looks + 5)
+    assert stopper.reports[1].phase is Phase.STOPPING
+    assert "50 Hz" in stopper.reports[1].text
+    here.line.registers[FREQUENCY] = 0
+    assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    here.end()

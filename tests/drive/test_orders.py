@@ -1,0 +1,57 @@
+"""What holds a command back, by the interlocks of each family that has some."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from tui.drive.orders import MOVING_ORDERS, STOP_ORDERS, interlock
+from tui.drive.profile import library
+from tui.drive.profile.schema import Chart, Interlock
+
+LOCKED = ["atv21", "atv31", "atv312", "atv71"]
+"""Families with interlocks."""
+
+
+def interlocks(family: str) -> Iterator[tuple[Chart, Interlock]]:
+    for chart in library.load(family).data.charts:
+        for lock in chart.interlocks:
+            yield chart, lock
+
+
+def words_of(chart: Chart, lock: Interlock) -> dict[str, int]:
+    """Words under which no interlock but this one could hold a command back, and it decides."""
+    raws = {one.parameter: one.values[0] for one in chart.interlocks if not one.when}
+    raws |= {one.parameter: raws.get(one.parameter, 0) | one.values[0] for one in chart.interlocks}
+    return raws | {when.parameter: when.values[0] for when in lock.when}
+
+
+@pytest.mark.parametrize("family", LOCKED)
+def test_a_word_that_was_not_read_holds_every_moving_command_back(family: str) -> None:
+    for chart, lock in interlocks(family):
+        raws = {c: raw for c, raw in words_of(chart, lock).items() if c != lock.parameter}
+        for id in lock.orders or MOVING_ORDERS:
+            assert "is not known, and it decides" in interlock(chart, id, raws), (
+                id,
+                lock.parameter,
+            )
+
+
+@pytest.mark.parametrize("family", LOCKED)
+def test_no_interlock_ever_holds_a_stop_back(family: str) -> None:
+    for chart, lock in interlocks(family):
+        for id in STOP_ORDERS:
+            assert interlock(chart, id, {}) == "", (id, lock.parameter)
+
+
+@pytest.mark.parametrize("family", LOCKED)
+def test_another_value_holds_a_command_back_and_tells_what_to_do(family: str) -> None:
+    for chart, lock in interlocks(family):
+        raws = words_of(chart, lock)
+        wrong = next(bit for bit in (1 << n for n in range(16)) if lock.mask & bit)
+        raws[lock.parameter] = raws[lock.parameter] ^ wrong
+        if raws[lock.parameter] & lock.mask in lock.values:
+            continue
+        for id in lock.orders or MOVING_ORDERS:
+            assert interlock(chart, id, raws), (id, lock.parameter)

@@ -1,0 +1,111 @@
+"""An Altivar 312 that takes its time, on a line without a wire, and what commands it."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Callable, Coroutine, Sequence
+from pathlib import Path
+from typing import Any, cast
+
+from tui.bus.errors import NoAnswer, RequestRefused
+from tui.bus.line import LineState, LineStatus, Priority, Reply, Worker
+from tui.drive.profile import library
+from tui.session.command.commander import Commander
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+from tui.session.starts.keeper import StartKeeper
+from tui.session.starts.starts import Starts
+from tui.session.work import OutcomeKind
+
+from .fakes import FakeLine
+
+PROFILE = library.load("atv312")
+STATUS, COMMAND, FREQUENCY = (PROFILE[code].address for code in ("ETA", "CMD", "rFr"))
+READY, SWITCHED_ON, ENABLED = 0x0221, 0x0223, 0x0227
+GOES_TO = {0x06: READY, 0x07: SWITCHED_ON, 0x0F: ENABLED}
+
+
+class SlowDrive(FakeLine):
+    """An Altivar 312 whose state follows a word only after it was looked at so many times."""
+
+    def __init__(self, looks: int) -> None:
+        super().__init__(dict.fromkeys(range(0x10000), 0))
+        held = {"LAC": 2, "CHCF": 1, "Fr1": 164}
+        self.registers |= {PROFILE[code].address: raw for code, raw in held.items()}
+        self.registers[STATUS] = 0x0240
+        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
+        self.read_only = False
+        self.looks = looks
+        """Looks at the status until a word has done its work."""
+        self.dead_to_writes = False
+        self.words: list[tuple[int, int]] = []
+        """Each command word, and the state that the drive was in when it came."""
+        self.before_write: Callable[[int], None] = lambda _address: None
+        self._coming: list[int] = []
+
+    async def read(
+        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+    ) -> Reply:
+        if address <= STATUS < address + count and self._coming:
+            self.registers[STATUS] = self._coming.pop(0)
+        await asyncio.sleep(0)
+        return await super().read(device, address, count, priority=priority)
+
+    async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
+        if (forbidden := how.get("forbidden")) is not None and (why := forbidden()):
+            raise RequestRefused(why)
+        if self.dead_to_writes:
+            raise NoAnswer(device, 6, address)
+        self.before_write(address)
+        self.registers[address] = values[0]
+        if address == COMMAND:
+            now = self.registers[STATUS]
+            self.words.append((values[0], now))
+            self._coming = [now] * self.looks + [GOES_TO[values[0]]]
+        return time.monotonic()
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, None]], _: str) -> Worker:
+        return cast("Worker", asyncio.ensure_future(work()))
+
+
+class SlowBench:
+    """An armed drive with its commander; starts are put on record."""
+
+    def __init__(self, folder: Path, looks: int = 3) -> None:
+        self.line = SlowDrive(looks)
+        self.starts = Starts(folder)
+        self.session = DriveSession(self.line.as_line(), 1, PROFILE)
+        self.session.starts = StartKeeper("test", self.starts)
+        self.session.arming.arm(seconds=math.inf)
+        self.journal = Journal()
+        self.commander = Commander(self.session, self.journal)
+
+    @property
+    def records(self) -> list[Path]:
+        """The starts on the disk."""
+        return sorted(self.starts.folder.glob("*.json"))
+
+    async def start(self) -> tuple[OutcomeKind, str]:
+        """What a run command comes to."""
+        self.commander.order("forward")
+        await until(lambda: not self.session.work.busy)
+        assert self.session.work.outcome is not None
+        return self.session.work.outcome.kind, self.session.work.outcome.text
+
+    def rest(self) -> None:
+        """The motor stands."""
+        self.line.registers[STATUS] = SWITCHED_ON
+
+    def end(self) -> None:
+        """Nothing is left to be written."""
+        self.starts.close(5.0)
+        self.journal.close()
+
+
+async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, "it did not come to that"
+        await asyncio.sleep(0.005)
