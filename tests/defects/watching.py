@@ -1,0 +1,141 @@
+"""Defects of what is known of a drive: reading, watching, blocks, who it is."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+DEFECTS = (
+    Defect(
+        "values-of-the-monitor-not-noted",
+        "tui/session/read/reader.py",
+        "image.take(found, Origin.POLL if priority >= Priority.POLL else Origin.READ)",
+        "priority < Priority.POLL and image.take(found, Origin.READ)",
+        "Parameters and stops do not know what Monitor shows.",
+        ("tests/session/test_reader.py",),
+    ),
+    Defect(
+        "refusal-hurts-the-neighbours",
+        "tui/session/read/reader.py",
+        "if several:\n                return {}",
+        "if False:\n                return {}",
+        "One word that a drive lacks makes its neighbours unreadable.",
+        ("tests/session/test_reader.py",),
+    ),
+    Defect(
+        "slots-after-use-not-compared",
+        "tui/session/read/reader.py",
+        "if {code: raw.raw for code, raw in raws.items()} != check.slots:",
+        "if not raws:",
+        "After another program changed the scanner one value is shown as another.",
+        (
+            "tests/session/test_slots.py"
+            "::test_a_scanner_changed_under_way_never_shows_one_value_as_another",
+        ),
+    ),
+    Defect(
+        "older-reply-wins",
+        "tui/session/image.py",
+        "if before is not None and before.time > one.time:",
+        "if before is not None and before.time < -1:",
+        "A value from before is shown as the present one.",
+        ("tests/session/test_owners.py::test_an_older_reply_never_takes_the_place_of_a_newer_one",),
+    ),
+    Defect(
+        "trusted-across-a-reset",
+        "tui/session/image.py",
+        "if held[code].time >= since}",
+        "if held[code].time >= 0}",
+        "A stop is chosen by what the drive held before somebody else set it up.",
+        (
+            "tests/session/test_owners.py::test_what_may_have_changed_since_is_known_but_not_trusted",
+        ),
+    ),
+    Defect(
+        "equal-zeros-prove-a-slot",
+        "tui/session/read/proof.py",
+        'return left[0] if len(left) == 1 and self._confirmed(slot, left[0]) else ""',
+        'return left[0] if left and self._confirmed(slot, left[0]) else ""',
+        "A current is shown as a frequency since both were zero at rest.",
+        ("tests/session/test_proof.py",),
+    ),
+    Defect(
+        "one-comparison-proves-a-slot",
+        "tui/session/read/proof.py",
+        "SURE = 3",
+        "SURE = 1",
+        "One chance fit decides which value a block brings.",
+        ("tests/session/test_proof.py",),
+    ),
+    Defect(
+        "slots-proved-before-a-reset",
+        "tui/session/read/reader.py",
+        "self._slots.distrust()",
+        "self._slots.heard()",
+        "After a reset of the drive its block brings other values than are shown.",
+        ("tests/session/test_slots.py::test_a_fault_ends_the_trust_in_what_counts_until_a_reset",),
+    ),
+    Defect(
+        "stale-ten-times-later",
+        "tui/session/monitor",
+        "STALE_CYCLES = 3",
+        "STALE_CYCLES = 30",
+        "Values of half a minute ago are shown as the present ones.",
+        ("tests/session/test_monitor_faults.py", "tests/session/test_owners.py"),
+    ),
+    Defect(
+        "trend-repeats-the-last-value",
+        "tui/session/monitor",
+        "if code and code in readings and not snapshot.error else None",
+        "if code and code in readings else None",
+        "A trend shows a motor running evenly while nobody heard the drive.",
+        ("tests/session/test_monitor_faults.py",),
+    ),
+    Defect(
+        "failed-cycle-looks-well",
+        "tui/session/monitor",
+        "error = str(fault)\n                    failures += 1",
+        "failures += 1",
+        "A drive that does not answer looks alive.",
+        ("tests/session/test_monitor_faults.py",),
+    ),
+    Defect(
+        "time-out-not-fed",
+        "tui/session/monitor",
+        "period = kept.watch.timeout / ASKED_PER_TIMEOUT",
+        "period = kept.watch.timeout * ASKED_PER_TIMEOUT",
+        "Drives trip by their communication time-out while the panel is open.",
+        ("tests/session/test_line_watch.py",),
+    ),
+    Defect(
+        "fed-behind-the-polls",
+        "tui/session/monitor",
+        "priority = Priority.FEED if silent < kept.watch.timeout else Priority.POLL",
+        "priority = Priority.POLL",
+        "On a busy line drives trip by their communication time-out.",
+        ("tests/session/test_line_watch.py",),
+    ),
+    Defect(
+        "time-out-warning-not-told",
+        "tui/session/monitor",
+        "if silent > TOLD_SHARE * watch.timeout:",
+        "if silent > 1000 * watch.timeout:",
+        "A drive that is about to trip is not told of.",
+        ("tests/session/test_line_watch.py",),
+    ),
+    Defect(
+        "identified-by-another-field",
+        "tui/session/connect",
+        'reference = texts.get(REFERENCE, "")',
+        'reference = texts.get(NAME, "")',
+        "A drive is taken for another family, and its words mean something else.",
+        ("tests/session/test_on_a_line.py::test_identify",),
+    ),
+    Defect(
+        "fault-from-the-wrong-word",
+        "tui/session/drive_state.py",
+        "fault_raw = raws.get(profile.data.faults.parameter)",
+        "fault_raw = raws.get(profile.data.charts[0].status)",
+        "A trip is explained by the cause and remedy of another fault.",
+        ("tests/session/test_drive_state.py",),
+    ),
+)

@@ -1,0 +1,256 @@
+"""Plants defects one at a time in a copy of the panel, and tells which of them no test notices.
+
+    python -m tests.mutants [NAME...] [--list] [--jobs N] [--table]
+
+The defects stand in `tests/defects/`. The checkout is never touched: each worker has a copy of
+its own in a temporary folder. Exit status 1 where a defect survives or no longer fits the code.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from queue import SimpleQueue
+
+from tests.defects import bus, commanding, drive, watching
+from tests.defects.defect import Defect
+
+ROOT = Path(__file__).resolve().parent.parent
+COPIED = ("tui", "tests", "profiles", "pyproject.toml", "README.md", "LICENSE")
+DEFECTS: tuple[Defect, ...] = (
+    *bus.DEFECTS,
+    *drive.DEFECTS,
+    *commanding.DEFECTS,
+    *watching.DEFECTS,
+)
+LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
+"""What became of each defect when it was planted last; `--table` tells it."""
+PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60")
+LONGEST = 300.0
+"""Seconds for the tests of one defect; what hangs for longer is noticed, too."""
+SURVIVED, STALE = "SURVIVED", "STALE"
+_FAILED = re.compile(r"^(?:FAILED|ERROR) ([^\s\[]+)", re.MULTILINE)
+
+
+class Stale(Exception):
+    """A defect that no longer fits the code or the tests; the text says why."""
+
+
+@dataclass(frozen=True, slots=True)
+class Planted:
+    """What became of one defect."""
+
+    name: str
+    noticed_by: str
+    """The test that failed first, or why there is none: SURVIVED, STALE and the reason."""
+    seconds: float
+
+    @property
+    def noticed(self) -> bool:
+        """Whether a test failed because of it."""
+        return not self.noticed_by.startswith((SURVIVED, STALE))
+
+
+def place_of(defect: Defect, root: Path) -> Path:
+    """The one file in which the defect's old text stands once; raises Stale."""
+    room = root / defect.room
+    files = sorted(room.rglob("*.py")) if room.is_dir() else [room]
+    found = [
+        path
+        for path in files
+        if path.is_file()
+        for _ in range(path.read_text("utf-8").count(defect.old))
+    ]
+    if len(found) != 1:
+        raise Stale(f"its text stands {len(found)} times in {defect.room}")
+    return found[0]
+
+
+def _forget_compiled(path: Path) -> None:
+    """A file that is as long and as old as the one before would be taken for it."""
+    for compiled in path.parent.glob(f"__pycache__/{path.stem}.*.pyc"):
+        compiled.unlink()
+
+
+@contextmanager
+def planted(defect: Defect, copy: Path) -> Iterator[None]:
+    """The copy with a defect in it; whole again afterwards. Raises Stale."""
+    path = place_of(defect, copy)
+    whole = path.read_text("utf-8")
+    try:
+        path.write_text(whole.replace(defect.old, defect.new), "utf-8")
+        _forget_compiled(path)
+        yield
+    finally:
+        path.write_text(whole, "utf-8")
+        _forget_compiled(path)
+
+
+def run_tests(tests: Iterable[str], copy: Path, *more: str) -> tuple[int, str]:
+    """Exit status and output of pytest in a copy; -1 where it hung."""
+    command = (sys.executable, *PYTEST, *more, *tests)
+    # the copy's own packages, whatever is installed
+    surroundings = {**os.environ, "PYTHONPATH": str(copy)}
+    try:
+        done = subprocess.run(
+            command, cwd=copy, env=surroundings, capture_output=True, text=True, timeout=LONGEST
+        )
+    except subprocess.TimeoutExpired:
+        return -1, ""
+    return done.returncode, done.stdout + done.stderr
+
+
+def judge(status: int, output: str) -> str:
+    """By what a defect was noticed: only a test that ran and failed counts."""
+    if status == 0:
+        return SURVIVED
+    if status == -1:
+        return f"a hang of more than {LONGEST:g} s"
+    first = _FAILED.search(output)
+    if status != 1 or first is None:
+        lines = [line for line in output.splitlines() if line.strip()] or ["nothing was said"]
+        return f"{STALE}: no test ran ({lines[-1][:100]})"
+    return first[1].rstrip(":")
+
+
+def plant(defect: Defect, copy: Path) -> Planted:
+    """Plant one defect in a copy and run its tests."""
+    begun = time.monotonic()
+    try:
+        with planted(defect, copy):
+            by = judge(*run_tests(defect.tests, copy))
+    except Stale as stale:
+        by = f"{STALE}: {stale}"
+    return Planted(defect.name, by, time.monotonic() - begun)
+
+
+@contextmanager
+def copies(count: int) -> Iterator[list[Path]]:
+    """So many copies of the checkout as it is now, gone afterwards."""
+    with tempfile.TemporaryDirectory(prefix="drivepanel-mutants-") as folder:
+        made = [Path(folder) / str(number) for number in range(count)]
+        for copy in made:
+            copy.mkdir()
+            for name in COPIED:
+                source = ROOT / name
+                if source.is_dir():
+                    leave = shutil.ignore_patterns("__pycache__")
+                    shutil.copytree(source, copy / name, ignore=leave)
+                elif source.exists():
+                    shutil.copy2(source, copy / name)
+        yield made
+
+
+def fit_to_judge(defects: Sequence[Defect], copy: Path) -> str:
+    """Why the tests prove nothing: they must pass while nothing is planted; else empty."""
+    shown = subprocess.run(
+        (sys.executable, "-c", "import tui; print(tui.__file__)"),
+        cwd=copy, env={**os.environ, "PYTHONPATH": str(copy)}, capture_output=True, text=True,
+    )  # fmt: skip
+    if not shown.stdout.startswith(str(copy)):
+        return f"the tests would run against {shown.stdout.strip() or shown.stderr}"
+    tests = dict.fromkeys(test for defect in defects for test in defect.tests)
+    status, output = run_tests(tests, copy)
+    if status == 0:
+        return ""
+    return f"without any defect: {judge(status, output)}\n{output[-2000:]}"
+
+
+def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
+    """Plant them one after another in each of `jobs` copies, telling each as it ends."""
+    with copies(jobs) as made:
+        if why := fit_to_judge(defects, made[0]):
+            raise SystemExit(f"The tests cannot judge: {why}")
+        free: SimpleQueue[Path] = SimpleQueue()
+        for copy in made:
+            free.put(copy)
+
+        def one(defect: Defect) -> Planted:
+            copy = free.get()
+            try:
+                result = plant(defect, copy)
+            finally:
+                free.put(copy)
+            print(f"{result.seconds:6.1f} s  {result.name}: {result.noticed_by}", flush=True)
+            return result
+
+        with ThreadPoolExecutor(jobs) as pool:
+            return list(pool.map(one, defects))
+
+
+def last_run() -> dict[str, Planted]:
+    """What became of each defect when it was planted last, by name."""
+    try:
+        told = json.loads(LAST_RUN.read_text("utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return {name: Planted(**one) for name, one in told.items()}
+
+
+def remember(results: Iterable[Planted]) -> None:
+    """Keep results beside those of defects that were not planted this time."""
+    kept = {**last_run(), **{one.name: one for one in results}}
+    names = {defect.name for defect in DEFECTS}
+    told = {name: asdict(one) for name, one in kept.items() if name in names}
+    LAST_RUN.write_text(json.dumps(told, indent=1), "utf-8")
+
+
+def table(results: dict[str, Planted]) -> str:
+    """All defects with what became of them, as Markdown."""
+    lines = ["| defect | what a person would suffer | noticed by | s |", "|---|---|---|---:|"]
+    for defect in DEFECTS:
+        one = results.get(defect.name)
+        by, seconds = ("not planted", "") if one is None else (one.noticed_by, f"{one.seconds:.0f}")
+        by = by.removeprefix("tests/").replace("|", "\\|")
+        lines.append(f"| `{defect.name}` | {defect.suffers} | {by} | {seconds} |")
+    noticed = sum(one.noticed for one in results.values())
+    return "\n".join([*lines, "", f"{noticed} of {len(DEFECTS)} defects are noticed."])
+
+
+def _chosen(names: Sequence[str]) -> list[Defect]:
+    known = {defect.name: defect for defect in DEFECTS}
+    if strange := [name for name in names if name not in known]:
+        raise SystemExit(f"There is no defect {strange[0]!r}; --list names them.")
+    return [known[name] for name in names] if names else list(DEFECTS)
+
+
+def main() -> int:
+    """Plant what was asked for; 1 where something survives."""
+    parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
+    parser.add_argument("names", nargs="*", metavar="NAME", help="plant only these defects")
+    parser.add_argument("--list", action="store_true", help="name the defects, plant nothing")
+    parser.add_argument("--table", action="store_true", help="the last results as Markdown")
+    parser.add_argument("--jobs", type=int, default=2, choices=(1, 2), help="copies at work")
+    asked = parser.parse_args()
+    if asked.table:
+        print(table(last_run()))
+        return 0
+    defects = _chosen(asked.names)
+    if asked.list:
+        for defect in defects:
+            print(f"{defect.name:34} {defect.room:32} {defect.suffers}")
+        return 0
+    results = plant_all(defects, min(asked.jobs, len(defects)))
+    remember(results)
+    missed = [one for one in results if not one.noticed]
+    print(f"\n{'defect':34} {'s':>6}  noticed by")
+    for one in results:
+        print(f"{one.name:34} {one.seconds:6.1f}  {one.noticed_by}")
+    print(f"\n{len(results) - len(missed)} of {len(results)} defects are noticed.")
+    return 1 if missed else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
