@@ -41,7 +41,7 @@ PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60
 LONGEST = 300.0
 """Seconds for the tests of one defect; what hangs for longer is noticed, too."""
 SURVIVED, STALE = "SURVIVED", "STALE"
-_FAILED = re.compile(r"^(?:FAILED|ERROR) ([^\s\[]+)", re.MULTILINE)
+_FAILED = re.compile(r"^(?:FAILED|ERROR) ([^\s\[:]+::[^\s\[]+)", re.MULTILINE)
 
 
 class Stale(Exception):
@@ -226,6 +226,19 @@ def _chosen(names: Sequence[str]) -> list[Defect]:
     return [known[name] for name in names] if names else list(DEFECTS)
 
 
+def _listed(defects: Iterable[Defect]) -> int:
+    """Name defects, with why those that no longer fit the code do not; 1 where there are any."""
+    stale = 0
+    for defect in defects:
+        print(f"{defect.name:42} {defect.room:32} {defect.suffers}")
+        try:
+            place_of(defect, ROOT)
+        except Stale as why:
+            stale += 1
+            print(f"    {STALE}: {why}")
+    return 1 if stale else 0
+
+
 def main() -> int:
     """Plant what was asked for; 1 where something survives."""
     parser = argparse.ArgumentParser(prog="python -m tests.mutants", description=__doc__)
@@ -239,15 +252,13 @@ def main() -> int:
         return 0
     defects = _chosen(asked.names)
     if asked.list:
-        for defect in defects:
-            print(f"{defect.name:34} {defect.room:32} {defect.suffers}")
-        return 0
+        return _listed(defects)
     results = plant_all(defects, min(asked.jobs, len(defects)))
     remember(results)
     missed = [one for one in results if not one.noticed]
-    print(f"\n{'defect':34} {'s':>6}  noticed by")
+    print(f"\n{'defect':42} {'s':>6}  noticed by")
     for one in results:
-        print(f"{one.name:34} {one.seconds:6.1f}  {one.noticed_by}")
+        print(f"{one.name:42} {one.seconds:6.1f}  {one.noticed_by}")
     print(f"\n{len(results) - len(missed)} of {len(results)} defects are noticed.")
     return 1 if missed else 0
 

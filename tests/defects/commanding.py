@@ -6,7 +6,7 @@ from .defect import Defect
 
 WRITING = "tests/session/test_writing.py"
 WORK = "tests/session/test_work.py"
-STOP = "tests/session/test_stop.py"
+STOP = "tests/session/test_stop_words.py"
 
 DEFECTS = (
     Defect(
@@ -159,7 +159,7 @@ DEFECTS = (
         "if code in fresh or (turns and since):",
         "if code in trusted:",
         "After a change at the keypad a stop sends a word that starts the motor.",
-        ("tests/session/test_stop_words.py",),
+        (f"{STOP}::test_what_somebody_changed_at_rest_is_read_anew",),
     ),
     Defect(
         "standstill-by-the-state-alone",
@@ -167,7 +167,7 @@ DEFECTS = (
         "if not hertz and kind in STANDING:",
         "if kind in STANDING:",
         "A motor that coasts at full speed is told as stopped.",
-        (STOP,),
+        (f"{STOP}::test_a_motor_that_coasts_is_not_stopped_before_it_stands",),
     ),
     Defect(
         "standstill-by-the-frequency-alone",
@@ -175,7 +175,7 @@ DEFECTS = (
         "if not hertz and kind in STANDING:",
         "if not hertz:",
         "A motor that stands enabled at 0 Hz is told as stopped.",
-        ("tests/session/test_stop_words.py",),
+        (f"{STOP}::test_a_motor_at_0_hz_that_is_enabled_elsewhere_is_not_stopped",),
     ),
     Defect(
         "stop-tried-once",
@@ -183,7 +183,7 @@ DEFECTS = (
         "STOP_TRIES = 5",
         "STOP_TRIES = 1",
         "One disturbed frame, and the motor runs on.",
-        (STOP,),
+        ("tests/session/test_stop.py::test_a_dead_drive_is_tried_again_and_told_of",),
     ),
     Defect(
         "broadcast-to-all-families",
