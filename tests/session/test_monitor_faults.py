@@ -200,7 +200,7 @@ async def test_values_of_failed_cycles_are_stale_after_three(bench: Bench) -> No
 
 
 async def test_a_failed_cycle_leaves_a_gap_in_the_trend(bench: Bench) -> None:
-    bench.monitor._trend_codes = ["SPEED"]
+    bench.monitor._trend._codes = ["SPEED"]
     await bench.run(2)
     await bench.fail(silence(), cycles=1)
     await bench.run(1)

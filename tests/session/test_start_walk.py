@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from tui.session.command import commander as commander_module
-from tui.session.command.stop import Phase, Stopper
+from tui.session.command import access, motor_start
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase
 from tui.session.work import OutcomeKind
 
 from .slow_drive import ENABLED, READY, STATUS, SWITCHED_ON, SlowBench, until
@@ -17,7 +18,8 @@ from .slow_drive import ENABLED, READY, STATUS, SWITCHED_ON, SlowBench, until
 @pytest.fixture(autouse=True)
 def quick(monkeypatch: pytest.MonkeyPatch) -> None:
     """Looks at the state as fast as they come."""
-    monkeypatch.setattr(commander_module, "STATE_POLL_INTERVAL", 0.0)
+    monkeypatch.setattr(access, "STATE_POLL_INTERVAL", 0.0)
+    monkeypatch.setattr(motor_start, "STATE_POLL_INTERVAL", 0.0)
 
 
 @pytest.fixture
@@ -37,7 +39,7 @@ async def test_no_word_goes_out_before_the_state_that_it_needs_was_seen(here: Sl
 async def test_a_drive_that_stays_where_it_is_gets_no_further_word(
     here: SlowBench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(commander_module, "STEP_TIME", 0.05)
+    monkeypatch.setattr(access, "STEP_TIME", 0.05)
     here.line.looks = 1_000_000
     kind, text = await here.start()
     assert kind is OutcomeKind.REFUSED

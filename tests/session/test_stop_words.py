@@ -11,7 +11,7 @@ from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Priority, Reply
 from tui.drive.orders import OrderRefused, stop_in_any
 from tui.drive.profile import library
-from tui.session.command import stop as stop_module
+from tui.session.command import motor_stop
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
 from tui.session.connect.limits import limits_of
@@ -176,7 +176,7 @@ async def test_a_motor_that_coasts_is_not_stopped_before_it_stands(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its state says so at once: nothing drives it any more, and it turns for a while."""
-    monkeypatch.setattr(stop_module, "STANDSTILL_POLL_INTERVAL", 0.01)
+    monkeypatch.setattr(motor_stop, "STANDSTILL_POLL_INTERVAL", 0.01)
     here = SlowBench(tmp_path, looks=0)
     await here.start()
     here.line.registers[FREQUENCY] = 500
