@@ -1,56 +1,46 @@
-"""A line without a wire: registers in a dictionary, refusals by address, a log of requests."""
+"""A fake line with one drive on it, and small profiles."""
 
 from __future__ import annotations
 
-import time
 from collections.abc import Mapping
-from typing import cast
 
 import msgspec
 
-from tui.bus.errors import DeviceException, NoAnswer
-from tui.bus.limits import Limits
-from tui.bus.line import DeviceState, Line, Priority, Reply
-from tui.bus.link import SerialLink
+from tui.bus.fake import FakeLine
+from tui.bus.fake_device import FakeDevice
+from tui.bus.requests import Read
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import ProfileData
 
 
-class FakeLine:
-    """Answers reads as one drive would; `requests` lists what was asked."""
+class BlockDrive(FakeDevice):
+    """A drive that puts a word of its own in the place of those that it lacks, in a block."""
 
-    def __init__(self, registers: Mapping[int, int], *, unknown_word: int | None = None) -> None:
-        self.link = SerialLink("/dev/null")
-        self.registers = dict(registers)
-        self.refused: dict[int, int] = {}
-        self.unknown_word = unknown_word
-        self.silent = False
-        self.requests: list[tuple[int, int]] = []
-        self.limits: dict[int, Limits] = {}
-        self.turnaround: float | None = None
+    unknown_word = 0x8000
 
-    def device_state(self, device: int) -> DeviceState:
-        return DeviceState(None, 0, None, None, self.turnaround, self.turnaround, None)
-
-    def describe(self, device: int, limits: Limits) -> None:
-        self.limits[device] = limits
-
-    async def read(
-        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
-    ) -> Reply:
-        self.requests.append((address, count))
-        if self.silent:
-            raise NoAnswer(device, 3, address)
+    def held(self, address: int, count: int) -> tuple[int, ...]:
         span = range(address, address + count)
-        missing = [a for a in span if a not in self.registers or a in self.refused]
-        if missing and (self.unknown_word is None or len(missing) == count):
-            code = self.refused.get(missing[0], 2)
-            raise DeviceException(device, 3, address, code, "refused")
-        words = (self.unknown_word if a in missing else self.registers[a] for a in span)
-        return Reply(tuple(cast("int", word) for word in words), time.monotonic())
+        if not any(number in self.words for number in span):
+            return super().held(address, count)
+        return tuple(self.words.get(number, self.unknown_word) for number in span)
 
-    def as_line(self) -> Line:
-        return cast("Line", self)
+
+class OneDrive(FakeLine):
+    """A line with one drive; `asked` lists the reads."""
+
+    def __init__(self, registers: Mapping[int, int], *, device: int = 1) -> None:
+        super().__init__({device: registers})
+        self.device = device
+
+    @property
+    def registers(self) -> dict[int, int]:
+        """What the drive holds."""
+        return self.devices[self.device].words
+
+    @property
+    def asked(self) -> list[tuple[int, int]]:
+        """Address and count of all reads so far."""
+        return [(one.address, one.count) for one in self.requests if isinstance(one, Read)]
 
 
 def parameter(code: str, address: int, **more: object) -> dict[str, object]:

@@ -5,12 +5,12 @@ from __future__ import annotations
 import asyncio
 import math
 import time
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, cast
+from typing import Any
 
 from tui.bus.errors import NoAnswer, RequestRefused
-from tui.bus.line import LineState, LineStatus, Priority, Reply, Worker
+from tui.bus.line import Priority, Reply
 from tui.drive.profile import library
 from tui.session.command.commander import Commander
 from tui.session.drive import DriveSession
@@ -19,7 +19,7 @@ from tui.session.starts.keeper import StartKeeper
 from tui.session.starts.starts import Starts
 from tui.session.work import OutcomeKind
 
-from .fakes import FakeLine
+from .fakes import OneDrive
 
 PROFILE = library.load("atv312")
 STATUS, COMMAND, FREQUENCY = (PROFILE[code].address for code in ("ETA", "CMD", "rFr"))
@@ -27,16 +27,14 @@ READY, SWITCHED_ON, ENABLED = 0x0221, 0x0223, 0x0227
 GOES_TO = {0x06: READY, 0x07: SWITCHED_ON, 0x0F: ENABLED}
 
 
-class SlowDrive(FakeLine):
+class SlowDrive(OneDrive):
     """An Altivar 312 whose state follows a word only after it was looked at so many times."""
 
     def __init__(self, looks: int) -> None:
         super().__init__(dict.fromkeys(range(0x10000), 0))
         held = {"LAC": 2, "CHCF": 1, "Fr1": 164}
-        self.registers |= {PROFILE[code].address: raw for code, raw in held.items()}
+        self.registers.update({PROFILE[code].address: raw for code, raw in held.items()})
         self.registers[STATUS] = 0x0240
-        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
-        self.read_only = False
         self.looks = looks
         """Looks at the status until a word has done its work."""
         self.dead_to_writes = False
@@ -66,9 +64,6 @@ class SlowDrive(FakeLine):
             self._coming = [now] * self.looks + [GOES_TO[values[0]]]
         return time.monotonic()
 
-    def spawn(self, work: Callable[[], Coroutine[Any, Any, None]], _: str) -> Worker:
-        return cast("Worker", asyncio.ensure_future(work()))
-
 
 class SlowBench:
     """An armed drive with its commander; starts are put on record."""
@@ -76,7 +71,7 @@ class SlowBench:
     def __init__(self, folder: Path, looks: int = 3) -> None:
         self.line = SlowDrive(looks)
         self.starts = Starts(folder)
-        self.session = DriveSession(self.line.as_line(), 1, PROFILE)
+        self.session = DriveSession(self.line, 1, PROFILE)
         self.session.starts = StartKeeper("test", self.starts)
         self.session.arming.arm(seconds=math.inf)
         self.journal = Journal()

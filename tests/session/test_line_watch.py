@@ -11,12 +11,12 @@ from typing import Any, cast
 
 import pytest
 
-from tui.bus.line import DeviceState, LineState, LineStatus, Priority, Reply, Worker
+from tui.bus.api import DeviceState, LineWorker, Priority, Reply
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor
 
-from .fakes import FakeLine, parameter, profile_of
+from .fakes import OneDrive, parameter, profile_of
 
 STATE, TIME_OUT = 10, 50
 PROFILE = profile_of(
@@ -40,30 +40,29 @@ PROFILE = profile_of(
 )
 
 
-class HeardLine(FakeLine):
-    """Knows when the drive was last heard, and runs workers in the test's loop."""
+class HeardLine(OneDrive):
+    """Knows with which priority the drive was asked, and keeps its workers."""
 
     def __init__(self, tenths: int) -> None:
         super().__init__({STATE: 1, TIME_OUT: tenths})
-        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
         self.heard: float | None = None
-        self.asked: list[tuple[int, Priority]] = []
-        self.workers: list[asyncio.Task[Any]] = []
-
-    def device_state(self, device: int) -> DeviceState:
-        return replace(super().device_state(device), heard=self.heard)
+        self.looked: list[tuple[int, Priority]] = []
+        self.workers: list[LineWorker] = []
 
     async def read(
         self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
     ) -> Reply:
-        self.asked.append((address, priority))
+        self.looked.append((address, priority))
         reply = await super().read(device, address, count, priority=priority)
         self.heard = reply.time
         return reply
 
-    def spawn(self, work: Callable[[], Coroutine[Any, Any, None]], _: str) -> Worker:
-        self.workers.append(asyncio.ensure_future(work()))
-        return cast("Worker", self.workers[-1])
+    def device_state(self, device: int) -> DeviceState:
+        return replace(super().device_state(device), heard=self.heard)
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        self.workers.append(super().spawn(work, name))
+        return self.workers[-1]
 
 
 async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
@@ -78,15 +77,15 @@ class Kept:
 
     def __init__(self, tenths: int) -> None:
         self.line = HeardLine(tenths)
-        session = DriveSession(self.line.as_line(), 1, PROFILE)
-        self.watch = LineWatch(self.line.as_line())
+        session = DriveSession(self.line, 1, PROFILE)
+        self.watch = LineWatch(self.line)
         self.watch.keep(session, Monitor(session))
 
     async def end(self) -> None:
         self.watch.stop()
         for worker in self.line.workers:
             with suppress(asyncio.CancelledError):
-                await worker
+                await cast("asyncio.Task[object]", worker)
 
 
 @pytest.fixture
@@ -108,14 +107,14 @@ async def test_a_drive_is_asked_before_its_time_is_up_and_before_the_polls(
 ) -> None:
     line = keep(20).line
     # behind its time-out it has acted already and would be asked as a poll
-    await until(lambda: (STATE, Priority.FEED) in line.asked)
+    await until(lambda: (STATE, Priority.FEED) in line.looked)
 
 
 async def test_a_drive_that_was_just_heard_is_not_asked(keep: Callable[[int], Kept]) -> None:
     kept = keep(10_000)
     await until(lambda: kept.watch.watch(1) is not None)
     await asyncio.sleep(0.1)
-    assert Priority.FEED not in [priority for _, priority in kept.line.asked]
+    assert Priority.FEED not in [priority for _, priority in kept.line.looked]
 
 
 @pytest.mark.parametrize(("silent", "told"), [(40.0, False), (60.0, True), (150.0, True)])
@@ -137,7 +136,7 @@ async def test_a_drive_that_watches_nothing_is_neither_fed_nor_told_of(
     keep: Callable[[int], Kept],
 ) -> None:
     kept = keep(0)
-    await until(lambda: (TIME_OUT, Priority.POLL) in kept.line.asked)
+    await until(lambda: (TIME_OUT, Priority.POLL) in kept.line.looked)
     kept.line.heard = time.monotonic() - 1000
     assert kept.watch.watch(1) is None
     assert kept.watch.warnings() == []

@@ -7,20 +7,19 @@ import time
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
 from dataclasses import replace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
+from tui.bus.api import LineWorker, Priority, Reply
 from tui.bus.errors import LineLost, NoAnswer
-from tui.bus.line import LineState, LineStatus, Priority, Reply, Worker
-from tui.bus.schedule.pace import Pace
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.rotation import Rotation
 from tui.session.reading import Quality
 
-from .fakes import FakeLine, parameter, profile_of
+from .fakes import OneDrive, parameter, profile_of
 
 Cycles = list[tuple[Snapshot, list[int]]]
 """Each snapshot with the addresses that were asked for it."""
@@ -56,30 +55,32 @@ PROFILE = profile_of(
 )
 
 
-class FaultyLine(FakeLine):
-    """Runs workers in the test's loop; the next requests fail with the errors in `faults`."""
+class FaultyLine(OneDrive):
+    """The next requests fail with the errors in `faults`."""
 
     def __init__(self) -> None:
         registers = {FIRST_SLOW + 100 * i: i for i in range(SLOW)}
         super().__init__({STATE: RUNNING, SPEED: 500, **registers})
-        self.refused[REFUSED] = 2
+        self.fail_read(1, REFUSED, 2)
         self.faults: list[Exception | None] = []
-        self.pace = Pace()
-        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
-        self.task: asyncio.Task[Any] | None = None
+        self.addresses: list[int] = []
+        """What was asked, whether it came or not."""
+        self.task: asyncio.Task[object] | None = None
 
     async def read(
         self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
     ) -> Reply:
         fault = self.faults.pop(0) if self.faults else None
+        self.addresses.append(address)
         if fault is not None:
-            self.requests.append((address, count))
             raise fault
         return await super().read(device, address, count, priority=priority)
 
-    def spawn(self, work: Callable[[], Coroutine[Any, Any, None]], name: str) -> Worker:
-        self.task = asyncio.ensure_future(work())
-        return cast("Worker", self.task)
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        worker = super().spawn(work, name)
+        assert isinstance(worker, asyncio.Task)
+        self.task = worker
+        return worker
 
 
 class Bench:
@@ -87,13 +88,13 @@ class Bench:
 
     def __init__(self) -> None:
         self.line = FaultyLine()
-        self.monitor = Monitor(DriveSession(self.line.as_line(), 1, PROFILE))
+        self.monitor = Monitor(DriveSession(self.line, 1, PROFILE))
         self.cycles: Cycles = []
         self.monitor.listen(self._take)
 
     def _take(self, snapshot: Snapshot) -> None:
-        self.cycles.append((snapshot, [address for address, _ in self.line.requests]))
-        self.line.requests.clear()
+        self.cycles.append((snapshot, list(self.line.addresses)))
+        self.line.addresses.clear()
 
     async def run(self, cycles: int) -> Cycles:
         """The next cycles."""
@@ -188,7 +189,7 @@ async def test_a_snapshot_is_stale_after_three_of_its_cycles(bench: Bench) -> No
 
 async def test_values_of_failed_cycles_are_stale_after_three(bench: Bench) -> None:
     await bench.run(3)
-    bench.line.silent = True
+    bench.line.silence(1)
     cycles = await bench.run(12)
     for snapshot, _ in cycles:
         reading = snapshot.readings["SPEED"]

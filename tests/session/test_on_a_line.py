@@ -7,7 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import cast
 
 import pytest
 
@@ -23,7 +22,8 @@ from tui.bus.errors import (
     Superseded,
     WrongReply,
 )
-from tui.bus.line import IdentificationObjects, Line, Priority
+from tui.bus.fake import FakeLine
+from tui.bus.line import Priority
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.session.connect.addresses import parse_addresses
@@ -111,16 +111,13 @@ async def test_a_second_scan_finds_drives_without_function_43_and_those_behind_t
         opened.close()
 
 
-class Trouble:
+def trouble(error: LineError) -> FakeLine:
     """A line on which one address has an error of its own."""
-
-    def __init__(self, error: LineError) -> None:
-        self.error = error
-
-    async def identify(self, device: int, **_: object) -> IdentificationObjects:
-        if device == 2:
-            raise self.error
-        return IdentificationObjects(1, {1: b"ATV71HU15M3"})
+    line = FakeLine({1: {}, 2: {}, 3: {}})
+    for device in line.devices.values():
+        device.identity = {1: b"ATV71HU15M3"}
+    line.fail_identify(2, error)
+    return line
 
 
 @pytest.mark.parametrize(
@@ -135,7 +132,7 @@ class Trouble:
 )
 async def test_what_is_wrong_with_one_address_ends_no_scan(error: LineError) -> None:
     results: list[ScanResult] = []
-    await scan(cast("Line", Trouble(error)), range(1, 4), results.append)
+    await scan(trouble(error), range(1, 4), results.append)
     assert [result.device for result in results] == [1, 2, 3]
     assert [result.error for result in results] == ["", str(error), ""]
 
@@ -144,7 +141,7 @@ async def test_what_is_wrong_with_one_address_ends_no_scan(error: LineError) -> 
 async def test_a_scan_ends_with_its_line(error: LineError) -> None:
     results: list[ScanResult] = []
     with pytest.raises(type(error)):
-        await scan(cast("Line", Trouble(error)), range(1, 4), results.append)
+        await scan(trouble(error), range(1, 4), results.append)
     assert [result.device for result in results] == [1]
 
 
@@ -362,12 +359,13 @@ async def test_a_watch_that_begins_with_a_command_is_not_told_of_before() -> Non
         opened.close()
 
 
-async def test_an_overloaded_line_lowers_all_rates_evenly(five: OpenLine) -> None:
+async def test_an_overloaded_line_lowers_all_rates_evenly(
+    five: OpenLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monitors = [Monitor(session(five, profile)) for profile in DRIVES]
-    slow = Line(SerialLink("/dev/null", baud=9600))
     for monitor in monitors:
         # as if the line were that slow: its time is shared out by what the plans cost there
-        monitor.line.link = slow.link
+        monkeypatch.setattr(five.line, "link", SerialLink("/dev/null", baud=9600))
         monitor.start(period=0.1)
     await asyncio.sleep(8.0)
     rates = [monitor.latest.rate for monitor in monitors if monitor.latest]
@@ -446,7 +444,7 @@ def test_recent_lines_survive_a_damaged_file() -> None:
 
 async def test_a_closed_line_ends_its_thread() -> None:
     opened = demo_line({"atv71": 10.0})
-    line: Line = opened.line
+    line = opened.line
     opened.close()
     opened.close()
     with pytest.raises(Exception, match="closed"):

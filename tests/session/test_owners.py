@@ -12,8 +12,9 @@ from typing import Any
 
 import pytest
 
+from tui.bus.api import ModbusLine, Priority, Reply
 from tui.bus.errors import NoAnswer
-from tui.bus.line import Line, Priority, Reply
+from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
@@ -46,7 +47,7 @@ class Bench:
         self.drive: SimulatedDrive = simulation.drive(1)
 
     @property
-    def line(self) -> Line:
+    def line(self) -> ModbusLine:
         """The line."""
         return self.fleet.line
 

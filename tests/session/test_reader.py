@@ -12,7 +12,7 @@ from tui.session.drive import DriveSession
 from tui.session.read.reader import PLANS_KEPT, Reader
 from tui.session.reading import Quality, Rating
 
-from .fakes import FakeLine, parameter, profile_of
+from .fakes import BlockDrive, OneDrive, parameter, profile_of
 
 INR = {"parameter": "INR", "scales": {"0": "0.01", "1": "0.1", "2": "1"}}
 
@@ -22,9 +22,9 @@ async def test_neighbours_come_in_one_request_with_their_units() -> None:
         parameter("LCR", 3204, unit="A", scale="0.1"),
         parameter("OTR", 3205, unit="%", scale="0.1", type="int16"),
     )
-    line = FakeLine({3204: 53, 3205: 0x10000 - 725})
-    readings = await Reader(DriveSession(line.as_line(), 1, profile)).read(["OTR", "LCR"])
-    assert line.requests == [(3204, 2)]
+    line = OneDrive({3204: 53, 3205: 0x10000 - 725})
+    readings = await Reader(DriveSession(line, 1, profile)).read(["OTR", "LCR"])
+    assert line.asked == [(3204, 2)]
     assert list(readings) == ["OTR", "LCR"]
     assert [r.value.display for r in readings.values() if r.value] == ["-72.5 %", "5.3 A"]
     assert all(r.quality is Quality.GOOD for r in readings.values())
@@ -32,8 +32,8 @@ async def test_neighbours_come_in_one_request_with_their_units() -> None:
 
 async def test_one_refused_word_does_not_hurt_its_neighbours() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
-    line = FakeLine({10: 1, 12: 3})
-    reader = Reader(DriveSession(line.as_line(), 1, profile))
+    line = OneDrive({10: 1, 12: 3})
+    reader = Reader(DriveSession(line, 1, profile))
     readings = await reader.read(["P10", "P11", "P12"])
     assert {c: r.raw for c, r in readings.items()} == {"P10": 1, "P11": None, "P12": 3}
     assert readings["P11"].quality is Quality.BAD
@@ -43,16 +43,16 @@ async def test_one_refused_word_does_not_hurt_its_neighbours() -> None:
 
 async def test_a_poll_does_not_ask_again_for_what_was_refused() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in (10, 11, 12)))
-    line = FakeLine({10: 1, 12: 3})
-    reader = Reader(DriveSession(line.as_line(), 1, profile))
+    line = OneDrive({10: 1, 12: 3})
+    reader = Reader(DriveSession(line, 1, profile))
     await reader.read(["P10", "P11", "P12"], priority=Priority.POLL)
     line.requests.clear()
     readings = await reader.read(["P10", "P11", "P12"], priority=Priority.POLL)
-    assert line.requests == [(10, 1), (12, 1)]
+    assert line.asked == [(10, 1), (12, 1)]
     assert readings["P11"].quality is Quality.BAD
     line.requests.clear()
     await reader.read(["P11"])
-    assert line.requests == [(11, 1)]
+    assert line.asked == [(11, 1)]
 
 
 async def test_the_word_for_no_value_is_asked_for_alone() -> None:
@@ -61,10 +61,9 @@ async def test_the_word_for_no_value_is_asked_for_alone() -> None:
         *(parameter(f"P{a}", a) for a in (8400, 8401, 8402)),
         reading={"unknown_word": 0x8000, "unknown_exception": 2},
     )
-    line = FakeLine({8401: 3, 8402: 0x8000}, unknown_word=0x8000)
-    readings = await Reader(DriveSession(line.as_line(), 12, profile)).read(
-        ["P8400", "P8401", "P8402"]
-    )
+    line = OneDrive({})
+    line.devices[1] = BlockDrive(1, {8401: 3, 8402: 0x8000})
+    readings = await Reader(DriveSession(line, 1, profile)).read(["P8400", "P8401", "P8402"])
     assert {c: r.raw for c, r in readings.items()} == {
         "P8400": None,
         "P8401": 3,
@@ -77,8 +76,8 @@ async def test_a_ramp_is_read_with_its_increment() -> None:
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR),
         parameter("INR", 9020, values={"0": "0.01 s", "1": "0.1 s", "2": "1 s"}),
     )
-    line = FakeLine({9001: 30, 9020: 0})
-    reader = Reader(DriveSession(line.as_line(), 1, profile))
+    line = OneDrive({9001: 30, 9020: 0})
+    reader = Reader(DriveSession(line, 1, profile))
     assert (await reader.read(["ACC"]))["ACC"].text == "0.30"
     line.registers[9020] = 2
     assert (await reader.read(["ACC"]))["ACC"].text == "30"
@@ -88,8 +87,8 @@ async def test_a_ramp_without_its_increment_is_shown_raw() -> None:
     profile = profile_of(
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=INR), parameter("INR", 9020)
     )
-    line = FakeLine({9001: 30})
-    reading = (await Reader(DriveSession(line.as_line(), 1, profile)).read(["ACC"]))["ACC"]
+    line = OneDrive({9001: 30})
+    reading = (await Reader(DriveSession(line, 1, profile)).read(["ACC"]))["ACC"]
     assert (reading.text, reading.unit) == ("30", "raw")
 
 
@@ -98,8 +97,8 @@ async def test_a_drive_without_the_increment_has_the_older_scale() -> None:
     profile = profile_of(
         parameter("ACC", 9001, unit="s", scale="0.1", scale_by=older), parameter("INR", 9020)
     )
-    line = FakeLine({9001: 30})
-    reading = (await Reader(DriveSession(line.as_line(), 1, profile)).read(["ACC"]))["ACC"]
+    line = OneDrive({9001: 30})
+    reading = (await Reader(DriveSession(line, 1, profile)).read(["ACC"]))["ACC"]
     assert (reading.text, reading.unit) == ("3.0", "s")
 
 
@@ -109,7 +108,7 @@ async def test_a_percentage_in_amperes_once_the_rating_is_known() -> None:
         parameter("OWN", 10, unit="%", scale="1", rating="NCR"),
         parameter("NCR", 11, unit="A", scale="0.1"),
     )
-    reader = Reader(DriveSession(FakeLine({65027: 5000, 10: 50, 11: 84}).as_line(), 1, profile))
+    reader = Reader(DriveSession(OneDrive({65027: 5000, 10: 50, 11: 84}), 1, profile))
     readings = await reader.read(["FE03", "OWN"])
     assert readings["FE03"].physical is None
     assert readings["OWN"].physical is not None
@@ -123,8 +122,8 @@ async def test_a_percentage_in_amperes_once_the_rating_is_known() -> None:
 @pytest.mark.parametrize("priority", [Priority.POLL, Priority.OPERATOR_READ])
 async def test_whatever_was_read_is_known_of_the_drive(priority: Priority) -> None:
     """What Monitor polls is what parameters, commands and stops go by."""
-    line = FakeLine({10: 7, 11: 8})
-    session = DriveSession(line.as_line(), 1, profile_of(parameter("A", 10), parameter("B", 11)))
+    line = OneDrive({10: 7, 11: 8})
+    session = DriveSession(line, 1, profile_of(parameter("A", 10), parameter("B", 11)))
     await Reader(session).read(["A", "B"], priority=priority)
     assert session.image.raws == {"A": 7, "B": 8}
     line.registers[10] = 9
@@ -133,14 +132,14 @@ async def test_whatever_was_read_is_known_of_the_drive(priority: Priority) -> No
 
 
 async def test_silence_is_an_error_not_a_value() -> None:
-    line = FakeLine({1: 1})
-    line.silent = True
+    line = OneDrive({1: 1})
+    line.silence(1)
     with pytest.raises(NoAnswer):
-        await Reader(DriveSession(line.as_line(), 1, profile_of(parameter("P1", 1)))).read(["P1"])
+        await Reader(DriveSession(line, 1, profile_of(parameter("P1", 1)))).read(["P1"])
 
 
 def test_the_line_learns_the_limits_of_the_profile() -> None:
-    line = FakeLine({})
+    line = OneDrive({})
     profile = profile_of(
         parameter("P1", 1),
         functions=[
@@ -150,7 +149,7 @@ def test_the_line_learns_the_limits_of_the_profile() -> None:
             {"code": 23, "name": "Both", "max_read": 20, "max_write": 10},
         ],
     )
-    Reader(DriveSession(line.as_line(), 7, profile))
+    Reader(DriveSession(line, 7, profile))
     limits = line.limits[7]
     assert limits.functions == {3, 6, 16, 23}
     assert (limits.max_read, limits.max_write) == (20, 12)
@@ -160,8 +159,8 @@ def test_the_line_learns_the_limits_of_the_profile() -> None:
 
 async def test_plans_do_not_pile_up_without_end() -> None:
     profile = profile_of(*(parameter(f"P{a}", a) for a in range(10, 120)))
-    line = FakeLine({a: a for a in range(10, 120)})
-    reader = Reader(DriveSession(line.as_line(), 1, profile))
+    line = OneDrive({a: a for a in range(10, 120)})
+    reader = Reader(DriveSession(line, 1, profile))
     for a in range(10, 118):
         await reader.read([f"P{a}", f"P{a + 1}"])
     assert len(reader._plans) <= PLANS_KEPT

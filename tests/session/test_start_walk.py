@@ -78,7 +78,7 @@ async def test_a_record_ends_with_the_standstill_and_not_with_the_stop(here: Slo
     """A stop that the drive never heard leaves the start to be found by the next program."""
     await here.start()
     here.line.dead_to_writes = True
-    stopper = Stopper(here.line.as_line(), here.journal)
+    stopper = Stopper(here.line, here.journal)
     stopper.stop([here.session])
     await until(lambda: stopper.reports[1].phase is Phase.FAILED)
     assert here.starts.close(5.0)

@@ -180,7 +180,7 @@ async def test_a_motor_that_coasts_is_not_stopped_before_it_stands(
     here = SlowBench(tmp_path, looks=0)
     await here.start()
     here.line.registers[FREQUENCY] = 500
-    stopper = Stopper(here.line.as_line(), here.journal)
+    stopper = Stopper(here.line, here.journal)
     stopper.stop([here.session])
     await wait_for(lambda: here.line.registers[STATUS] == SWITCHED_ON)
     looks = len(here.line.requests)

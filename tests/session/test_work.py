@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import AsyncIterator, Callable, Coroutine
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
+from tui.bus.api import LineStatus, LineWorker
 from tui.bus.errors import Superseded
-from tui.bus.line import Line, LineState, LineStatus
+from tui.bus.fake import FakeLine
 from tui.drive.orders import OrderRefused
 from tui.session.arming import Arming, NotArmed
 from tui.session.work import (
@@ -24,24 +25,20 @@ from tui.session.work import (
 )
 
 
-class Loop:
-    """A line that does the work in the test's own loop."""
+class Loop(FakeLine):
+    """A line that does the work in the test's own loop, and may cancel it late."""
 
-    read_only = False
+    cancels_late = False
 
-    def __init__(self) -> None:
-        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
-        self.cancels_late = False
-
-    def spawn(self, work: Callable[[], Coroutine[Any, Any, None]], _: str) -> asyncio.Task[None]:
-        task = asyncio.get_running_loop().create_task(work())
-        return cast("asyncio.Task[None]", _Late(task)) if self.cancels_late else task
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        worker = super().spawn(work, name)
+        return _Late(worker) if self.cancels_late else worker
 
 
 class _Late:
     """A worker that hears of being cancelled a few turns of the loop later."""
 
-    def __init__(self, task: asyncio.Task[None]) -> None:
+    def __init__(self, task: LineWorker) -> None:
         self._task = task
 
     def done(self) -> bool:
@@ -61,9 +58,9 @@ class Told:
 
     def __init__(self) -> None:
         self.line = Loop()
-        self.arming = Arming(cast("Line", self.line))
+        self.arming = Arming(self.line)
         self.arming.arm()
-        self.queue = WorkQueue(cast("Line", self.line), 1, self.arming)
+        self.queue = WorkQueue(self.line, 1, self.arming)
         self.said: list[str] = []
         self.before: dict[str, Outcome | None] = {}
         """What the work had come to when a task began."""
@@ -155,7 +152,7 @@ async def test_too_many_are_refused(told: Told) -> None:
 
 
 async def test_nothing_is_taken_for_a_lost_line(told: Told) -> None:
-    told.line.state = LineState(LineStatus.LOST, "", 0.0)
+    told.line.become(LineStatus.LOST)
     with pytest.raises(OrderRefused, match="line was lost"):
         told.put("a")
     with pytest.raises(OrderRefused, match="The line is lost"):

@@ -5,11 +5,14 @@ from __future__ import annotations
 import asyncio
 import math
 from collections.abc import Callable, Iterator, Sequence
+from typing import Any
 
 import pytest
 
-from tui.bus.errors import DeviceException, NoAnswer, RequestRefused, Superseded
-from tui.bus.line import LineState, LineStatus, Priority
+from tui.bus.api import Priority
+from tui.bus.errors import DeviceException, LineError, NoAnswer, RequestRefused, Superseded
+from tui.bus.fake_device import FakeDevice
+from tui.bus.requests import WriteOne
 from tui.session.arming import NotArmed
 from tui.session.drive import DriveSession
 from tui.session.journal import Journal
@@ -17,7 +20,7 @@ from tui.session.read.reader import Reader
 from tui.session.settings.write import NotTaken, Writer
 from tui.session.work import Permit, Stopped
 
-from .fakes import FakeLine, parameter, profile_of
+from .fakes import OneDrive, parameter, profile_of
 
 INR = {"parameter": "INR", "scales": {"0": "0.01", "1": "0.1", "2": "1"}}
 PROFILE = profile_of(
@@ -28,41 +31,31 @@ PROFILE = profile_of(
 )
 
 
-class WilfulLine(FakeLine):
-    """A drive that takes, changes, refuses or forgets what is written, as a test wants."""
+class WilfulDrive(FakeDevice):
+    """A drive that takes or changes what is written, as a test wants."""
+
+    keeps: Callable[[int, int], int] = staticmethod(lambda _address, word: word)
+
+    def take(self, address: int, values: Sequence[int]) -> None:
+        super().take(address, [self.keeps(address, value) for value in values])
+
+
+class WilfulLine(OneDrive):
+    """A line with such a drive, and something that happens while a write waits."""
 
     def __init__(self) -> None:
         super().__init__({10: 30, 11: 1, 12: 0})
-        self.state = LineState(LineStatus.CONNECTED, "", 0.0)
-        self.read_only = False
-        self.written: list[tuple[int, int]] = []
-        self.keeps: Callable[[int, int], int] = lambda _address, word: word
-        self.answer: Exception | None = None
+        self.drive = self.devices[1] = WilfulDrive(1, self.registers)
         self.before: Callable[[], None] = lambda: None
 
-    async def write(
-        self,
-        device: int,
-        address: int,
-        values: Sequence[int],
-        *,
-        priority: Priority = Priority.OPERATOR_WRITE,
-        multiple: bool | None = None,
-        replaceable: bool = False,
-        forbidden: Callable[[], str] | None = None,
-    ) -> float:
+    @property
+    def written(self) -> list[tuple[int, int]]:
+        """Address and word of all writes that went out."""
+        return [(one.address, one.value) for one in self.requests if isinstance(one, WriteOne)]
+
+    async def write(self, *what: Any, **how: Any) -> float:
         self.before()
-        if forbidden is not None and (why := forbidden()):
-            raise RequestRefused(why)
-        if isinstance(self.answer, RequestRefused | Superseded):
-            raise self.answer
-        self.written.append((address, values[0]))
-        if isinstance(self.answer, DeviceException):
-            raise self.answer
-        self.registers[address] = self.keeps(address, values[0])
-        if self.answer is not None:
-            raise self.answer
-        return 0.0
+        return await super().write(*what, **how)
 
 
 @pytest.fixture
@@ -74,7 +67,7 @@ def line() -> WilfulLine:
 @pytest.fixture
 def session(line: WilfulLine) -> DriveSession:
     """An armed session with it."""
-    made = DriveSession(line.as_line(), 1, PROFILE)
+    made = DriveSession(line, 1, PROFILE)
     made.arming.arm(seconds=math.inf)
     return made
 
@@ -106,7 +99,7 @@ async def test_a_value_that_the_drive_keeps_is_known_and_recorded(
 async def test_another_value_than_was_written_is_told_and_known(
     line: WilfulLine, session: DriveSession, journal: Journal, kept: int
 ) -> None:
-    line.keeps = lambda _address, _word: kept
+    line.drive.keeps = lambda _address, _word: kept
     with pytest.raises(NotTaken, match=r"ACC: written 5\.0 s, the drive holds"):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert session.image.raws["ACC"] == kept
@@ -117,7 +110,7 @@ async def test_another_value_than_was_written_is_told_and_known(
 async def test_only_the_bits_that_are_checked_must_be_held(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
-    line.keeps = lambda _address, word: word | 0x8000
+    line.drive.keeps = lambda _address, word: word | 0x8000
     await writer(session, journal).write_parameter(PROFILE["INR"], 1, why="bits", check=0x00FF)
     with pytest.raises(NotTaken):
         await writer(session, journal).write_parameter(PROFILE["INR"], 1, why="bits", check=0x80FF)
@@ -128,7 +121,7 @@ async def test_a_refused_write_leaves_nothing_known(
 ) -> None:
     """Only confirmed reads are known: neither the new value nor the old one is."""
     await Reader(session).read(["ACC"])
-    line.answer = DeviceException(1, 6, 10, 4, "not in this state")
+    line.fail_write(1, 10, 4)
     with pytest.raises(DeviceException):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert "ACC" not in session.image.raws
@@ -140,7 +133,7 @@ async def test_an_unanswered_write_makes_the_word_unknown(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     await Reader(session).read(["ACC"])
-    line.answer = NoAnswer(1, 6, 10)
+    line.fail_write(1, 10, NoAnswer(1, 6, 10), taken=True)
     with pytest.raises(NoAnswer):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert "ACC" not in session.image.raws
@@ -153,10 +146,10 @@ async def test_an_unanswered_write_makes_the_word_unknown(
     "answer", [RequestRefused("The line is read-only: nothing is written."), Superseded(1, 10)]
 )
 async def test_a_write_that_was_never_sent_changes_nothing_of_what_is_known(
-    line: WilfulLine, session: DriveSession, journal: Journal, answer: Exception
+    line: WilfulLine, session: DriveSession, journal: Journal, answer: LineError
 ) -> None:
     await Reader(session).read(["ACC"])
-    line.answer = answer
+    line.fail_write(1, 10, answer)
     with pytest.raises(type(answer)):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert session.image.raws["ACC"] == 30
@@ -167,7 +160,7 @@ async def test_a_reply_from_before_the_write_is_not_taken_for_the_word_after_it(
     line: WilfulLine, session: DriveSession, journal: Journal
 ) -> None:
     held = (await Reader(session).read(["ACC"]))["ACC"]
-    line.answer = NoAnswer(1, 6, 10)
+    line.fail_write(1, 10, NoAnswer(1, 6, 10), taken=True)
     with pytest.raises(NoAnswer):
         await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert held.raw is not None
@@ -180,7 +173,7 @@ async def test_what_cannot_be_read_back_is_not_known(
 ) -> None:
     await writer(session, journal).write_parameter(PROFILE["CMD"], 7, why="command")
     assert "CMD" not in session.image.raws
-    assert line.requests == []
+    assert line.asked == []
 
 
 async def test_the_journal_tells_units_though_the_scale_was_never_read(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Coroutine, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
@@ -10,7 +10,16 @@ from typing import Any, cast
 from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
-from tui.bus.line import DeviceState, Frame, Line, LineCounters, LineState, LineStatus
+from tui.bus.api import (
+    DeviceState,
+    Frame,
+    LineCounters,
+    LineState,
+    LineStatus,
+    LineWorker,
+    ModbusLine,
+)
+from tui.bus.fake import FakeLine
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
@@ -130,7 +139,7 @@ class StillMonitor(Monitor):
 class StillArming(Arming):
     """A drive that is armed for so many seconds, or not at all."""
 
-    def __init__(self, line: Line, seconds: float | None) -> None:
+    def __init__(self, line: ModbusLine, seconds: float | None) -> None:
         super().__init__(line)
         self._seconds = seconds
 
@@ -140,44 +149,45 @@ class StillArming(Arming):
         return self._seconds
 
 
-@dataclass
-class FakeLine:
-    """A line in a given state."""
+COUNTED = LineCounters(
+    requests=1204, replies=1203, timeouts=1, bytes_out=9632, bytes_in=30120, busy_seconds=31.0
+)
+FRAMES = (
+    Frame(NOW - 0.6, "out", bytes.fromhex("02030c1e0004276c")),
+    Frame(NOW - 0.59, "in", bytes.fromhex("02030800280258 01f4000052b0".replace(" ", ""))),
+    Frame(NOW - 0.1, "out", bytes.fromhex("0c0320d000030eef")),
+    Frame(NOW - 0.09, "in", bytes.fromhex("0c83025132"), "exception 2"),
+)
 
-    state: LineState = CONNECTED
-    link: SerialLink = field(default_factory=lambda: SerialLink("/dev/ttyUSB0"))
-    counters: LineCounters = field(
-        default_factory=lambda: LineCounters(
-            requests=1204,
-            replies=1203,
-            timeouts=1,
-            bytes_out=9632,
-            bytes_in=30120,
-            busy_seconds=31.0,
-        )
-    )
-    heard: float = NOW - 0.2
-    read_only: bool = False
-    trace: tuple[Frame, ...] = (
-        Frame(NOW - 0.6, "out", bytes.fromhex("02030c1e0004276c")),
-        Frame(NOW - 0.59, "in", bytes.fromhex("02030800280258 01f4000052b0".replace(" ", ""))),
-        Frame(NOW - 0.1, "out", bytes.fromhex("0c0320d000030eef")),
-        Frame(NOW - 0.09, "in", bytes.fromhex("0c83025132"), "exception 2"),
-    )
 
-    def spawn(self, *_: Any, **__: Any) -> Any:
-        """No loop, no worker."""
-        return type("Worker", (), {"cancel": lambda self: None, "done": lambda self: False})()
+class StillLine(FakeLine):
+    """A line in a given state, on which nothing works; every device was heard a moment ago."""
 
-    def device_state(self, _device: int) -> DeviceState:
-        """Heard a moment ago."""
-        return DeviceState(True, 0, None, None, 0.005, 0.005, self.heard)
+    def __init__(self, state: LineState = CONNECTED, *, heard: float = NOW - 0.2) -> None:
+        super().__init__(link=SerialLink("/dev/ttyUSB0"))
+        self.state = state
+        self.counters = COUNTED
+        self.trace = FRAMES
+        self._heard = heard
 
-    def describe(self, *_: Any) -> None:
-        """Limits are not looked at."""
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        """No worker begins, and none ends."""
+        return StillWorker()
 
-    def close(self) -> None:
-        """Nothing to close."""
+    def device_state(self, device: int) -> DeviceState:
+        """Each answers, and was heard when the picture says."""
+        return DeviceState(True, 0, None, None, 0.005, 0.005, self._heard)
+
+
+class StillWorker:
+    """A worker that is always at work."""
+
+    def cancel(self) -> None:
+        """It does not end."""
+
+    def done(self) -> bool:
+        """It has not ended."""
+        return False
 
 
 @dataclass
@@ -218,7 +228,7 @@ ATV71 = DriveIdentity(2, "Telemecanique", "ATV71HU15M3", "0201", "MACHINE 4", "a
 
 def opened(state: LineState = CONNECTED) -> OpenLine:
     """An open line without a port."""
-    return OpenLine("serial:/dev/ttyUSB0,19200,8E1", cast("Line", FakeLine(state)))
+    return OpenLine("serial:/dev/ttyUSB0,19200,8E1", StillLine(state))
 
 
 def console_of(
@@ -230,7 +240,7 @@ def console_of(
     armed: float | None = None,
 ) -> DriveConsole:
     """A drive whose monitor has brought this snapshot, with a trend of a start and a run."""
-    session = DriveSession(cast("Line", FakeLine(line)), device, library.load(family), ATV71)
+    session = DriveSession(StillLine(line), device, library.load(family), ATV71)
     session.arming = session.work.arming = StillArming(session.line, armed)
     trend = tuple(
         TrendPoint(NOW - 60 + i / 2, (min(50.0, max(0.0, i - 20) * 0.8), 2.0 + (i % 30) * 0.1))
@@ -259,7 +269,7 @@ class StillFleet(Fleet):
         line_watch: FakeLineWatch | None = None,
         line: LineState = CONNECTED,
     ) -> None:
-        super().__init__(cast("Line", FakeLine(line)), Journal())
+        super().__init__(StillLine(line), Journal())
         self.line_watch = cast("LineWatch", line_watch or FakeLineWatch())
         for drive in drives:
             self.hold(drive)

@@ -85,13 +85,16 @@ SPECIAL: dict[str, tuple[dict[str, Any], LineState, float, bool]] = {
 
 @SIZES
 @pytest.mark.parametrize("state", SPECIAL)
-def test_watched(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+def test_watched(
+    snap_compare: Compare, monkeypatch: pytest.MonkeyPatch, state: str, size: tuple[int, int]
+) -> None:
     how, line, age, low = SPECIAL[state]
     snapshot = fakes.snapshot_of(library.load("atv71"), line=line, **how)
     app = fakes.app_of()
     app.opened, app.low_bandwidth = fakes.opened(line), low
     console = fakes.console_of(snapshot, line)
-    console.session.line.heard = fakes.NOW - age  # type: ignore[attr-defined]
+    heard = fakes.StillLine(line, heard=fakes.NOW - age).device_state
+    monkeypatch.setattr(console.session.line, "device_state", heard)
     found = FoundDrive(fakes.ATV71, console)
     app.fleet = fakes.StillFleet(found, line_watch=fakes.FakeLineWatch(WATCH), line=line)
     fakes.choose(app, console)

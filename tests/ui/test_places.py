@@ -39,7 +39,7 @@ WIDTHS = st.sampled_from([47, 48, 85])
 
 def view_of(profile: Profile, raws: dict[str, int], age: float = 0.1) -> View:
     snapshot = fakes.snapshot_of(profile, raws, age=age)
-    line = fakes.FakeLine()
+    line = fakes.StillLine()
     return View(
         profile=profile,
         identity=fakes.ATV71,

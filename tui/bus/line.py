@@ -28,10 +28,9 @@ from .requests import (
     Read,
     ReadWrite,
     Request,
-    WriteMany,
-    WriteOne,
     diagnostic_of,
     objects_of,
+    write_request,
 )
 from .schedule.engine import Engine
 from .schedule.pace import Pace
@@ -153,7 +152,7 @@ class Line:
         in its place.
         """
         limits = self._devices[device].limits
-        request = _write(device, address, values, multiple, limits.functions)
+        request = write_request(device, address, values, multiple, limits.functions)
         reply = await self._ask(request, priority, replaceable=replaceable, forbidden=forbidden)
         return reply.time
 
@@ -211,7 +210,7 @@ class Line:
 
         Nobody answers; the line is left quiet afterwards, which this waits for.
         """
-        request = _write(BROADCAST, address, values, None, limits.broadcast_functions)
+        request = write_request(BROADCAST, address, values, None, limits.broadcast_functions)
         return (await self._ask(request, priority, limits)).time
 
     def spawn(self, work: ThreadWork, name: str) -> Worker:
@@ -256,21 +255,3 @@ def timing_of(link: Link) -> Timing:
         scan_timeout=min(usual.scan_timeout, link.timeout),
         late_reply=max(usual.late_reply, LATE_REPLY * link.timeout),
     )
-
-
-def _write(
-    device: int,
-    address: int,
-    values: Sequence[int],
-    multiple: bool | None,
-    functions: frozenset[int],
-) -> WriteOne | WriteMany:
-    """The request that writes the values with what the device knows."""
-    if multiple is None:
-        one_word = WriteOne.function in functions or WriteMany.function not in functions
-        multiple = len(values) != 1 or not one_word
-    if multiple:
-        return WriteMany(device, address, tuple(values))
-    if len(values) != 1:
-        raise RequestRefused(f"Function 6 writes one word, not {len(values)}.")
-    return WriteOne(device, address, values[0])

@@ -7,6 +7,7 @@ before anything is read from a reply.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -21,6 +22,7 @@ from pymodbus.pdu.register_message import (
     WriteSingleRegisterRequest,
 )
 
+from .errors import RequestRefused
 from .expectation import IDENTIFY, MEI_IDENTIFICATION, Expectation
 
 DATA_ECHOED = frozenset({0x00, 0x01, 0x03, 0x0A, 0x14})
@@ -206,6 +208,27 @@ class Identify(Request):
         return Expectation(
             self.function, bytes([IDENTIFY, MEI_IDENTIFICATION, self.read_code]), None
         )
+
+
+def write_request(
+    device: int,
+    address: int,
+    values: Sequence[int],
+    multiple: bool | None,
+    functions: frozenset[int],
+) -> WriteOne | WriteMany:
+    """The request that writes the values with what the device knows; see Line.write.
+
+    Raises RequestRefused where function 6 alone cannot carry them.
+    """
+    if multiple is None:
+        one_word = WriteOne.function in functions or WriteMany.function not in functions
+        multiple = len(values) != 1 or not one_word
+    if multiple:
+        return WriteMany(device, address, tuple(values))
+    if len(values) != 1:
+        raise RequestRefused(f"Function 6 writes one word, not {len(values)}.")
+    return WriteOne(device, address, values[0])
 
 
 def _words_expected(function: int, count: int) -> Expectation:

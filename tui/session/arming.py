@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tui.bus.line import Line, LineStatus
+from tui.bus.api import LineStatus, ModbusLine
 from tui.drive.orders import OrderRefused
 
 from .clock import REAL_CLOCK, Clock
@@ -23,7 +23,7 @@ class NotArmed(OrderRefused):
 class Arming:
     """Lets writes to one drive through for a while; whatever writes asks here."""
 
-    def __init__(self, line: Line, clock: Clock = REAL_CLOCK) -> None:
+    def __init__(self, line: ModbusLine, clock: Clock = REAL_CLOCK) -> None:
         self._line = line
         self._clock = clock
         self._until: float | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from tui.bus.line import Line
+from tui.bus.api import ModbusLine
 from tui.bus.link import label
 from tui.drive.chart import UNKNOWN, ChartState, read_chart
 from tui.drive.profile.profile import Profile
@@ -27,7 +27,7 @@ class DriveSession:
 
     def __init__(
         self,
-        line: Line,
+        line: ModbusLine,
         device: int,
         profile: Profile,
         identity: DriveIdentity | None = None,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 
-from tui.bus.line import Line
+from tui.bus.api import ModbusLine
 from tui.drive.profile.schema import OrderId
 
 from .clock import REAL_CLOCK, Clock
@@ -49,7 +49,7 @@ class Fleet:
 
     def __init__(
         self,
-        line: Line,
+        line: ModbusLine,
         journal: Journal,
         starts: StartKeeper | None = None,
         events: EventLog | None = None,

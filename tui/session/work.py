@@ -14,8 +14,8 @@ from collections.abc import Awaitable, Callable
 from dataclasses import dataclass
 from enum import StrEnum
 
+from tui.bus.api import LineStatus, LineWorker, ModbusLine
 from tui.bus.errors import LineError, Superseded
-from tui.bus.line import Line, LineStatus, Worker
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
@@ -96,7 +96,9 @@ class Task:
 class WorkQueue:
     """Takes the work on one drive from any thread; knows its stops and its last outcome."""
 
-    def __init__(self, line: Line, device: int, arming: Arming, clock: Clock = REAL_CLOCK) -> None:
+    def __init__(
+        self, line: ModbusLine, device: int, arming: Arming, clock: Clock = REAL_CLOCK
+    ) -> None:
         self.arming = arming
         self.outcome: Outcome | None = None
         """What the last work has come to: the one truth about this drive."""
@@ -114,7 +116,7 @@ class WorkQueue:
         self._lock = threading.RLock()
         self._waiting: deque[tuple[Task, Permit]] = deque()
         self._doing: Task | None = None
-        self._worker: Worker | None = None
+        self._worker: LineWorker | None = None
         self._turn = object()
         """Whose turn it is to take tasks: a worker that a stop has ended takes none."""
 

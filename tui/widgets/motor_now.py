@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.text import Text
 
-from tui.bus.line import LineStatus
+from tui.bus.api import LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 from tui.session.monitor.line_watch import GLANCE, Look

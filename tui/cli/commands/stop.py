@@ -219,8 +219,8 @@ async def _found(
 
     Raises Failure where it cannot be stopped, and why.
     """
+    from tui.bus.api import Priority
     from tui.bus.errors import LineError, NoAnswer
-    from tui.bus.line import Priority
     from tui.session.connect.identify import identify_drive
 
     priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND

@@ -107,8 +107,8 @@ async def read_out(upload: Upload) -> None:
 
     Raises the line's errors where it does not come back.
     """
+    from tui.bus.api import LineStatus
     from tui.bus.errors import LineLost
-    from tui.bus.line import LineStatus
 
     line = upload.session.line
     while not upload.done:

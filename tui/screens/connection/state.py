@@ -164,7 +164,7 @@ class ConnectionView(PanelScreen):
         count = f"{len(self.found)} found" if self.found else ""
         self._title("drives-title", "Drives", count)
         if state is not None:
-            from tui.bus.line import LineStatus
+            from tui.bus.api import LineStatus
 
             if state.status is LineStatus.LOST:
                 reason = f"LINE LOST: {state.reason}"
@@ -218,7 +218,7 @@ class ConnectionView(PanelScreen):
         opened = self.app.opened
         if opened is None:  # the first picture waits for no import
             return False
-        from tui.bus.line import LineStatus
+        from tui.bus.api import LineStatus
 
         return opened.line.state.status is LineStatus.CONNECTED
 

@@ -7,7 +7,7 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 
-from tui.bus.line import Frame
+from tui.bus.api import Frame
 from tui.session.console import DriveConsole
 from tui.widgets.drawing import rule, short
 from tui.widgets.lines import Lines

@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.style import Style
 from rich.text import Text
 
-from tui.bus.line import LineStatus
+from tui.bus.api import LineStatus
 from tui.drive.profile.schema import Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.command.stop_report import Phase, StopReport

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.bus.line import LineCounters, LineState, LineStatus
+from tui.bus.api import LineCounters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import MonitoringValue
 from tui.screens.command.control import UNARMED, Control

@@ -12,8 +12,8 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
 
+from tui.bus.api import LineWorker
 from tui.bus.errors import LineError
-from tui.bus.line import Worker
 from tui.drive.blocks.assignment import Assignment, MappingError
 from tui.drive.blocks.user_words import UserWords
 from tui.drive.errors import DriveError
@@ -54,7 +54,7 @@ class BlockEditor:
     trouble: str = ""
     """Why nothing can be read now; empty while that works."""
     mapper: Mapper = field(init=False)
-    _reader: Worker | None = None
+    _reader: LineWorker | None = None
     _verify: bool = False
 
     def __post_init__(self) -> None:

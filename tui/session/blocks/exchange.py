@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
+from tui.bus.api import Priority
 from tui.bus.errors import LineError, RequestRefused
-from tui.bus.line import Priority
 from tui.drive.blocks.assignment import UNUSED, Assignment, slot_target
 from tui.drive.blocks.wire_cost import span
 from tui.drive.profile.schema import Parameter

@@ -12,8 +12,8 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 
+from tui.bus.api import Priority
 from tui.bus.errors import DeviceException
-from tui.bus.line import Priority
 from tui.bus.link import TcpLink, character_time, silence
 from tui.drive.blocks.assignment import UNUSED, Assignment, assignment, slot_target
 from tui.drive.blocks.wire_cost import span

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from tui.bus.api import Priority
 from tui.bus.errors import DeviceException
-from tui.bus.line import Priority
 from tui.drive.blocks.assignment import MappingError
 from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named, is_no_value
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
-from tui.bus.line import Priority
+from tui.bus.api import Priority
 from tui.drive.chart import state_of
 from tui.drive.orders import (
     OrderRefused,

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from tui.bus.line import Priority
+from tui.bus.api import Priority
 from tui.drive.control_source import source_changes, source_codes
 from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import ControlSource

@@ -6,8 +6,8 @@ import logging
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
+from tui.bus.api import Priority
 from tui.bus.errors import ExchangeError
-from tui.bus.line import Priority
 from tui.drive.chart import state_of
 from tui.drive.orders import (
     chart_in_force,

@@ -13,8 +13,8 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
 
+from tui.bus.api import LineWorker, ModbusLine, Priority
 from tui.bus.errors import DeviceException, ExchangeError, LineError, RequestRefused
-from tui.bus.line import Line, Priority, Worker
 from tui.drive.errors import DriveError
 from tui.drive.orders import (
     OrderRefused,
@@ -40,7 +40,7 @@ STOP_TRIES = 5
 class Stopper:
     """Stops drives of one line; `stop` may be called from any thread and returns at once."""
 
-    def __init__(self, line: Line, journal: Journal, events: EventLog | None = None) -> None:
+    def __init__(self, line: ModbusLine, journal: Journal, events: EventLog | None = None) -> None:
         self._line = line
         self._events = events
         self._journal = journal
@@ -161,7 +161,7 @@ class _UnderWay:
     """A stop that was begun."""
 
     stop: MotorStop
-    worker: Worker
+    worker: LineWorker
     times: int
     """How often the drive had been armed then."""
 

@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from tui.bus.api import IdentificationObjects, ModbusLine, Priority
 from tui.bus.errors import (
     DeviceException,
     LineClosed,
@@ -15,7 +16,6 @@ from tui.bus.errors import (
     RequestRefused,
 )
 from tui.bus.expectation import IDENTIFY
-from tui.bus.line import IdentificationObjects, Line, Priority
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 
@@ -54,7 +54,7 @@ class ScanResult:
 
 
 async def identify_drive(
-    line: Line, device: int, *, priority: Priority = Priority.OPERATOR_READ
+    line: ModbusLine, device: int, *, priority: Priority = Priority.OPERATOR_READ
 ) -> DriveIdentity:
     """Ask a drive who it is by function 43.
 
@@ -72,7 +72,7 @@ async def identify_drive(
     return await asyncio.to_thread(_identity, device, answer)
 
 
-async def _ask(line: Line, device: int, priority: Priority) -> IdentificationObjects:
+async def _ask(line: ModbusLine, device: int, priority: Priority) -> IdentificationObjects:
     """Function 43; a person's question is asked again once, a lost reply is no absent drive."""
     try:
         return await line.identify(device, priority=priority)
@@ -104,7 +104,7 @@ def _identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
     )
 
 
-async def _nameless_families(line: Line, device: int, priority: Priority) -> tuple[str, ...]:
+async def _nameless_families(line: ModbusLine, device: int, priority: Priority) -> tuple[str, ...]:
     """Profiles without function 43 whose status word the device lets be read.
 
     None of them where it only refuses: it is there. Raises NoAnswer where nothing answers.
@@ -141,7 +141,9 @@ def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
     return found
 
 
-async def scan(line: Line, devices: Iterable[int], found: Callable[[ScanResult], None]) -> None:
+async def scan(
+    line: ModbusLine, devices: Iterable[int], found: Callable[[ScanResult], None]
+) -> None:
     """Ask each address in turn, behind everything else; `found` hears of all not silent.
 
     What is wrong with one address ends nothing. Raises LineClosed and LineLost.

@@ -15,7 +15,7 @@ from tui.bus.errors import LinkSyntaxError
 from .line_key import SIMULATED_PREFIX
 
 if TYPE_CHECKING:
-    from tui.bus.line import Line
+    from tui.bus.api import ModbusLine
     from tui.bus.link import Link
     from tui.simulator import DriveSpec, Simulation
 
@@ -26,7 +26,7 @@ class OpenLine:
 
     text: str
     """As it was typed."""
-    line: Line
+    line: ModbusLine
     simulation: Simulation | None = None
     devices: tuple[int, ...] = ()
     """Addresses known to be taken: those of a simulated line, else none."""

@@ -11,8 +11,8 @@ import logging
 from collections.abc import Awaitable, Callable, Mapping
 from dataclasses import dataclass, replace
 
+from tui.bus.api import LineWorker, ModbusLine, Priority
 from tui.bus.errors import LineError
-from tui.bus.line import Line, Priority, Worker
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
@@ -55,13 +55,13 @@ class _Kept:
     since: float
     watch: TimeoutWatch | None = None
     learned: float | None = None
-    workers: tuple[Worker, ...] = ()
+    workers: tuple[LineWorker, ...] = ()
 
 
 class LineWatch:
     """Asks each kept drive often enough, in workers of the line's loop."""
 
-    def __init__(self, line: Line) -> None:
+    def __init__(self, line: ModbusLine) -> None:
         self._line = line
         self._kept: dict[int, _Kept] = {}
         self._looks: dict[int, Look] = {}

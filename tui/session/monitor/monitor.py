@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
+from tui.bus.api import LineWorker, Priority
 from tui.bus.errors import LineClosed, LineError, LineLost
-from tui.bus.line import Priority, Worker
 from tui.drive.errors import DriveError
 from tui.drive.orders import deciding_codes
 
@@ -64,7 +64,7 @@ class Monitor:
         self._learn_due = True
         self._trend = Trend(session.profile)
         self._listeners: tuple[Listener, ...] = ()
-        self._worker: Worker | None = None
+        self._worker: LineWorker | None = None
 
     @property
     def latest(self) -> Snapshot | None:

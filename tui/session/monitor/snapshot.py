@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tui.bus.line import LineState
+from tui.bus.api import LineState
 
 from ..drive_state import DriveState
 from ..reading import Reading

@@ -6,8 +6,8 @@ import math
 from collections.abc import Hashable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
+from tui.bus.api import ModbusLine, Priority, Reply
 from tui.bus.errors import DeviceException, NoAnswer
-from tui.bus.line import Line, Priority, Reply
 from tui.bus.link import TcpLink, character_time, silence
 from tui.drive.chart import read_chart
 from tui.drive.profile.profile import Profile, is_verified
@@ -52,7 +52,7 @@ class Reader:
         self._slots = Slots(self.line, self.device, self.profile, self.session.clock)
 
     @property
-    def line(self) -> Line:
+    def line(self) -> ModbusLine:
         """The line of the drive."""
         return self.session.line
 

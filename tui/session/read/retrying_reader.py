@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
+from tui.bus.api import Priority
 from tui.bus.errors import ChecksumFault, NoAnswer, WrongReply
-from tui.bus.line import Priority
 from tui.drive.chart import watched_codes
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import StateKind

@@ -12,8 +12,8 @@ from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
 
+from tui.bus.api import ModbusLine, Priority
 from tui.bus.errors import DeviceException
-from tui.bus.line import Line, Priority
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block
 
@@ -80,7 +80,7 @@ class _Comparison:
 class Slots:
     """The slots of one drive's read blocks; `ask` reads parameters at the priority of polls."""
 
-    line: Line
+    line: ModbusLine
     device: int
     profile: Profile
     clock: Clock

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from datetime import datetime
 
 import tui
-from tui.bus.line import Priority
+from tui.bus.api import Priority
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.parameter_set import ParameterSet, SetHead
 from tui.drive.settings.rating import rating_codes

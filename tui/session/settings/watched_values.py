@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
+from tui.bus.api import LineWorker, Priority
 from tui.bus.errors import LineError, NoAnswer
-from tui.bus.line import Priority, Worker
 from tui.drive.profile.schema import Parameter, StateKind
 from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
@@ -41,7 +41,7 @@ class WatchedValues:
     """What is looked at now."""
     trouble: str = ""
     """Why nothing can be read now; empty while that works."""
-    _reader: Worker | None = None
+    _reader: LineWorker | None = None
     _silent: float | None = None
     """Since when the drive does not answer."""
     _starting: bool = False

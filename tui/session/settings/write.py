@@ -5,8 +5,8 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass
 
+from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, LineError, RequestRefused, Superseded
-from tui.bus.line import Priority
 from tui.drive.errors import DriveError
 from tui.drive.profile.schema import Parameter
 from tui.drive.shown import depends_on, shown_text

@@ -1,0 +1,165 @@
+"""What sessions, screens and commands ask of a line: the Protocol `ModbusLine`.
+
+`tui.bus.line.Line` is the one for live drives, `tui.bus.fake.FakeLine` the one without a wire.
+Whatever only uses a line types against the Protocol; only who opens a line names `Line`. The
+values that go with it can be imported from here too, without what a real line is made of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Coroutine, Sequence
+from typing import TYPE_CHECKING, Any, Protocol
+
+from .model import (
+    DeviceState,
+    IdentificationObjects,
+    LineCounters,
+    LineState,
+    LineStatus,
+    Priority,
+    Reply,
+)
+from .trace import Frame
+
+if TYPE_CHECKING:
+    from .limits import Limits
+    from .link import Link
+    from .schedule.pace import Pace
+
+__all__ = [
+    "DeviceState",
+    "Frame",
+    "IdentificationObjects",
+    "LineCounters",
+    "LineState",
+    "LineStatus",
+    "LineWorker",
+    "ModbusLine",
+    "Priority",
+    "Reply",
+]
+
+
+class LineWorker(Protocol):
+    """A coroutine at work in the line's loop; all methods may be called from any thread."""
+
+    def cancel(self) -> object:
+        """Ask the work to end; more than once does no harm."""
+
+    def done(self) -> bool:
+        """Whether the work has ended: by itself, by cancel() or by an error."""
+
+
+class ModbusLine(Protocol):
+    """A line shared by everything that talks to its devices.
+
+    A device is 1..247, an address a register number from 0, a word 0..65535, a time the line's
+    clock in seconds. Requests go out one at a time: by priority, then first come first served.
+    Each raises LineClosed, LineLost, LineBusy or RequestRefused where nothing was sent (a lost
+    line also during an exchange), and an ExchangeError where something was: NoAnswer,
+    ChecksumFault, WrongReply or DeviceException. A read may be repeated, a write never is.
+    """
+
+    @property
+    def link(self) -> Link:
+        """What the line is reached by."""
+
+    @property
+    def read_only(self) -> bool:
+        """Whether everything that changes a device is refused with RequestRefused."""
+
+    @property
+    def pace(self) -> Pace:
+        """Shares the line's time out among regular polls."""
+
+    @property
+    def state(self) -> LineState:
+        """Whether the line can be used now, and if not, why and when it is tried again."""
+
+    @property
+    def counters(self) -> LineCounters:
+        """What has happened on the line so far."""
+
+    @property
+    def trace(self) -> tuple[Frame, ...]:
+        """The last frames, oldest first."""
+
+    def open(self, *, wait: float | None = None) -> None:
+        """Start the line; with `wait` return once connected, or raise after so many seconds."""
+
+    def close(self) -> None:
+        """Close the line for good; what waits fails with LineClosed. May be called twice."""
+
+    def describe(self, device: int, limits: Limits) -> None:
+        """Set what a device may be sent; nobody's device gets one word and no write."""
+
+    def device_state(self, device: int) -> DeviceState:
+        """What the line has seen of a device."""
+
+    async def read(
+        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+    ) -> Reply:
+        """Read `count` registers by function 3."""
+
+    async def write(
+        self,
+        device: int,
+        address: int,
+        values: Sequence[int],
+        *,
+        priority: Priority = Priority.OPERATOR_WRITE,
+        multiple: bool | None = None,
+        replaceable: bool = False,
+        forbidden: Callable[[], str] | None = None,
+    ) -> float:
+        """Write registers, once; returns when the answer came.
+
+        One word goes by function 6 and more by 16, unless `multiple` says which. A `replaceable`
+        write that a newer one of the same register overtook raises Superseded, unsent.
+        `forbidden` is asked just before the frame goes out; a reason that it gives is raised as
+        RequestRefused in its place.
+        """
+
+    async def read_write(
+        self,
+        device: int,
+        read_address: int,
+        count: int,
+        write_address: int,
+        values: Sequence[int],
+        *,
+        priority: Priority = Priority.OPERATOR_WRITE,
+        forbidden: Callable[[], str] | None = None,
+    ) -> Reply:
+        """Write registers, then read `count` others, by function 23, once; see `write`."""
+
+    async def identify(
+        self, device: int, *, priority: Priority = Priority.OPERATOR_READ
+    ) -> IdentificationObjects:
+        """Ask a device who it is by function 43/14."""
+
+    async def diagnose(
+        self,
+        device: int,
+        subfunction: int,
+        data: int = 0,
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+    ) -> int:
+        """Ask by function 8; returns the data word of the answer."""
+
+    async def broadcast(
+        self,
+        address: int,
+        values: Sequence[int],
+        *,
+        limits: Limits,
+        priority: Priority = Priority.OPERATOR_WRITE,
+    ) -> float:
+        """Write registers of all devices; returns when it was sent. Nobody answers."""
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        """Run a coroutine in the line's own loop; it ends with the line. Raises LineClosed."""
+
+    def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
+        """Call `listener` in the line's thread at each new state; returns how to end that."""

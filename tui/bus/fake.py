@@ -1,0 +1,291 @@
+"""A line without a wire, for tests and for programs that want a `ModbusLine` of their own making.
+
+    line = FakeLine({1: {3201: 0x0237, 8501: 0}})
+    line.describe(1, limits)                                 # as DriveSession does
+    line.fail_read(1, 3201, NoAnswer(1, 3, 3201), times=2)   # the next two reads of it
+    line.fail_write(1, 8501, 4)                              # every write: exception 4
+    line.delay(1, 0.2)                                       # its answers take so long
+    line.silence(2)                                          # it answers nothing
+    ... await line.read(1, 3201) ...
+    assert line.requests == [Read(1, 3201, 1)]               # all that went out, in order
+
+Registers, failures and delays may be changed at any time. Requests are checked as on a real line:
+by the limits that describe() gave a device, and by read-only. All is done in the loop of whoever
+calls, so a fake line belongs to one thread; it queues nothing and repeats nothing.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import time
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from typing import Any, TypeVar
+
+from .api import LineWorker
+from .errors import ExchangeError, LineClosed, LineError, LineLost, NoAnswer, RequestRefused
+from .fake_device import FakeDevice, PlannedFailure
+from .limits import CAUTIOUS, Limits, send_refusal
+from .link import Link, SerialLink
+from .model import (
+    DeviceState,
+    IdentificationObjects,
+    LineCounters,
+    LineState,
+    LineStatus,
+    Priority,
+    Reply,
+)
+from .requests import BROADCAST, Diagnose, Identify, Read, ReadWrite, Request, write_request
+from .schedule.pace import Pace
+from .trace import Frame
+
+T = TypeVar("T")
+
+
+class FakeLine:
+    """Devices as dictionaries of registers, failures by address, and a log of requests.
+
+    `registers` are words by address by device; a device that is not among them is silent, an
+    address that it lacks is refused with exception 2.
+    """
+
+    def __init__(
+        self,
+        registers: Mapping[int, Mapping[int, int]] | None = None,
+        *,
+        link: Link | None = None,
+        read_only: bool = False,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.link: Link = link or SerialLink("/dev/null")
+        self.read_only = read_only
+        self.pace = Pace()
+        self.devices = {n: FakeDevice(n, words) for n, words in (registers or {}).items()}
+        """Those that are there; may be added to, and replaced by some of another kind."""
+        self.requests: list[Request] = []
+        """All that was sent, in order; not what was refused before."""
+        self.limits: dict[int, Limits] = {}
+        """What describe() was told."""
+        self.state = LineState(LineStatus.CONNECTED, "", clock())
+        self.counters = LineCounters()
+        """Nothing is counted here, `requests` tells; may be set."""
+        self.trace: tuple[Frame, ...] = ()
+        """No frames are made; may be set."""
+        self._clock = clock
+        self._listeners: list[Callable[[LineState], None]] = []
+        self._workers: list[LineWorker] = []
+
+    # What is to happen
+
+    def fail_read(
+        self, device: int, address: int | None, error: LineError | int, *, times: float = math.inf
+    ) -> None:
+        """Let reads that hold an address fail, of any address for None.
+
+        An int is the code of the exception with which the device refuses. So many requests fail,
+        one after another; 0 takes the failures of that address back.
+        """
+        self.devices[device].fail("read", PlannedFailure(error, address, times))
+
+    def fail_write(
+        self,
+        device: int,
+        address: int | None,
+        error: LineError | int,
+        *,
+        times: float = math.inf,
+        taken: bool = False,
+    ) -> None:
+        """Let writes fail, see fail_read; where `taken` the device holds the words all the same.
+
+        RequestRefused, Superseded, LineBusy and the like are raised without anything being sent.
+        """
+        self.devices[device].fail("write", PlannedFailure(error, address, times, taken))
+
+    def fail_identify(
+        self, device: int, error: LineError | int, *, times: float = math.inf
+    ) -> None:
+        """Let function 43/14 fail, see fail_read."""
+        self.devices[device].fail("identify", PlannedFailure(error, None, times))
+
+    def delay(self, device: int, seconds: float) -> None:
+        """Let each answer of a device take so long."""
+        self.devices[device].seconds = seconds
+
+    def silence(self, device: int, silent: bool = True) -> None:
+        """Let a device answer nothing any more, or answer again."""
+        self.devices[device].silent = silent
+
+    def become(self, status: LineStatus, reason: str = "") -> None:
+        """Lose the line, regain it; tells those who listen."""
+        self.state = LineState(status, reason, self._clock())
+        for listener in tuple(self._listeners):
+            listener(self.state)
+
+    # A line
+
+    def open(self, *, wait: float | None = None) -> None:
+        """It is open from the beginning."""
+
+    def close(self) -> None:
+        """Close the line for good, and end what works on it."""
+        if self.state.status is not LineStatus.CLOSED:
+            self.become(LineStatus.CLOSED)
+        for worker in self._workers:
+            worker.cancel()
+
+    def describe(self, device: int, limits: Limits) -> None:
+        """Set what a device may be sent."""
+        self.limits[device] = limits
+
+    def device_state(self, device: int) -> DeviceState:
+        """What was set for the device, or what the requests so far have shown."""
+        return self._device(device).state
+
+    async def read(
+        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+    ) -> Reply:
+        """Read registers."""
+        held = self._device(device).held
+        request = Read(device, address, count)
+        words = await self._exchange(request, "read", lambda: held(address, count))
+        return Reply(words, self._clock())
+
+    async def write(
+        self,
+        device: int,
+        address: int,
+        values: Sequence[int],
+        *,
+        priority: Priority = Priority.OPERATOR_WRITE,
+        multiple: bool | None = None,
+        replaceable: bool = False,
+        forbidden: Callable[[], str] | None = None,
+    ) -> float:
+        """Write registers, once."""
+        take = self._device(device).take
+        functions = self.limits.get(device, CAUTIOUS).functions
+        request = write_request(device, address, values, multiple, functions)
+        await self._exchange(request, "write", lambda: take(address, values), forbidden)
+        return self._clock()
+
+    async def read_write(
+        self,
+        device: int,
+        read_address: int,
+        count: int,
+        write_address: int,
+        values: Sequence[int],
+        *,
+        priority: Priority = Priority.OPERATOR_WRITE,
+        forbidden: Callable[[], str] | None = None,
+    ) -> Reply:
+        """Write registers, then read others, once."""
+        there = self._device(device)
+
+        def both() -> tuple[int, ...]:
+            there.take(write_address, values)
+            return there.held(read_address, count)
+
+        request = ReadWrite(device, read_address, count, write_address, tuple(values))
+        return Reply(await self._exchange(request, "write", both, forbidden), self._clock())
+
+    async def identify(
+        self, device: int, *, priority: Priority = Priority.OPERATOR_READ
+    ) -> IdentificationObjects:
+        """The objects that the device's `identity` holds."""
+        objects = self._device(device).objects
+        return await self._exchange(Identify(device), "identify", objects)
+
+    async def diagnose(
+        self,
+        device: int,
+        subfunction: int,
+        data: int = 0,
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+    ) -> int:
+        """Every sub-function gives its data back."""
+        request = Diagnose(device, subfunction, data)
+        return await self._exchange(request, "diagnose", lambda: data)
+
+    async def broadcast(
+        self,
+        address: int,
+        values: Sequence[int],
+        *,
+        limits: Limits,
+        priority: Priority = Priority.OPERATOR_WRITE,
+    ) -> float:
+        """Write registers of all devices that have them."""
+        request = write_request(BROADCAST, address, values, None, limits.broadcast_functions)
+        self._check(request, limits)
+        self.requests.append(request)
+        for device in self.devices.values():
+            if not device.silent and address in device.words:
+                device.take(address, values)
+        return self._clock()
+
+    def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
+        """Run a coroutine in the loop of whoever calls."""
+        if self.state.status is LineStatus.CLOSED:
+            raise LineClosed
+        worker: LineWorker = asyncio.get_running_loop().create_task(work(), name=name)
+        self._workers.append(worker)
+        return worker
+
+    def on_state(self, listener: Callable[[LineState], None]) -> Callable[[], None]:
+        """Call `listener` at each new state."""
+        self._listeners.append(listener)
+        return lambda: self._listeners.remove(listener)
+
+    # One exchange
+
+    def _device(self, device: int) -> FakeDevice:
+        """The device; one that was not told of is silent."""
+        if device not in self.devices:
+            self.devices[device] = FakeDevice(device)
+            self.devices[device].silent = True
+        return self.devices[device]
+
+    def _check(self, request: Request, limits: Limits) -> None:
+        """Refuse what a real line would not send."""
+        if reason := send_refusal(request, limits, read_only=self.read_only):
+            raise RequestRefused(reason)
+        if self.state.status is LineStatus.CLOSED:
+            raise LineClosed
+        if self.state.status is not LineStatus.CONNECTED:
+            raise LineLost(self.state.reason)
+
+    async def _exchange(
+        self,
+        request: Request,
+        kind: str,
+        carry_out: Callable[[], T],
+        forbidden: Callable[[], str] | None = None,
+    ) -> T:
+        """Check a request, log it, let the device do it, wait as long as its answer takes."""
+        self._check(request, self.limits.get(request.device, CAUTIOUS))
+        if forbidden is not None and (why := forbidden()):
+            raise RequestRefused(why)
+        device = self._device(request.device)
+        failure = device.next_failure(kind, request)
+        error = failure.raised(request) if failure else None
+        if error is not None and not isinstance(error, ExchangeError):
+            raise error
+        self.requests.append(request)
+        if device.silent:
+            error = NoAnswer(request.device, request.function, request.register)
+        try:
+            if not device.silent and (failure is None or failure.taken):
+                done = carry_out()
+            # the device has it by now, whoever waits for the answer
+            await asyncio.sleep(device.seconds)
+            if error is not None:
+                raise error
+        except ExchangeError as raised:
+            device.noted(raised, self._clock())
+            raise
+        device.noted(None, self._clock())
+        return done

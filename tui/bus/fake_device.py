@@ -1,0 +1,116 @@
+"""A device on a fake line: its registers, what goes wrong with it, what the line sees of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from .errors import DeviceException, ExchangeError, LineError, NoAnswer
+from .limits import STANDARD_EXCEPTIONS
+from .model import DeviceState, IdentificationObjects
+from .requests import Identify, Read, ReadWrite, Request, WriteMany, WriteOne
+
+UNKNOWN_FUNCTION, UNKNOWN_ADDRESS = 1, 2
+
+
+@dataclass(slots=True)
+class PlannedFailure:
+    """What is to go wrong; `times` is how often still, `taken` whether the words arrive."""
+
+    error: LineError | int
+    address: int | None
+    times: float
+    taken: bool = False
+
+    def hits(self, request: Request) -> bool:
+        """Whether a request meets it."""
+        return self.times > 0 and (self.address is None or self.address in _span(request))
+
+    def raised(self, request: Request) -> LineError:
+        """The error; where only the code of an exception was given, the refusal with it."""
+        if isinstance(self.error, LineError):
+            return self.error
+        return refusal(request.device, request.function, request.register, self.error)
+
+
+class FakeDevice:
+    """Registers in a dictionary; replace `held` and `take` for one with a will of its own."""
+
+    def __init__(self, number: int, words: Mapping[int, int] | None = None) -> None:
+        self.number = number
+        self.words = dict(words or {})
+        """The registers: what a read finds, and where a write goes."""
+        self.identity: Mapping[int, bytes] | None = None
+        """Objects of function 43/14; None where it does not know the function."""
+        self.silent = False
+        self.seconds = 0.0
+        """How long each answer takes."""
+        self.state = DeviceState(None, 0, None, None, None, None, None)
+        """What the line has seen of it; may be set."""
+        self._failures: dict[str, list[PlannedFailure]] = {}
+
+    def held(self, address: int, count: int) -> tuple[int, ...]:
+        """The words that a read finds. Raises the DeviceException with which it refuses."""
+        span = range(address, address + count)
+        if any(number not in self.words for number in span):
+            raise refusal(self.number, Read.function, address, UNKNOWN_ADDRESS)
+        return tuple(self.words[number] for number in span)
+
+    def take(self, address: int, values: Sequence[int]) -> None:
+        """Do with written words as it likes. Raises the DeviceException with which it refuses."""
+        span = range(address, address + len(values))
+        if any(number not in self.words for number in span):
+            raise refusal(self.number, WriteOne.function, address, UNKNOWN_ADDRESS)
+        self.words.update(zip(span, values, strict=True))
+
+    def objects(self) -> IdentificationObjects:
+        """Who it is. Raises DeviceException where it does not know the function."""
+        if self.identity is None:
+            raise refusal(self.number, Identify.function, 0, UNKNOWN_FUNCTION)
+        return IdentificationObjects(1, self.identity)
+
+    def fail(self, kind: str, failure: PlannedFailure) -> None:
+        """Let something go wrong, in the place of what was to go wrong with that address."""
+        wanted = self._failures.setdefault(kind, [])
+        wanted[:] = [one for one in wanted if one.address != failure.address]
+        wanted.append(failure)
+
+    def next_failure(self, kind: str, request: Request) -> PlannedFailure | None:
+        """The failure that a request meets; one less is left of it."""
+        for failure in self._failures.get(kind, ()):
+            if failure.hits(request):
+                failure.times -= 1
+                return failure
+        return None
+
+    def noted(self, error: ExchangeError | None, now: float) -> None:
+        """An exchange with it has ended."""
+        if error is None or isinstance(error, DeviceException):
+            self.state = replace(self.state, answers=True, failures=0, silent_since=None, heard=now)
+        elif isinstance(error, NoAnswer):
+            self.state = replace(
+                self.state,
+                answers=False,
+                failures=self.state.failures + 1,
+                silent_since=self.state.silent_since or now,
+            )
+
+
+def refusal(device: int, function: int, address: int, code: int) -> DeviceException:
+    """What a device answers that does not do it."""
+    return DeviceException(device, function, address, code, STANDARD_EXCEPTIONS.get(code, ""))
+
+
+def _span(request: Request) -> range:
+    """The registers that a failure may be meant for; those written where some are."""
+    match request:
+        case Read(address=address, count=count):
+            return range(address, address + count)
+        case WriteOne(address=address):
+            return range(address, address + 1)
+        case WriteMany(address=address, values=values):
+            return range(address, address + len(values))
+        case ReadWrite(write_address=address, values=values):
+            return range(address, address + len(values))
+        case _:
+            return range(0)
