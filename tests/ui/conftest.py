@@ -6,8 +6,11 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from textual.css.stylesheet import Stylesheet
 
 from tui.screens.dialogs.question import Question
+
+from .quick import parse_once
 
 
 @pytest.fixture(autouse=True)
@@ -18,6 +21,12 @@ def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
     """
     monkeypatch.setattr(Question, "_is_early", lambda _: False)
     monkeypatch.setattr("tui.screens.monitor.run_line.SETTLED", 0.0)
+
+
+@pytest.fixture(autouse=True)
+def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A fifth of the time of a test of the panel would go into the same style sheets."""
+    monkeypatch.setattr(Stylesheet, "_parse_rules", parse_once)
 
 
 @pytest.fixture(autouse=True)
