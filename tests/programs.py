@@ -75,8 +75,9 @@ def simulated(*arguments: str) -> Iterator[Served]:
 
 
 def _own_interrupts() -> None:
-    """Let SIGINT work in the program even where the test run itself ignores it."""
+    """Let signals work in the program even where the test run itself ignores them, as by nohup."""
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    signal.signal(signal.SIGHUP, signal.SIG_DFL)
 
 
 def _ready_line(process: subprocess.Popen[str], wanted: str) -> str:

@@ -197,18 +197,20 @@ async def test_no_letter_writes_without_a_question_or_a_line(screen: str) -> Non
 
 
 async def back_to(made: Bench, screen: str) -> None:
-    """Armed on that screen, with no question open and no line."""
+    """Armed on that screen, with no question open and no line; nothing where that is so."""
     app = made.app
     while isinstance(app.screen, ModalScreen):
         await made.pilot.press("escape")
+    console = app.chosen
+    assert console is not None
+    if app.place == "monitor" and "Enter" in shown(app, "message"):
+        await made.pilot.press("escape")
+    if app.place == screen != CONNECTION and console.session.arming.armed:
+        return
     if app.place != "monitor":
         await made.pilot.press("2")
         await until(made.pilot, lambda: app.place == "monitor")
     await until(made.pilot, lambda: bool(shown(app, "message")))
-    if "Enter" in shown(app, "message"):
-        await made.pilot.press("escape")
-    console = app.chosen
-    assert console is not None
     if not console.session.arming.armed:
         await made.pilot.press("a")
         await until(made.pilot, lambda: console.session.arming.armed)
