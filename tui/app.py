@@ -31,12 +31,14 @@ from tui.terminal.stroke import stroke_of
 from tui.terminal.type_ahead import TypeAhead
 from tui.widgets.palette import THEME
 
+from .screens.frame import Framed
+from .screens.frame_source import FrameSource
 from .screens.leaving import Leaving
 from .screens.places import Places
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
-    from tui.session.command.stop_report import StopSummary
+    from tui.session.command.stop_report import StopReport
     from tui.session.console import DriveConsole
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
@@ -48,8 +50,8 @@ log = logging.getLogger(__name__)
 CHOSEN_CONNECTS_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""
 
-WARNINGS_LOOK = 0.25
-"""Seconds between two looks for drives that are about to act on their time-out."""
+FRAME_LOOK = 0.25
+"""Seconds between two looks at what stands around every screen."""
 
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 
@@ -79,6 +81,7 @@ class DrivePanelApp(LeanApp, LastWords, Places, Leaving):
         low_bandwidth: bool = False,
         leave_running: bool = False,
         mouse: bool = False,
+        bell: bool = True,
         on_shown: Callable[[], None] | None = None,
     ) -> None:
         super().__init__()
@@ -88,6 +91,8 @@ class DrivePanelApp(LeanApp, LastWords, Places, Leaving):
         self.read_only = read_only
         self.low_bandwidth = low_bandwidth
         self.mouse = mouse
+        self.bell_rings = bell
+        """Whether a new fault rings."""
         self.period = 0.5
         self.opened: OpenLine | None = None
         self.fleet: Fleet | None = None
@@ -103,8 +108,9 @@ class DrivePanelApp(LeanApp, LastWords, Places, Leaving):
         self._stops = 0
         self._trying_f12 = False
         self._typed = TypeAhead(self, Admission(self, self).admits)
-        self._hungry: set[int] = set()
-        self._told: StopSummary | None = None
+        self._cried: list[StopReport] = []
+        """Stops that failed, and of which that was said."""
+        self._frame = FrameSource(self)
         self._journal: Journal | None = None
         self._journal_trouble = ""
 
@@ -177,7 +183,6 @@ class DrivePanelApp(LeanApp, LastWords, Places, Leaving):
         """Tell that keys came at once, or too late, and did nothing."""
         came = "came too late" if late else "came at once" if count > 1 else "did not come alone"
         keys = f"{count} keys {came} and were" if count > 1 else f"1 key {came} and was"
-        self.events.add("told", f"{keys} not taken.")
         self.notify(f"{keys} not taken.", severity="warning")
 
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
@@ -269,59 +274,36 @@ class DrivePanelApp(LeanApp, LastWords, Places, Leaving):
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
         self.push_screen(self.connection)
-        self.set_interval(WARNINGS_LOOK, self._tell_timeouts)
-        self.set_interval(WARNINGS_LOOK, self._tell_stops)
-        self.set_interval(WARNINGS_LOOK, self._tell_journal)
+        self.set_interval(FRAME_LOOK, self._look_around)
         if self._on_shown is not None:
             self.connection.call_after_refresh(self._on_shown)
         self.call_after_refresh(self._try_f12)
         if self._start is not None:
             self.call_after_refresh(self.connection.start, self._start, self._device)
 
-    def _tell_timeouts(self) -> None:
-        """Tell of a drive that is about to act because it was not asked in time."""
-        hungry = self.fleet.line_watch.warnings() if self.fleet else []
-        for one in hungry:
-            if one.device not in self._hungry and one.left > 0:
-                does = f": {one.watch.reaction.does}" if one.watch.reaction else "."
-                self.notify(
-                    f"{one.profile.name}, device {one.device}, was not heard for"
-                    f" {one.silent:.1f} s. In {one.left:.1f} s it acts on its time-out{does}",
-                    severity="error",
-                    timeout=max(3.0, one.left),
-                )
-        self._hungry = {one.device for one in hungry}
-
-    def _tell_journal(self) -> None:
-        """Tell once, at once, that what is written is not on record."""
+    def _look_around(self) -> None:
+        """What must be seen on every screen: the frame, a new fault, a stop that failed."""
+        if self.fleet is not None:
+            if self.fleet.alarms.take(self.fleet.line_watch.states) and self.bell_rings:
+                self.bell()
+            self._cry_for_stops(self.fleet)
         trouble = self._journal.trouble if self._journal is not None else ""
         if trouble and trouble != self._journal_trouble:
-            self.notify(trouble, severity="error", timeout=30.0)
+            self.notify(trouble, severity="error")
         self._journal_trouble = trouble
+        self.draw_frame()
 
-    def _tell_stops(self) -> None:
-        """Tell what the last stop has come to where the screen on top does not show it."""
-        reports = list(self.fleet.stopper.reports.values()) if self.fleet else []
-        if not reports:
-            return
-        from tui.session.command.stop_report import StopSummary
+    def draw_frame(self) -> None:
+        """Put the frame of the screen on top as it is now."""
+        if isinstance(self.screen, Framed):
+            self.screen.draw_frame(self._frame.view())
 
-        last = max(report.time for report in reports)
-        stop = StopSummary([report for report in reports if report.time >= last - 0.1])
-        if stop == self._told:
-            return
-        before, self._told = self._told, stop
-        console = getattr(self.screen, "console", None)
-        if console is not None and {console.device} == {r.device for r in stop.reports}:
-            return
-        if self.screen is self.connection:
-            self.connection.say(stop.head, stop.text, "error" if stop.failed else "alarm")
-        elif before is None or stop.ended != before.ended:
-            self.notify(
-                f"{stop.head} {stop.text if stop.failed else ''}".strip(),
-                severity="error" if stop.failed else "information",
-                timeout=30.0 if stop.failed else 4.0,
-            )
+    def _cry_for_stops(self, fleet: Fleet) -> None:
+        """Say over everything, once, that a motor does not stop."""
+        for report in fleet.stopper.reports.values():
+            if report.phase.value == "failed" and report not in self._cried:
+                self.cry(f"Device {report.device}: {report.text}")
+        self._cried = [r for r in fleet.stopper.reports.values() if r.phase.value == "failed"]
 
     async def on_unmount(self) -> None:
         """Leave no line open."""

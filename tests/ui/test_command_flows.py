@@ -236,7 +236,7 @@ async def test_what_is_typed_ahead_reaches_the_line_but_commands_nothing(
 SCREENS = {
     "help": ("question_mark", HelpScreen),
     "options": ("o", OptionsScreen),
-    "control source": ("6", ControlSourceScreen),
+    "control": ("6", ControlSourceScreen),
     "faults": ("5", FaultsScreen),
     "frames": ("7", FramesScreen),
     "messages": ("m", MessagesScreen),

@@ -212,7 +212,7 @@ def test_every_action_has_a_method_and_words() -> None:
         BlocksScreen,
         MessagesScreen,
     )
-    owners = {(screen.TITLE or "connection").lower(): screen for screen in screens}
+    owners = {(screen.TITLE or "line").lower(): screen for screen in screens}
     for action in ACTIONS:
         name = f"action_{action.id.partition('(')[0]}"
         for screen in action.screens:

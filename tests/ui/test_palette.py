@@ -25,13 +25,13 @@ from .test_flows import shown, until
 from .test_questions import writes
 
 SCREENS = {
-    "connection": ConnectionScreen,
+    "line": ConnectionScreen,
     "monitor": MonitorScreen,
     "frames": FramesScreen,
-    "control source": ControlSourceScreen,
+    "control": ControlSourceScreen,
     "faults": FaultsScreen,
     "parameters": ParametersScreen,
-    "blocks": BlocksScreen,
+    "scanner": BlocksScreen,
 }
 WORDS = sorted({word for action in ACTIONS for word in action.help.casefold().split()})
 

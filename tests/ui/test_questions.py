@@ -370,7 +370,7 @@ QUESTIONS: dict[str, tuple[Callable[[Bench], Awaitable[None]], type[ModalScreen[
     "factory": (factory, Confirm),
     "save": (save, Confirm),
     "block": (write_block, Confirm),
-    "control source": (control_source, Confirm),
+    "control": (control_source, Confirm),
     "hand back": (hand_back, Confirm),
     "option": (option, OptionsScreen),
     "reset": (reset, Confirm),

@@ -164,9 +164,9 @@ WAYS: dict[str, tuple[str, Way]] = {
     "monitor": ("atv71", monitor),
     "rating": ("atv21", rating),
     "parameters": ("atv71", parameters),
-    "blocks": ("atv71", blocks),
+    "scanner": ("atv71", blocks),
     "faults": ("atv71", faults),
-    "connection": ("atv71", connection),
+    "line": ("atv71", connection),
 }
 ASKED = {
     "rating",

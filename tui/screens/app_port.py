@@ -36,6 +36,8 @@ class Panel(App[None]):
     """The drives of the open line."""
     events: EventLog
     """Everything that was said."""
+    chosen: DriveConsole | None
+    """The drive that was opened last on the open line; the stop key means it."""
 
     @property
     @abstractmethod
@@ -59,18 +61,17 @@ class Panel(App[None]):
         timeout: float | None = None,
         markup: bool = False,
     ) -> None:
-        """Show a notice, which is text and never markup."""
-        super().notify(
-            plain(message, lines=True),
-            title=plain(title),
-            severity=severity,
-            timeout=timeout,
-            markup=False,
-        )
+        """Say something in the line of messages, where the newest replaces the one before."""
+        kinds = {"information": "told", "warning": "alarm", "error": "failed"}
+        self.events.add(kinds[severity], f"{title} {message}".strip())
+
+    def cry(self, message: str) -> None:
+        """Say over everything that a motor does not stop; text, never markup."""
+        super().notify(plain(message, lines=True), severity="error", timeout=30.0, markup=False)
 
     def action_help_quit(self) -> None:
         """Ctrl+C ends nothing here."""
-        self.notify("Ctrl+C ends nothing here: q leaves the panel.", timeout=5)
+        self.tell("Ctrl+C ends nothing here: q leaves the panel.")
 
     @property
     def line_text(self) -> str:
@@ -119,4 +120,3 @@ class Panel(App[None]):
     def tell(self, text: str) -> None:
         """Say why a key did nothing."""
         self.events.add("told", text)
-        self.notify(text, timeout=4)

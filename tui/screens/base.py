@@ -2,31 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import ClassVar
 
 from rich.text import Text
+from textual.app import ComposeResult
 from textual.events import Key, Resize
-from textual.screen import Screen
+from textual.widget import Widget
 from textual.widgets import Input
 
 from tui.terminal.fields import takes_space
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
-from .app_port import Panel
+from .frame import Framed
 from .keys.table import elsewhere, keys_line
 
 
-class PanelScreen(Screen[None]):
-    """A screen made of lines, the last of which names its keys.
+class PanelScreen(Framed):
+    """A screen made of lines within the frame, the last of which names its keys.
 
     Textual calls the `on_...` methods of a class and then those of its bases.
     """
 
-    app: Panel
+    DEFAULT_CSS = """
+    PanelScreen { layout: vertical; background: $background; color: $foreground; }
+    PanelScreen #head { height: 2; }
+    PanelScreen #keys { height: 1; margin-top: 1; background: $surface; }
+    """
     LOOK: ClassVar[float | None] = None
     """Seconds between two looks at what there is; None for a screen with a time of its own."""
+
+    def compose(self) -> ComposeResult:
+        """The frame, what the screen itself shows, and its keys."""
+        yield from self.framed()
+        yield Lines(id="head")  # the place of strip and tabs
+        yield from self.body()
+        yield Lines(id="keys")
+
+    def body(self) -> Iterable[Widget]:
+        """What stands between the tabs and the message."""
+        raise NotImplementedError
 
     def on_mount(self) -> None:
         """Look now and then."""

@@ -22,7 +22,6 @@ class Places(Panel):
     """Where the keys 1 to 7 lead, and those that look for the drive or the screen they need."""
 
     chosen: DriveConsole | None = None
-    """The drive that was opened last on the open line; the stop key means it."""
 
     @property
     def place(self) -> str:

@@ -70,6 +70,11 @@ class DriveConsole:
         return self.__dict__.get("editor")
 
     @property
+    def begun_blocks(self) -> BlockEditor | None:
+        """The block editor, if anybody has looked at the blocks."""
+        return self.__dict__.get("blocks")
+
+    @property
     def latest(self) -> Snapshot | None:
         """The last cycle of the monitor."""
         return self.monitor.latest

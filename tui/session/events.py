@@ -18,7 +18,7 @@ class Event:
     wall: float
     device: int | None
     kind: str
-    """`done`, `refused`, `stop`, `failed` or `told`."""
+    """`done`, `refused`, `stop`, `failed`, `fault`, `alarm` or `told`."""
     text: str
 
 
@@ -41,6 +41,12 @@ class EventLog:
     def __bool__(self) -> bool:
         """A log is there however empty it is."""
         return True
+
+    @property
+    def newest(self) -> Event | None:
+        """The last event; None where nothing was said yet."""
+        with self._lock:
+            return self._events[-1] if self._events else None
 
     @property
     def events(self) -> tuple[Event, ...]:

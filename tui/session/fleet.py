@@ -21,6 +21,7 @@ from .console import DriveConsole
 from .drive import DriveSession
 from .events import EventLog
 from .journal import Journal
+from .monitor.alarms import LineAlarms
 from .monitor.line_watch import LineWatch
 from .starts.keeper import StartKeeper
 from .work import Outcome, OutcomeKind
@@ -65,6 +66,8 @@ class Fleet:
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.stopper = Stopper(line, journal, self.events)
+        self.alarms = LineAlarms(self.events)
+        """The faults of all of them."""
         self._lock = threading.Lock()
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})
 

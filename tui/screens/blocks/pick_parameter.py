@@ -39,7 +39,7 @@ class PickParameter(Question[str | None]):
         self._profile, self._block, self._slot = profile, block, slot
         self._found: list[Parameter] = []
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """A search, and what it finds."""
         with Vertical(id="dialog"):
             yield Plain(f"{self._slot} stands for", id="question")

@@ -37,7 +37,7 @@ class BlocksScreen(BlockKeys):
 
     CSS_PATH = "blocks.tcss"
     BINDINGS: ClassVar = bindings(BLOCKS)
-    TITLE = "Blocks"
+    TITLE = "Scanner"
     LOOK = 0.25
     AUTO_FOCUS = ""
 
@@ -53,7 +53,7 @@ class BlocksScreen(BlockKeys):
         blocks = self.block_editor.proposals.blocks
         return blocks[self._side % len(blocks)] if blocks else None
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """Title, tables, details, cost, user words, news, keys."""
         yield Lines(id="title")
         with Horizontal(id="tables"):
@@ -63,7 +63,6 @@ class BlocksScreen(BlockKeys):
         yield Lines(id="cost")
         yield Lines(id="words")
         yield Lines(id="message")
-        yield Lines(id="keys")
 
     def on_mount(self) -> None:
         """Begin to look."""

@@ -41,7 +41,7 @@ class OptionsScreen(KeyQuestion[tuple[CommandOption, int] | None]):
             for choice in option.choices
         ]
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """The list and its keys."""
         with Vertical(id="dialog"):
             yield Plain("Options of the commands", id="question")

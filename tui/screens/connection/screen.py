@@ -16,7 +16,7 @@ class ConnectionScreen(LineKeys):
 
     CSS_PATH = "connection.tcss"
     BINDINGS: ClassVar = bindings(CONNECTION)
-    TITLE = "Connection"
+    TITLE = "Line"
     AUTO_FOCUS = "#lines"
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:

@@ -55,7 +55,7 @@ class ConnectionView(PanelScreen):
         self._key_at = -math.inf
         """When the last key came, in seconds of the clock."""
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """Two columns and the lines below."""
         yield Lines(id="header")
         with Horizontal(id="body"):
@@ -68,7 +68,6 @@ class ConnectionView(PanelScreen):
                 yield Lines(id="drives-title")
                 yield DriveList(id="drives")
         yield Lines(id="message")
-        yield Lines(id="keys")
 
     @property
     def found(self) -> Mapping[int, FoundDrive]:

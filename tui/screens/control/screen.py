@@ -29,7 +29,7 @@ class ControlSourceScreen(OrderKeys):
 
     CSS_PATH = "control.tcss"
     BINDINGS: ClassVar = bindings(SOURCES)
-    TITLE = "Control source"
+    TITLE = "Control"
     LOOK = 0.5
 
     def __init__(self, console: DriveConsole) -> None:
@@ -41,13 +41,12 @@ class ControlSourceScreen(OrderKeys):
         self._trouble = "reading today's configuration"
         self._seen: object = None
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """The list above, what belongs to the chosen one below."""
         yield Lines(id="title")
         yield OptionList(id="sources", compact=True)
         yield Lines(id="detail")
         yield Lines(id="message")
-        yield Lines(id="keys")
 
     def on_mount(self) -> None:
         """Show the list, and read what the drive holds."""

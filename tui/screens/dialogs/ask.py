@@ -47,7 +47,7 @@ class Ask(Question[str | None]):
         self._about = about
         self._takes = takes
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """A field, room for what is wrong, and what an answer looks like."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")

@@ -47,7 +47,7 @@ class Confirm(KeyQuestion[bool]):
         self._loses = loses
         self._keys = hint(("y" if loses else "y or Enter", yes), ("Esc or q", no))
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """What is asked, what the motor does, what follows, and the keys."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")

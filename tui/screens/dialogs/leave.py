@@ -32,7 +32,7 @@ class Leave(KeyQuestion[Choice]):
         super().__init__(now)
         self._follows = follows
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """What runs, what happens when it is left, and the keys."""
         with Vertical(id="dialog"):
             yield Plain("A motor runs by your command", id="question")

@@ -41,7 +41,7 @@ class Palette(Question[FoundAction | None]):
         self._of = screen
         self._found: list[FoundAction] = []
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """A field, and what fits what is typed there."""
         with Vertical(id="dialog"):
             yield Plain("What shall be done?", id="question")

@@ -41,7 +41,7 @@ class PickFile(KeyQuestion[str | None]):
         self._lines += [_line(path) for path in found]
         self._files = len(found)
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """The list and its keys."""
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")

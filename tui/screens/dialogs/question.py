@@ -11,12 +11,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 
 from rich.text import Text
+from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.screen import ModalScreen
+from textual.widget import Widget
 
 from tui.drive.plain import plain
 from tui.widgets.palette import FAINT, KEY
 from tui.widgets.plain import Plain
+
+from ..frame import Framed
 
 if TYPE_CHECKING:
     from tui.screens.app_port import Panel
@@ -32,10 +36,9 @@ NOW_EVERY = 0.5
 """Seconds between two looks at what the motor does."""
 
 
-class Question(ModalScreen[T]):
+class Question(Framed, ModalScreen[T]):
     """A dialog that gives an answer back; Esc is no, as is a stop of the drive meanwhile."""
 
-    app: Panel
     CSS_PATH = DIALOG_STYLES
     SETTLED: ClassVar[float] = 0.3
     """Seconds that a question has stood before Enter and `y` are answers."""
@@ -56,6 +59,15 @@ class Question(ModalScreen[T]):
         self._now = now
         self._drawn: float | None = None
         self._voided = self._answered = False
+
+    def compose(self) -> ComposeResult:
+        """The frame, which is live over a question too, and what is asked."""
+        yield from self.framed()
+        yield from self.dialog()
+
+    def dialog(self) -> Iterable[Widget]:
+        """What is asked, and its keys."""
+        raise NotImplementedError
 
     def on_mount(self) -> None:
         """From its first picture on it is asked."""

@@ -54,7 +54,7 @@ class FaultsScreen(OrderKeys):
     def _recorder(self) -> Recorder:
         return self.console.recorder
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """The fault, the history beside what was stored, the record."""
         yield Lines(id="title")
         yield Lines(id="fault")
@@ -63,7 +63,6 @@ class FaultsScreen(OrderKeys):
             yield Lines(id="stored")
         yield Lines(id="record")
         yield Lines(id="message")
-        yield Lines(id="keys")
 
     def on_mount(self) -> None:
         """Read the history; who opens this screen has seen the trip."""

@@ -35,10 +35,9 @@ class FramesScreen(PanelScreen):
         self._line = console.session.line
         self._held: tuple[Frame, ...] | None = None
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """One list and the keys."""
         yield Lines(id="frames")
-        yield Lines(id="keys")
 
     def draw(self, width: int) -> None:
         """Show the newest frames that fit."""

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-CONNECTION, MONITOR, FRAMES = "connection", "monitor", "frames"
-SOURCES, FAULTS, PARAMETERS = "control source", "faults", "parameters"
-BLOCKS, MESSAGES = "blocks", "messages"
+CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
+SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
+BLOCKS, MESSAGES = "scanner", "messages"
 EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS, MESSAGES)
 
 KEY_NAMES = {

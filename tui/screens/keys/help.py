@@ -14,6 +14,7 @@ from textual.screen import ModalScreen
 from tui.widgets.palette import ALARM, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
 from tui.widgets.plain import Plain
 
+from ..frame import Framed
 from .table import of_screen
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
@@ -30,7 +31,7 @@ WITHOUT_KEY = "^p"
 HELP_STYLES = {"green": RUNNING, "red": FAULT, "amber": ALARM, "grey": FAINT, "white": PLAIN}
 
 
-class HelpScreen(ModalScreen[None]):
+class HelpScreen(Framed, ModalScreen[None]):
     """The keys of one screen, made from the table of actions."""
 
     CSS_PATH = "help.tcss"
@@ -43,6 +44,11 @@ class HelpScreen(ModalScreen[None]):
         self._of = screen
 
     def compose(self) -> ComposeResult:
+        """The frame, and the list."""
+        yield from self.framed()
+        yield from self.dialog()
+
+    def dialog(self) -> ComposeResult:
         """One text that scrolls where the terminal is small."""
         with VerticalScroll(id="help"):
             yield Plain(help_text(self._of))

@@ -48,10 +48,10 @@ PLACES: tuple[tuple[str, str, str], ...] = (
     (CONNECTION, "1", "Line"),
     (MONITOR, "2", "Monitor"),
     (PARAMETERS, "3", "Parameters"),
-    (BLOCKS, "4", "Scanner and blocks"),
+    (BLOCKS, "4", "Scanner"),
     (FAULTS, "5", "Faults"),
-    (SOURCES, "6", "Control: who commands the drive"),
-    (FRAMES, "7", "Frames on the line"),
+    (SOURCES, "6", "Control"),
+    (FRAMES, "7", "Frames"),
 )
 """The screens, each with its key everywhere, and how it is called."""
 
@@ -156,7 +156,7 @@ def elsewhere(screen: str, key: str, character: str | None = None) -> str:
     for action in ACTIONS:
         if {key, character} & {*action.keys.split(",")} and screen not in action.screens:
             place = next(((k, name) for p, k, name in PLACES if p == action.screens[0]), None)
-            where = f"{place[1].partition(':')[0]} ({place[0]})" if place else "another screen"
+            where = f"{place[1]} ({place[0]})" if place else "another screen"
             return f"{action.shown} has a meaning on {where}: {action.help}"
     return ""
 

@@ -34,11 +34,10 @@ class MessagesScreen(PanelScreen):
         super().__init__()
         self._offset = 0
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """Title, the messages, the keys."""
         yield Lines(id="title")
         yield Lines(id="list")
-        yield Lines(id="keys")
 
     def draw(self, width: int) -> None:
         """The newest first, from where the person has scrolled to."""

@@ -70,7 +70,7 @@ class MonitorScreen(RunKeys):
         self._load = 0.0
         self._was = ""
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """Fixed places, filled by lines."""
         yield Lines(id="header")
         with Horizontal(id="body"):
@@ -86,7 +86,6 @@ class MonitorScreen(RunKeys):
                 yield Lines(id=f"word{index}", classes="word")
         yield Lines(id="message")
         yield Lines(id="status")
-        yield Lines(id="keys")
 
     def on_mount(self) -> None:
         """Start watching."""

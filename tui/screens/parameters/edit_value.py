@@ -40,7 +40,7 @@ class EditNumber(Question[str | None]):
         super().__init__()
         self._editor, self._parameter = editor, parameter
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """The field, what it comes to, and what is known."""
         editor, parameter = self._editor, self._parameter
         staged = editor.staging.edits.get(parameter.code)
@@ -120,7 +120,7 @@ class PickValue(KeyQuestion[int | None]):
         self._editor, self._parameter = editor, parameter
         self._names = sorted(editor.session.profile.names(parameter).items())
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """The list with the held value marked."""
         with Vertical(id="dialog"):
             yield Plain(f"{self._parameter.code}  {self._parameter.name}", id="question")
@@ -169,7 +169,7 @@ class EditBits(KeyQuestion[int | None]):
         self._held = held & 0xFFFF
         self._word = (staged.new if staged else held) & 0xFFFF
 
-    def compose(self) -> ComposeResult:
+    def dialog(self) -> ComposeResult:
         """Every named bit; reserved ones cannot be chosen."""
         parameter = self._parameter
         with Vertical(id="dialog"):

@@ -42,7 +42,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     LOOK = 0.25
     AUTO_FOCUS = ""
 
-    def compose(self) -> ComposeResult:
+    def body(self) -> ComposeResult:
         """The search above, the table, the details below."""
         with Horizontal(id="top"):
             yield Lines(id="title")
@@ -52,7 +52,6 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         yield Lines(id="detail")
         yield Lines(id="message")
         yield Lines(id="status")
-        yield Lines(id="keys")
 
     def on_mount(self) -> None:
         """Begin to read."""

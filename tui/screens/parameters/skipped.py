@@ -18,9 +18,10 @@ from tui.widgets.palette import PLAIN, STRONG
 from tui.widgets.plain import Plain
 
 from ..dialogs.question import DIALOG_STYLES, hint
+from ..frame import Framed
 
 
-class Skipped(ModalScreen[None]):
+class Skipped(Framed, ModalScreen[None]):
     """A list to read through; scrolls."""
 
     CSS_PATH = DIALOG_STYLES
@@ -32,6 +33,11 @@ class Skipped(ModalScreen[None]):
         self._left = left
 
     def compose(self) -> ComposeResult:
+        """The frame, and the list."""
+        yield from self.framed()
+        yield from self.dialog()
+
+    def dialog(self) -> ComposeResult:
         """Each with its reason."""
         table = Table.grid(padding=(0, 2, 0, 0))
         for item in self._left:

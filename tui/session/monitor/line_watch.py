@@ -16,20 +16,29 @@ from tui.bus.errors import LineError
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Quantity
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.reader import Reader
+from ..reading import Reading
 from .monitor import Monitor
 from .rates import monitoring_codes
 from .timeout import TOLD_SHARE, TimeoutWarning, TimeoutWatch, timeout_seconds
 
 log = logging.getLogger(__name__)
 
+GLANCE_QUANTITIES: tuple[Quantity, ...] = (
+    "output_frequency",
+    "frequency_reference",
+    "motor_current",
+)
 MAY_TURN = frozenset({"running", "unknown"})
 """Kinds of state in which a motor that was commanded from here is not left alone unasked."""
 GLANCE = 3.0
 """Seconds between two looks at a drive that no monitor watches."""
+GLANCE_EACH = 0.15
+"""Seconds of that for each drive of the line."""
 ASKED_PER_TIMEOUT = 4.0
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
@@ -45,6 +54,8 @@ class Look:
     time: float
     timeout: float | None
     """The drive's communication time-out in seconds, if it is one that runs already."""
+    readings: Mapping[str, Reading] = field(default_factory=dict)
+    """What was read with the state: output frequency, its reference, motor current."""
 
 
 @dataclass(slots=True)
@@ -134,6 +145,12 @@ class LineWatch:
             return latest.state, latest.time
         return state, seen
 
+    @property
+    def states(self) -> dict[int, DriveState]:
+        """The newest state of each drive that was seen at all, by device."""
+        seen = {device: self._last_seen(kept)[0] for device, kept in self._kept.items()}
+        return {device: state for device, state in seen.items() if state is not None}
+
     def warnings(self) -> list[TimeoutWarning]:
         """Drives that are about to act on their time-out, or have, for want of an answer."""
         found = []
@@ -214,18 +231,24 @@ class LineWatch:
         if kept.monitor.running:
             return GLANCE / 10
         profile, device = kept.session.profile, kept.session.device
-        state, error = None, ""
+        state, error, readings = None, "", {}
         try:
-            readings = await kept.reader.read(_state_codes(profile), priority=Priority.POLL)
+            codes = [*_state_codes(profile), *_glance_codes(profile)]
+            readings = await kept.reader.read(codes, priority=Priority.POLL)
             state = drive_state(profile, readings)
         except LineError as fault:
             error = str(fault)
         watch = self._watch(kept)
         timeout = watch.timeout if watch and watch.active else None
         if self._kept.get(device) is kept:
-            look = Look(state, error, kept.session.clock.monotonic(), timeout)
+            look = Look(state, error, kept.session.clock.monotonic(), timeout, readings)
             self._looks = {**self._looks, device: look}
-        return GLANCE if kept.learned is not None else GLANCE / 10
+        return self._glance_period if kept.learned is not None else GLANCE / 10
+
+    @property
+    def _glance_period(self) -> float:
+        """Longer where many drives share the line, so that looks leave it to the others."""
+        return max(GLANCE, GLANCE_EACH * len(self._kept))
 
     async def _learn(self, kept: _Kept) -> None:
         """Read the drive's time-out and its reaction."""
@@ -247,6 +270,12 @@ def _any_word(profile: Profile) -> int:
     """A word that every drive of the family has: one that tells its state, if there is one."""
     codes = _state_codes(profile) or monitoring_codes(profile)
     return profile[codes[0]].address
+
+
+def _glance_codes(profile: Profile) -> list[str]:
+    """What a list of drives tells of a motor beside its state."""
+    found = (profile.quantity(quantity) for quantity in GLANCE_QUANTITIES)
+    return [parameter.code for parameter in found if parameter is not None]
 
 
 def _state_codes(profile: Profile) -> list[str]:

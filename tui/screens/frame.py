@@ -1,0 +1,133 @@
+"""What stands around every screen and over every dialog: strip, tabs, the newest message.
+
+It is live everywhere: whoever answers a question sees what the motor does meanwhile.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from rich.style import Style
+from rich.text import Text
+from textual.screen import Screen
+from textual.widget import Widget
+
+from tui.drive.plain import plain
+from tui.widgets.drawing import wrapped
+from tui.widgets.lines import Lines
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, PLAIN, STRONG
+from tui.widgets.strip import StripView, Tab, said_line, strip_line, tabs_line
+
+from .keys.action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
+
+if TYPE_CHECKING:
+    from .app_port import Panel
+
+TABS: tuple[Tab, ...] = (
+    Tab(CONNECTION, "1", "Line", "Line", 2),
+    Tab(MONITOR, "2", "Monitor", "Mon"),
+    Tab(PARAMETERS, "3", "Parameters", "Par", 3),
+    Tab(BLOCKS, "4", "Scanner", "Scan", 3),
+    Tab(FAULTS, "5", "Faults", "Flt", 2),
+    Tab(SOURCES, "6", "Control", "Ctl"),
+    Tab(FRAMES, "7", "Frames", "Frm"),
+)
+SAID_STYLES: dict[str, Style] = {
+    "fault": FAULT,
+    "failed": FAULT,
+    "error": FAULT,
+    "refused": ALARM,
+    "alarm": ALARM,
+    "stop": STRONG,
+    "working": ATTENTION,
+    "done": PLAIN,
+}
+WARNS = frozenset({"fault", "failed", "error", "refused", "alarm"})
+"""Kinds of a message that is shown whole for a while, on more lines where it takes them."""
+WHOLE_FOR = 15.0
+"""Seconds for which a message that warns takes more lines than its own."""
+WHOLE_LINES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """The message of now; `age` in seconds."""
+
+    when: str
+    text: str
+    kind: str
+    age: float
+    there: bool = False
+    """Whether it is about another drive than the one that is open."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameView:
+    """All that stands around a screen at one moment."""
+
+    strip: StripView
+    place: str
+    marks: dict[str, tuple[str, Style]]
+    said: Said | None
+
+
+class Framed(Screen[Any]):
+    """A screen, or a dialog over one, with the frame around it; the app draws it now and then."""
+
+    app: Panel
+    FRAME: ClassVar[bool] = True
+    DEFAULT_CSS = """
+    Framed { layers: default frame; }
+    Framed #strip { dock: top; height: 1; background: $surface; layer: frame; }
+    Framed #tabs { dock: top; height: 1; margin-top: 1; background: $background; layer: frame; }
+    Framed #said { dock: bottom; height: 1; margin-bottom: 1; layer: frame; }
+    Framed #said { background: $background; }
+    """
+
+    def framed(self) -> Iterable[Widget]:
+        """The parts of the frame, above whatever else stands there."""
+        yield Lines(id="strip")
+        yield Lines(id="tabs")
+        yield Lines(id="said")
+
+    def draw_frame(self, view: FrameView) -> None:
+        """Put the frame as it is now; what stays the same is not drawn."""
+        width = self.size.width
+        strip = self.query("#strip")
+        if not width or not strip:
+            return
+        self.query_one("#strip", Lines).show([strip_line(view.strip, width)])
+        self.query_one("#tabs", Lines).show([tabs_line(TABS, view.place, view.marks, width)])
+        place = self.query_one("#said", Lines)
+        lines = said_lines(view.said, width)
+        if place.styles.height is None or place.styles.height.value != len(lines):
+            place.styles.height = len(lines)
+        place.show(lines)
+
+
+def said_lines(said: Said | None, width: int) -> list[Text]:
+    """The message; one that warns and is new has as many lines as it takes, up to three."""
+    if said is None:
+        return [Text("")]
+    style = SAID_STYLES.get(said.kind, FAINT)
+    room = width - 12
+    if said.kind in WARNS and said.age < WHOLE_FOR and len(plain(said.text)) > room - 12:
+        parts = wrapped(said.text, max(10, room), WHOLE_LINES)
+        lines = []
+        for number, part in enumerate(parts):
+            line = Text(f" {said.when if not number else '':<8} ", FAINT, no_wrap=True)
+            line.append(part, style)
+            lines.append(line)
+        return lines
+    hint = "m messages" if width >= 60 else ""
+    if said.there and said.kind == "fault" and width >= 72:
+        hint = "[ ] there"
+    return [said_line(said.when, said.text, style, hint, width)]
+
+
+def at(wall: float) -> str:
+    """The time of day of a message."""
+    return time.strftime("%H:%M:%S", time.localtime(wall))

@@ -1,0 +1,243 @@
+"""What the frame around every screen tells, gathered from the line and its drives."""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import TYPE_CHECKING
+
+from rich.style import Style
+
+from tui.widgets.palette import ALARM, ATTENTION, FAULT
+from tui.widgets.strip import DriveNow, StripView
+
+from .frame import FrameView, Said, at
+from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
+
+if TYPE_CHECKING:
+    from tui.session.command.stop_report import StopReport
+    from tui.session.console import DriveConsole
+    from tui.session.drive_state import DriveState
+    from tui.session.fleet import Fleet
+    from tui.session.monitor.line_watch import Look
+    from tui.session.reading import Reading
+
+    from .app_port import Panel
+
+LOAD_OVER = 2.0
+"""Seconds over which the load of the line is measured."""
+STOP_SHOWN = 10.0
+"""Seconds for which a stop that failed stands in place of the state, though that is known."""
+LOOK_IS_OLD = 10.0
+"""Seconds after which a look at a drive that no monitor watches is not its present any more."""
+WORDS = {"forward": "FORWARD", "reverse": "REVERSE"}
+
+
+class FrameSource:
+    """Makes the frame's view of the moment; belongs to the panel's loop."""
+
+    def __init__(self, app: Panel) -> None:
+        self._app = app
+        self._busy: tuple[float, float] | None = None
+        self._load: float | None = None
+
+    def view(self) -> FrameView:
+        """All that the frame tells now."""
+        app, fleet = self._app, self._app.fleet
+        now = app.clock.monotonic()
+        console = app.chosen if fleet is not None and app.chosen in fleet.consoles else None
+        drive = drive_now(console, fleet, now) if console is not None and fleet else None
+        strip = StripView(
+            drive=drive,
+            line=self._line(fleet),
+            faults=len(fleet.alarms.active) if fleet else 0,
+            unseen=fleet.alarms.unseen if fleet else False,
+            load=self._measured(now),
+            clock=app.clock.time_of_day(),
+            read_only=app.read_only,
+        )
+        return FrameView(strip, app.place, _marks(console, fleet), self._said(console, now))
+
+    def _line(self, fleet: Fleet | None) -> str:
+        if not self._app.line_label:
+            return ""
+        count = len(fleet.found) if fleet else 0
+        drives = f"{count} drive{'' if count == 1 else 's'}"
+        return f"{self._app.line_label} · {drives}" if count else self._app.line_label
+
+    def _measured(self, now: float) -> float | None:
+        """Share of the last seconds in which the line was busy."""
+        opened = self._app.opened
+        if opened is None:
+            self._busy = self._load = None
+            return None
+        busy = opened.line.counters.busy_seconds
+        if self._busy is None or busy < self._busy[1]:
+            self._busy = (now, busy)
+        since, before = self._busy
+        if now - since >= LOAD_OVER:
+            self._load = min(1.0, max(0.0, (busy - before) / (now - since)))
+            self._busy = (now, busy)
+        return self._load
+
+    def _said(self, console: DriveConsole | None, now: float) -> Said | None:
+        """What holds now before what was said: a lost line, a drive that is not heard."""
+        holds = self._line_trouble(now) or self._not_heard()
+        if holds:
+            return Said(self._app.clock.time_of_day(), holds, "alarm", 0.0)
+        event = self._app.events.newest
+        outcome = console.session.work.outcome if console is not None else None
+        if outcome is not None and outcome.kind == "working":
+            return Said(self._app.clock.time_of_day(), outcome.text, "working", now - outcome.time)
+        if event is None:
+            return None
+        opened = console.device if console is not None else None
+        there = event.device is not None and event.device != opened
+        text = f"drive {event.device}: {event.text}" if there else event.text
+        if there and event.kind == "fault":
+            text = f"drive {event.device} {event.text}"
+        return Said(at(event.wall), text, event.kind, time.time() - event.wall, there)
+
+    def _line_trouble(self, now: float) -> str:
+        opened = self._app.opened
+        if opened is None:
+            return ""
+        state = opened.line.state
+        if state.status.value not in ("lost", "connecting"):
+            return ""
+        since = f"{max(0.0, now - state.since):.0f} s"
+        if state.status.value == "connecting":
+            return f"CONNECTING for {since}. {state.reason}".rstrip()
+        again = ""
+        if state.next_try is not None:
+            again = f" Tried again in {max(0.0, state.next_try - now):.0f} s."
+        return f"LINE LOST for {since}: {state.reason}{again}"
+
+    def _not_heard(self) -> str:
+        fleet = self._app.fleet
+        warnings = fleet.line_watch.warnings() if fleet else []
+        if not warnings:
+            return ""
+        one = min(warnings, key=lambda warning: warning.left)
+        does = f": {one.watch.reaction.name.lower()}" if one.watch.reaction else ""
+        when = f"in {one.left:.1f} s" if one.left > 0 else "by now"
+        return (
+            f"Drive {one.device} NOT HEARD for {one.silent:.1f} s: it acts on its communication"
+            f" time-out {when}{does}."
+        )
+
+
+def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
+    """The open drive as it was last seen, by its monitor or by the line's look at it."""
+    session, identity = console.session, console.identity
+    model = (identity.reference if identity else "") or session.profile.name
+    snapshot, look = console.latest, fleet.line_watch.looks.get(session.device)
+    report = fleet.stopper.reports.get(session.device)
+    by_look = snapshot is None or (look is not None and look.time > snapshot.time)
+    state, age, readings = _seen(console, look if by_look else None, now)
+    kind, words = _words(console, state, report, now)
+    values = {
+        quantity: _value(console, readings, quantity)
+        for quantity in ("output_frequency", "frequency_reference", "motor_current")
+    }
+    armed = console.commander.armed_for
+    return DriveNow(
+        device=session.device,
+        name=identity.name if identity else "",
+        model=model,
+        kind=kind,
+        words=words,
+        frequency=values["output_frequency"][0],
+        reference=values["frequency_reference"][0],
+        frequency_unit=values["output_frequency"][1] or "Hz",
+        current=values["motor_current"][0],
+        current_unit=values["motor_current"][1] or "A",
+        age=age,
+        armed=armed if armed is None or math.isfinite(armed) else 99.0,
+        by=_commanded_by(state),
+    )
+
+
+def _seen(
+    console: DriveConsole, look: Look | None, now: float
+) -> tuple[DriveState | None, float | None, dict[str, Reading]]:
+    """State, age where it is not the present, and readings of what was seen last."""
+    snapshot = console.latest
+    if look is not None:
+        age = max(0.0, now - look.time)
+        old = age > LOOK_IS_OLD or bool(look.error)
+        return look.state, age if old else None, dict(look.readings)
+    if snapshot is None:
+        return None, None, {}
+    age = max(0.0, now - snapshot.time)
+    lost = bool(snapshot.error) or snapshot.is_stale(now)
+    return snapshot.state, age if lost else None, dict(snapshot.readings)
+
+
+def _words(
+    console: DriveConsole, state: DriveState | None, report: StopReport | None, now: float
+) -> tuple[str, str]:
+    """The kind of the state and its words, a stop on its way before it."""
+    if report is not None:
+        if report.phase.value in ("sending", "stopping"):
+            return "stop", "STOPPING"
+        if report.phase.value == "failed" and now - report.since < STOP_SHOWN:
+            return "stop failed", "NOT STOPPED"
+    if state is None:
+        return "", "reading"
+    if state.kind == "running":
+        return state.kind, WORDS.get(state.direction or "", "RUNNING")
+    if state.kind == "fault":
+        return state.kind, f"FAULT {state.fault.code}" if state.fault else "FAULT"
+    if stands_by(console, state):
+        return "ready", "STANDBY"
+    return state.kind, state.headline.upper() or "UNKNOWN"
+
+
+def stands_by(console: DriveConsole, state: DriveState) -> bool:
+    """Whether the motor stands and the next command from here runs it."""
+    if state.kind not in ("blocked", "ready", "stopped"):
+        return False
+    from tui.drive.orders import chart_in_force, interlock
+
+    raws = console.session.image.raws
+    chart = chart_in_force(console.session.profile, raws)
+    return chart is not None and not interlock(chart, "forward", raws)
+
+
+def _value(console: DriveConsole, readings: dict[str, Reading], quantity: str) -> tuple[str, str]:
+    """Text and unit of a quantity that was read; empty where it was not."""
+    parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
+    reading = readings.get(parameter.code) if parameter else None
+    if reading is None:
+        return "", ""
+    value = reading.physical or reading.value
+    return (value.text, value.unit) if value is not None else (reading.text, reading.unit)
+
+
+def _commanded_by(state: DriveState | None) -> str:
+    """Who commands the drive, where its chart tells that it is not the line."""
+    if state is None or not state.channel or "modbus" in state.channel.casefold():
+        return ""
+    return state.channel
+
+
+def _marks(console: DriveConsole | None, fleet: Fleet | None) -> dict[str, tuple[str, Style]]:
+    """What the tabs say of their screens."""
+    if fleet is None:
+        return {}
+    marks: dict[str, tuple[str, Style]] = {}
+    device = console.device if console is not None else None
+    for fault in fleet.alarms.active:
+        marks[FAULTS if fault.device == device else CONNECTION] = ("■", FAULT)
+    if console is None:
+        return marks
+    editor = console.begun_editor
+    if editor is not None and len(editor.staging.edits):
+        marks[PARAMETERS] = (f"●{min(99, len(editor.staging.edits))}", ATTENTION)
+    elif editor is not None and editor.unsaved:
+        marks[PARAMETERS] = ("S", ALARM)
+    blocks = console.begun_blocks
+    if blocks is not None and (count := blocks.proposals.count):
+        marks[BLOCKS] = (f"●{count}", ATTENTION)
+    return marks

@@ -1,0 +1,225 @@
+"""The first two lines of every screen: what the open drive does, and where the keys 1 to 7 lead.
+
+Every part has its place, so that nothing moves when a value changes. Pure functions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.drive.plain import plain
+
+from .drawing import armed_text, cut, short
+from .drive_signs import STATE_SIGNS, age_text
+from .palette import (
+    ALARM,
+    ATTENTION,
+    CURSOR,
+    FAINT,
+    FAULT,
+    FAULT_BLOCK,
+    KEY,
+    PLAIN,
+    RUNNING,
+    STALE,
+    STRONG,
+)
+
+STATE_AT, STATE_WIDTH = 20, 14
+"""Column and width of the state at 80 columns; what is wider goes to the name."""
+VALUES_WIDTH = 26
+"""`123.4 → 123.4 Hz  123.4 A`, each at its place."""
+STRIP_STYLES: Mapping[str, Style] = {
+    "running": RUNNING,
+    "fault": FAULT_BLOCK,
+    "unknown": ALARM,
+    "stop": ATTENTION,
+    "stop failed": FAULT_BLOCK,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class DriveNow:
+    """The open drive at one moment, in words and figures."""
+
+    device: int
+    name: str
+    """What it says it is called; empty where it says nothing."""
+    model: str
+    kind: str
+    """Kind of its state, or `stop` while one is on its way, `stop failed` where it is none."""
+    words: str
+    frequency: str = ""
+    reference: str = ""
+    frequency_unit: str = "Hz"
+    current: str = ""
+    current_unit: str = "A"
+    age: float | None = None
+    """Seconds since it was heard, where that is too long ago to be the present."""
+    armed: float | None = None
+    """Seconds for which it is armed yet."""
+    by: str = ""
+    """Who commands it, where it is not this panel."""
+
+
+@dataclass(frozen=True, slots=True)
+class StripView:
+    """All that the strip tells."""
+
+    drive: DriveNow | None = None
+    line: str = ""
+    """The open line and how many drives were found on it."""
+    faults: int = 0
+    """Drives of the line that are in fault."""
+    unseen: bool = False
+    """Whether one of the faults was not looked at yet."""
+    load: float | None = None
+    clock: str = ""
+    read_only: bool = False
+
+
+def strip_line(view: StripView, width: int) -> Text:
+    """The first line: the open drive, or the line where none is open."""
+    left, right = Text(no_wrap=True), _right(view)
+    if view.drive is None:
+        room = max(0, width - right.cell_len - 1)
+        head = " Drive Panel"
+        left.append(head, STRONG)
+        left.append(short(f" · {view.line}" if view.line else "", max(0, room - len(head))), FAINT)
+        left.truncate(room)
+    else:
+        left = _drive(view.drive, max(1, width - right.cell_len - 1), width)
+    left.append(" " * max(0, width - left.cell_len - right.cell_len))
+    left.append_text(right)
+    left.truncate(width)
+    return left
+
+
+def _drive(drive: DriveNow, room: int, width: int) -> Text:
+    """The drive in as much room as there is: the state first, then values, then who it is."""
+    text = Text(no_wrap=True)
+    name_width = STATE_AT if width < 100 else STATE_AT + min(24, width - 100)
+    if room < STATE_AT + STATE_WIDTH + VALUES_WIDTH:
+        name_width = max(4, room - STATE_WIDTH - VALUES_WIDTH)
+    text.append(f"{drive.device:>2} ", FAINT)
+    name, model = plain(drive.name), plain(drive.model)
+    if name:
+        text.append(short(name, name_width - 4), STRONG)
+        if model and (rest := name_width - text.cell_len - 4) >= 4:
+            text.append(f" · {short(model, rest)}", FAINT)
+    else:
+        text.append(short(model, name_width - 4), STRONG)
+    text.append(" " * max(1, name_width - text.cell_len))
+    text.append_text(_state(drive))
+    text.append_text(_values(drive))
+    text.truncate(room)
+    return text
+
+
+def _state(drive: DriveNow) -> Text:
+    style = STRIP_STYLES.get(drive.kind, STRONG)
+    sign = {"stop": "▼", "stop failed": "■"}.get(drive.kind, STATE_SIGNS.get(drive.kind, "□"))
+    words = drive.words
+    if drive.age is not None:
+        sign, style, words = "?", ALARM, f"{age_text(drive.age)} ago"
+    text = Text(no_wrap=True)
+    text.append(f"{sign} {short(words, STATE_WIDTH - 3)}", style)
+    text.append(" " * max(1, STATE_WIDTH - text.cell_len))
+    return text
+
+
+def _values(drive: DriveNow) -> Text:
+    style = STRONG if drive.age is None else STALE
+    text = Text(no_wrap=True)
+    if not (drive.frequency or drive.current):
+        return text.append(" " * VALUES_WIDTH)
+    # the unit first behind the reference, as both have it
+    text.append(f"{drive.frequency:>5}", style)
+    text.append(f" → {drive.reference:>5}" if drive.reference else " " * 8, PLAIN)
+    text.append(f" {drive.frequency_unit:<2}", FAINT)
+    text.append(f"{drive.current:>6}", style)
+    text.append(f" {short(drive.current_unit, 2):<2}", FAINT)
+    return text
+
+
+def _right(view: StripView) -> Text:
+    """What concerns the whole line, and whether keys move this drive's motor."""
+    text = Text(no_wrap=True)
+    if view.faults:
+        count = f"■ {view.faults} fault{'' if view.faults == 1 else 's'}"
+        text.append(f" {count} " if view.unseen else count, FAULT_BLOCK if view.unseen else FAULT)
+        text.append(" ")
+    drive = view.drive
+    if drive is not None and drive.armed is not None:
+        text.append_text(armed_text(drive.armed))
+    elif view.read_only:
+        text.append("read-only ", FAINT)
+    elif drive is not None and drive.by:
+        text.append(f"by {short(drive.by, 12)} ", FAINT)
+    if drive is None:
+        load = f"load {view.load * 100:3.0f} %  " if view.load is not None else ""
+        text.append(f"{load}{view.clock} ", FAINT)
+    return text
+
+
+@dataclass(frozen=True, slots=True)
+class Tab:
+    """A screen of the panel as its tab shows it."""
+
+    place: str
+    key: str
+    name: str
+    narrow: str
+    """Its name where the terminal is narrow."""
+    room: int = 0
+    """Cells kept for its mark."""
+
+
+def tabs_line(
+    tabs: Sequence[Tab], chosen: str, marks: Mapping[str, tuple[str, Style]], width: int
+) -> Text:
+    """The second line: where the keys lead, what is there, and where we are."""
+    full = sum(len(tab.name) + tab.room + 3 for tab in tabs) + 1
+    wide = full <= width
+    text, block = Text(no_wrap=True), (0, 0)
+    for tab in tabs:
+        here, start = tab.place == chosen, text.cell_len
+        text.append(f" {tab.key}", STRONG if here else KEY)
+        text.append(f" {tab.name if wide else tab.narrow}", STRONG if here else FAINT)
+        mark, style = marks.get(tab.place, ("", PLAIN))
+        text.append(f" {mark}" if mark and wide else mark, style)
+        if wide:
+            text.append(" " * max(0, start + len(tab.name) + 3 + tab.room - text.cell_len))
+        if here:
+            text.append(" ")
+            block = (start, text.cell_len)
+    text.stylize(CURSOR, *block)
+    text.truncate(width)
+    return text
+
+
+def said_line(when: str, said: str, style: Style, hint: str, width: int) -> Text:
+    """The last line but one: the newest event with its time, and which key shows more."""
+    text = Text(no_wrap=True)
+    text.append(f" {cut(when, 8)} ", FAINT)
+    room = max(8, width - text.cell_len - (len(hint) + 2 if hint else 1))
+    text.append(cut_at_word(said, room), style)
+    if hint:
+        text.append(" " * max(1, width - text.cell_len - len(hint) - 1))
+        key, _, does = hint.partition(" ")
+        text.append(key, KEY)
+        text.append(f" {does}", FAINT)
+    return text
+
+
+def cut_at_word(text: str, width: int) -> str:
+    """The text in at most so many cells, ended at a word with an ellipsis where it is longer."""
+    text = plain(text)
+    if len(text) <= width:
+        return text
+    at = text.rfind(" ", 0, width)
+    return f"{text[: at if at > width // 2 else width - 1].rstrip(' ,;:')}…"
