@@ -157,6 +157,7 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
             data.faults.parameter,
             *data.faults.history,
             *(code for stored in data.faults.stored for code in stored),
+            *(look.code for one in data.faults.help for look in one.look_at),
         ],
         "link": [setting.parameter for setting in data.link.settings],
         "communication_fault": [watch.timeout, watch.reaction] if watch else [],
@@ -205,6 +206,16 @@ def _functions(data: ProfileData) -> Iterator[Finding]:
         yield ["functions"], "function 3 is missing: nothing could be read."
 
 
+def _fault_help(data: ProfileData) -> Iterator[Finding]:
+    known = {fault.raw for fault in data.faults.codes}
+    helped = [one.raw for one in data.faults.help]
+    for index, raw in enumerate(helped):
+        if raw not in known:
+            yield ["faults", "help", index], f"help: there is no fault {raw}."
+        if raw in helped[:index]:
+            yield ["faults", "help", index], f"help: fault {raw} has two."
+
+
 def _scales(data: ProfileData) -> Iterator[Finding]:
     for index, parameter in enumerate(data.parameters):
         if parameter.scale_by and not parameter.scale_by.scales:
@@ -219,5 +230,6 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     _references,
     _states,
     _functions,
+    _fault_help,
     _scales,
 )

@@ -9,7 +9,7 @@ from decimal import Decimal
 from functools import cached_property
 
 from ..errors import UnknownParameter
-from .schema import Chart, FaultCode, Function, Parameter, ProfileData, Quantity
+from .schema import Chart, FaultCode, FaultHelp, Function, Parameter, ProfileData, Quantity
 
 _HEX = re.compile(r"^(?:16#|0x)([0-9a-f]+)$", re.IGNORECASE)
 _WORD = re.compile(r"^w ?([0-9 ]+)$", re.IGNORECASE)
@@ -84,6 +84,14 @@ class Profile:
     def fault(self, raw: int) -> FaultCode | None:
         """The fault a raw fault code stands for, or None if the profile does not know it."""
         return self._faults.get(raw)
+
+    @cached_property
+    def _help(self) -> Mapping[int, FaultHelp]:
+        return {one.raw: one for one in self.data.faults.help}
+
+    def fault_help(self, raw: int) -> FaultHelp | None:
+        """What a fault points at, by its raw code; None where nothing is known."""
+        return self._help.get(raw)
 
     @cached_property
     def groups(self) -> tuple[str, ...]:

@@ -63,6 +63,7 @@ from .memory import MemoryOrder, MemoryOrders
 from .monitoring import (
     CommunicationFault,
     FaultCode,
+    FaultHelp,
     Faults,
     Monitoring,
     MonitoringValue,
@@ -105,6 +106,7 @@ __all__ = [
     "Erratum",
     "ExceptionCode",
     "FaultCode",
+    "FaultHelp",
     "Faults",
     "Function",
     "FurtherServer",

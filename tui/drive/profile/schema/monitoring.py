@@ -48,6 +48,29 @@ class FaultCode(Table, frozen=True, kw_only=True):
     remedy: str = ""
 
 
+class LookAt(Table, frozen=True, kw_only=True):
+    """A parameter to look at after a fault, and why."""
+
+    code: str
+    why: str
+
+
+class FaultHelp(Table, frozen=True, kw_only=True):
+    """What a fault points at; `practice` is general practice with drives, from no manual."""
+
+    raw: RawWord
+    """The fault, as among `codes`."""
+    probable: list[str]
+    """Probable causes, the likeliest first."""
+    check: list[str] = []
+    look_at: list[LookAt] = []
+    reset: Literal["", "after-cause", "automatic", "power-cycle"] = ""
+    """How it can be reset: once its cause is gone, by the drive itself too where that is set, or
+    only by switching the drive off and on."""
+    source: str = ""
+    confidence: Literal["manual", "public", "practice"] = "practice"
+
+
 class Faults(Table, frozen=True, kw_only=True):
     """Where faults are read and what their codes mean."""
 
@@ -59,6 +82,7 @@ class Faults(Table, frozen=True, kw_only=True):
     stored: list[list[str]] = []
     """What the drive keeps of the moment of each fault of its history, in the same order."""
     codes: list[FaultCode] = []
+    help: list[FaultHelp] = []
     none: int = 0
     note: str = ""
     source: str = ""
