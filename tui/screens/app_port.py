@@ -112,6 +112,10 @@ class Panel(App[None]):
     def action_goto(self, place: str) -> AwaitMount | None:
         """Show a screen, on the drive that is open."""
 
+    @abstractmethod
+    async def open_parameter(self, code: str) -> None:
+        """Show a parameter of the open drive in the editor, under the cursor."""
+
     @property
     @abstractmethod
     def stops_whom(self) -> str:

@@ -26,7 +26,8 @@ class PanelScreen(Framed):
     """
 
     DEFAULT_CSS = """
-    PanelScreen { layout: vertical; background: $background; color: $foreground; }
+    PanelScreen { layout: vertical; overflow: hidden; }
+    PanelScreen { background: $background; color: $foreground; }
     PanelScreen #head { height: 2; }
     PanelScreen #keys { height: 1; margin-top: 1; background: $surface; }
     """

@@ -99,6 +99,15 @@ class Places(Panel):
         if self.chosen is not None:
             self._ask_screen("action_search")
 
+    async def open_parameter(self, code: str) -> None:
+        """Show a parameter of the open drive in the editor, under the cursor."""
+        from textual.widgets import Input
+
+        if shown := self.action_goto(PARAMETERS):
+            await shown
+        self.screen.query_one("#search", Input).value = code
+        self.screen.set_focus(None)
+
     def action_messages(self) -> None:
         """Everything that was said."""
         from .messages.screen import MessagesScreen

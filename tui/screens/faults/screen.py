@@ -1,4 +1,4 @@
-"""Faults: what tripped the drive, its history with what it stored, the seconds before."""
+"""Faults: what tripped the drive, what that points at, its history, the seconds before."""
 
 from __future__ import annotations
 
@@ -7,34 +7,35 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.containers import Horizontal
-from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
-from tui.screens.faults.view import fault_lines, history_line, record_lines, stored_lines
+from tui.drive.profile.schema import FaultCode
 from tui.session.console import DriveConsole
 from tui.session.monitor.fault_record import FaultRecord, Recorder, record_name, record_text
 from tui.session.paths import state_folder
 from tui.session.reading import Reading
-from tui.widgets.drawing import armed_text, rule
+from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, STRONG
-from tui.widgets.plain import entry
 
 from ..command.command_keys import OrderKeys
-from ..command.news import news
 from ..dialogs.files import fault_of_new
 from ..keys.table import FAULTS, bindings
+from .doctor import DoctorView, doctor_lines
+from .view import record_lines, stored_lines
 
-LEFT = 36
 STORED = 52
 """Columns of what the drive stored, where there is room: values stay beside their names."""
 STEP = 5
 """Rows of the record that a key moves by."""
+READ_AGAIN = 2.0
+"""Seconds between two looks at the parameters that a fault points at."""
+BESIDE = 36
+"""Rows from which on the seconds before the trip stand below the doctor."""
+DOCTOR_ROWS = 24
 
 
 class FaultsScreen(OrderKeys):
-    """Reads the history when it opens, and again after a trip."""
+    """What the drive is in, or was in last; another fault of its history where one is chosen."""
 
     CSS_PATH = "faults.tcss"
     BINDINGS: ClassVar = bindings(FAULTS)
@@ -47,93 +48,148 @@ class FaultsScreen(OrderKeys):
         self.session = console.session
         self._readings: dict[str, Reading] = {}
         self._shown: FaultRecord | None = None
-        self._message = Text(" reading the history", STRONG)
+        self._chosen: FaultCode | None = None
+        """A fault of the history that was chosen."""
+        self._unread = True
+        self._at = 0
         self._offset = 0
+        self._before = False
+        """Whether the seconds before the trip are shown in place of the doctor."""
 
     @property
     def _recorder(self) -> Recorder:
         return self.console.recorder
 
     def body(self) -> ComposeResult:
-        """The fault, the history beside what was stored, the record."""
-        yield Lines(id="title")
-        yield Lines(id="fault")
-        with Horizontal(id="middle"):
-            yield OptionList(id="history", compact=True)
-            yield Lines(id="stored")
+        """The doctor above, the record below where there is room."""
+        yield Lines(id="doctor")
         yield Lines(id="record")
-        yield Lines(id="message")
 
     def on_mount(self) -> None:
         """Read the history; who opens this screen has seen the trip."""
-        self._recorder.acknowledge()
+        self._see()
         self._shown = self._recorder.latest
-        self._list()
-        self.query(OptionList).focus()
         self._read_again()
+        self.set_interval(READ_AGAIN, self._read_again)
+
+    def _see(self) -> None:
+        self._recorder.acknowledge()
+        if self.app.fleet is not None:
+            self.app.fleet.alarms.acknowledge(self.session.device)
 
     def _read_again(self) -> None:
-        self.run_worker(self._read(), exclusive=True, group="faults")
+        if self.is_current:
+            self.run_worker(self._read(), exclusive=True, group="faults")
 
     async def _read(self) -> None:
         faults = self.session.profile.data.faults
-        codes = [*faults.history, *(code for stored in faults.stored for code in stored)]
+        codes = [look.code for look in self.doctor().look_at]
+        if self._unread:
+            codes += [*faults.history, *(code for stored in faults.stored for code in stored)]
+        if not codes:
+            return
         try:
-            self._readings = await self.console.read(list(dict.fromkeys(codes)))
+            found = await self.console.read(list(dict.fromkeys(codes)))
         except LineError as error:
-            self._message = Text(f" {error}", ALARM)
+            if self._unread:
+                self.app.notify(f"The history was not read: {error}", severity="warning")
         else:
-            self._message = Text("")
-        self._list()
+            self._readings = {**self._readings, **found}
+            self._unread = False
         self.look()
 
-    def _list(self) -> None:
-        if not (found := self.query(OptionList)):
-            return  # the screen was left before it stood
-        options = found.first()
-        at = options.highlighted or 0
-        profile = self.session.profile
-        options.clear_options()
-        for number, code in enumerate(profile.data.faults.history, start=1):
-            options.add_option(entry(history_line(profile, number, code, self._readings, LEFT - 2)))
-        if profile.data.faults.history:
-            options.highlighted = at
-        else:
-            options.add_option(entry(Text(" not known on this drive"), disabled=True))
-
-    def on_option_list_option_highlighted(self) -> None:
-        """Another fault of the history is looked at."""
-        self.look()
+    def doctor(self) -> DoctorView:
+        """What is shown now."""
+        latest, record = self.console.monitor.latest, self._recorder.latest
+        present = latest is not None and not latest.error and latest.state.kind == "fault"
+        fault = latest.state.fault if latest is not None and present else None
+        if fault is None and not present:
+            fault = record.fault if record else None
+        if self._chosen is not None:
+            present = present and fault is not None and fault.raw == self._chosen.raw
+            fault = self._chosen
+        same = record is not None and record.fault is not None and fault is not None
+        return DoctorView(
+            profile=self.session.profile,
+            fault=fault,
+            present=present,
+            record=record if same and record and record.fault.raw == fault.raw else None,  # type: ignore[union-attr]
+            readings=self._readings,
+            at=self._at,
+            unread=self._unread,
+        )
 
     def draw(self, width: int) -> None:
         """Show what there is; a new trip counts as seen."""
         super().draw(width)
         record = self._recorder.latest
         if record is not self._shown:
-            self._shown, self._offset = record, 0
-            self._recorder.acknowledge()
+            self._shown, self._offset, self._unread, self._chosen = record, 0, True, None
+            self._at = 0
             self._read_again()
-        latest = self.console.monitor.latest
-        present = latest is not None and latest.state.kind == "fault"
-        fault = latest.state.fault if latest and present else record.fault if record else None
-        who = f"Faults · {self.session.profile.name} · device {self.session.device}"
-        title = rule(who, width - 12, self.app.clock.time_of_day())
-        self.put("title", [title.append_text(armed_text(self.commander.armed_for))])
-        self.put("fault", fault_lines(fault, present, width))
-        room = min(STORED, width - LEFT)
-        stored = stored_lines(self.session.profile, self._stored(), self._readings, room)
-        self.put("stored", stored)
-        room = self.size.height - 1 - 4 - self.query_one("#middle").size.height - 2
-        self.put("record", record_lines(record, width, room, self._offset))
-        now = self.app.clock.monotonic()
-        told = news(self.session.work.outcome, now, busy=self.session.work.busy)
-        self.put("message", [Text(f" {told[0]}", told[1]) if told else self._message])
+        self._see()
+        rows = self.size.height - 4
+        doctor, below = rows, 0
+        if self._before:
+            doctor, below = 0, rows
+        elif self.size.height >= BESIDE:
+            doctor, below = DOCTOR_ROWS, rows - DOCTOR_ROWS
+        self.query_one("#doctor", Lines).display = doctor > 0
+        self.query_one("#record", Lines).display = below > 0
+        self.put("doctor", doctor_lines(self.doctor(), width, doctor) if doctor else [])
+        self.put("record", self._past(width, below) if below else [])
+
+    def _past(self, width: int, rows: int) -> list[Text]:
+        """What the drive stored of the chosen fault, and the seconds before the trip."""
+        stored = []
+        if self._before:
+            codes = self._stored()
+            stored = stored_lines(self.session.profile, codes, self._readings, min(STORED, width))
+            stored = [rule("Stored by the drive", width), *stored, Text("")]
+        room = max(3, rows - len(stored))
+        return [*stored, *record_lines(self._shown, width, room, self._offset)]
 
     def _stored(self) -> list[str]:
         """Codes that the drive keeps of the chosen fault."""
         stored = self.session.profile.data.faults.stored
-        at = self.query_one(OptionList).highlighted or 0
+        at = max(0, self._at - len(self.doctor().look_at))
         return stored[at] if at < len(stored) else []
+
+    def action_move(self, rows: int) -> None:
+        """Another parameter to look at, or another fault of the history."""
+        view = self.doctor()
+        most = len(view.look_at) + len(view.history) - 1
+        self._at = max(0, min(most, self._at + rows))
+        self.look()
+
+    async def action_open(self) -> None:
+        """Open the parameter under the cursor in the editor, or look at that fault."""
+        view = self.doctor()
+        if self._at < len(view.look_at):
+            await self.app.open_parameter(view.look_at[self._at].code)
+            return
+        code = view.history[self._at - len(view.look_at)] if view.history else ""
+        reading = self._readings.get(code)
+        known = self.session.profile.fault(reading.raw or 0) if reading else None
+        if known is None or known.raw == self.session.profile.data.faults.none:
+            self.app.tell("There is no fault to look at.")
+            return
+        self._chosen, self._at = known, 0
+        self._read_again()
+        self.look()
+
+    def action_other_page(self) -> None:
+        """The seconds before the trip, or the doctor again."""
+        self._before = not self._before
+        self.look()
+
+    def action_leave(self) -> None:
+        """From a fault of the history to that of now, then back to Monitor."""
+        if self._chosen is not None or self._before:
+            self._chosen, self._before, self._at = None, False, 0
+            self.look()
+        else:
+            self.app.pop_screen()
 
     def action_move_record(self, rows: int) -> None:
         """Older or newer values of the record."""
@@ -147,8 +203,7 @@ class FaultsScreen(OrderKeys):
 
         record = self._recorder.latest
         if record is None:
-            self._message = Text(" Nothing to save: no trip was seen.", ALARM)
-            self.look()
+            self.app.tell("Nothing to save: no trip was seen since this drive is watched.")
             return
         proposed = str(state_folder() / record_name(self.session, record))
 
@@ -173,7 +228,6 @@ class FaultsScreen(OrderKeys):
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(record_text(self.session, record, rows), encoding="utf-8")
         except OSError as error:
-            self._message = Text(f" Not saved: {error.strerror or error}: {path}", ALARM)
+            self.app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
         else:
-            self._message = Text(f" Saved: {path}", STRONG)
-        self.look()
+            self.app.tell(f"Saved: {path}")

@@ -1,4 +1,4 @@
-"""A drive's fault, its history with what it stored, and the seconds before a trip, as lines."""
+"""What a drive stored of a fault, and the seconds before a trip, as lines; pure functions."""
 
 from __future__ import annotations
 
@@ -8,47 +8,15 @@ from datetime import datetime
 from rich.text import Text
 
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.journal import Entry
 from tui.session.monitor.fault_record import FaultRecord, Moment
 from tui.session.reading import Reading
-from tui.widgets.drawing import cut, rule, wrapped
-from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, FAULT_BLOCK, PLAIN, STRONG
+from tui.widgets.drawing import cut, rule
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN, STRONG
 
 RECORD_VALUE_WIDTH = 9
 FAULT_TIME_WIDTH = 8
-
-
-def fault_lines(fault: FaultCode | None, present: bool, width: int) -> list[Text]:
-    """What tripped the drive, why, and what to do; always four lines."""
-    if fault is None:
-        text = " ■ FAULT, its code was not read " if present else " No fault now."
-        return [Text(text, FAULT_BLOCK if present else STRONG), Text(""), Text(""), Text("")]
-    sign, style = (" ■ FAULT", FAULT_BLOCK) if present else (" Last trip:", FAULT)
-    lines = [Text(f"{sign} {fault.code} ({fault.raw}) {fault.name} ", style)]
-    cause = fault.cause or "The manual in hand gives no cause."
-    lines += [Text(f"   {line}", PLAIN) for line in wrapped(cause, width - 4, 2)]
-    remedy = f"Do: {fault.remedy}" if fault.remedy else ""
-    lines += [Text(f"   {line}", STRONG) for line in wrapped(remedy, width - 4, 4 - len(lines))]
-    return [*lines, *(Text("") for _ in range(4 - len(lines)))]
-
-
-def history_line(
-    profile: Profile, number: int, code: str, readings: Mapping[str, Reading], width: int
-) -> Text:
-    """One fault of the drive's history."""
-    text = Text(no_wrap=True)
-    text.append(f" {number} {code:<5}", FAINT)
-    reading = readings.get(code)
-    if reading is None or reading.raw is None:
-        text.append(NOT_AVAILABLE, FAINT)
-    else:
-        known = profile.fault(reading.raw)
-        none = reading.raw == profile.data.faults.none
-        name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
-        text.append(cut(name, max(1, width - 9)).rstrip(), FAINT if none else PLAIN)
-    return text
 
 
 def stored_lines(

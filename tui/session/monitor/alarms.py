@@ -11,7 +11,7 @@ from ..events import EventLog
 
 
 @dataclass(frozen=True, slots=True)
-class ActiveFault:
+class PresentFault:
     """A fault that a drive is in now; `wall` is when it was first seen, time.time()."""
 
     device: int
@@ -32,10 +32,10 @@ class LineAlarms:
     def __init__(self, events: EventLog, wall: Callable[[], float] = time.time) -> None:
         self._events = events
         self._wall = wall
-        self._active: dict[int, ActiveFault] = {}
+        self._active: dict[int, PresentFault] = {}
 
     @property
-    def active(self) -> tuple[ActiveFault, ...]:
+    def active(self) -> tuple[PresentFault, ...]:
         """The faults of now, the first one first."""
         return tuple(self._active.values())
 
@@ -74,7 +74,7 @@ class LineAlarms:
             self._events.add("fault", f"the fault is {_called(self._active[device])}.", device)
             return False
         first = next(iter(self._active.values()), None)
-        now = ActiveFault(device, code, name, self._wall())
+        now = PresentFault(device, code, name, self._wall())
         self._active[device] = now
         self._events.add("fault", f"tripped: {_called(now)}{_behind(first, device)}.", device)
         return True
@@ -86,11 +86,11 @@ class LineAlarms:
             self._active[device] = replace(fault, seen=True)
 
 
-def _called(fault: ActiveFault) -> str:
+def _called(fault: PresentFault) -> str:
     return f"{fault.code} {fault.name}".strip() or "a fault whose code was not read"
 
 
-def _behind(first: ActiveFault | None, device: int) -> str:
+def _behind(first: PresentFault | None, device: int) -> str:
     if first is None or first.device == device:
         return ""
     at = time.strftime("%H:%M:%S", time.localtime(first.wall))

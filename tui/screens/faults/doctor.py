@@ -1,0 +1,255 @@
+"""A fault, what it points at, and the drive's history, as lines; pure functions."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from rich.style import Style
+from rich.text import Text
+
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import FaultCode, FaultHelp, LookAt, Quantity
+from tui.drive.values import NOT_AVAILABLE
+from tui.session.monitor.fault_record import FaultRecord
+from tui.session.reading import Reading
+from tui.widgets.drawing import cut, wrapped
+from tui.widgets.palette import (
+    CURSOR,
+    FAINT,
+    FAULT,
+    FAULT_BLOCK,
+    KEY,
+    PLAIN,
+    STALE,
+    STRONG,
+)
+from tui.widgets.strip import cut_at_word
+
+LABEL = 13
+"""Columns of the headings at the left."""
+CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
+TRUST: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
+"""How surely the causes are known, in a word."""
+RESETS: Mapping[str, str] = {
+    "after-cause": "x, once the cause is gone; nothing runs by itself",
+    "automatic": "x, once the cause is gone; by the drive itself where that is set",
+    "power-cycle": "switch the drive off and on, once the cause is gone; x does not reset it",
+    "": "x, once the cause is gone",
+}
+TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
+    "output_frequency": "",
+    "motor_current": "",
+    "mains_voltage": "mains ",
+}
+STORED_UNITS = ("Hz", "A", "h")
+"""What is told of a fault of the history, where the drive stores it."""
+
+
+@dataclass(frozen=True, slots=True)
+class DoctorView:
+    """What the Faults screen shows at one moment."""
+
+    profile: Profile
+    fault: FaultCode | None
+    present: bool
+    """Whether the drive is in this fault now."""
+    record: FaultRecord | None
+    """The trip as the panel saw it, where it did and this is the fault."""
+    readings: Mapping[str, Reading]
+    at: int = 0
+    """The row of the cursor: parameters to look at first, then the history."""
+    unread: bool = False
+    """Whether the history is being read yet."""
+
+    @property
+    def help(self) -> FaultHelp | None:
+        """What the fault points at."""
+        return self.profile.fault_help(self.fault.raw) if self.fault else None
+
+    @property
+    def look_at(self) -> Sequence[LookAt]:
+        """The parameters to look at."""
+        return self.help.look_at if self.help else ()
+
+    @property
+    def history(self) -> list[str]:
+        """The codes of the drive's history, the newest first."""
+        return self.profile.data.faults.history
+
+
+def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
+    """The whole of it, in so many lines; where room is short, without the empty ones."""
+    parts = [
+        _headline(view, width),
+        _probable(view, width),
+        _look_at(view, width),
+        _checks(view, width),
+        _reset(view, width),
+    ]
+    parts = [part for part in parts if part]
+    known = sum(len(part) for part in parts)
+    least = min(3, len(view.history) or 1)
+    airy = known + len(parts) + least + 1 <= height
+    lines = [Text("")] if airy else []
+    for part in parts:
+        lines += [*part, *([Text("")] if airy else [])]
+    lines = lines[: max(1, height - least)]
+    return lines + _history(view, width, height - len(lines))
+
+
+def _headline(view: DoctorView, width: int) -> list[Text]:
+    fault = view.fault
+    text = Text(no_wrap=True)
+    text.append("  ")
+    if fault is None:
+        if view.present:
+            text.append(" ■ FAULT, its code was not read ", FAULT_BLOCK)
+        else:
+            text.append("No fault now.", STRONG)
+            text.append("   reading the history" if view.unread else "", FAINT)
+        return [text]
+    if view.present:
+        text.append(f" ■ {fault.code}  {fault.name.upper()} ", FAULT_BLOCK)
+    else:
+        text.append(f"{fault.code}  {fault.name}", FAULT)
+    room = width - text.cell_len - 4
+    told = _tripped(view) if view.present or view.record else "not in it now"
+    text.append(f"   {cut_at_word(told, max(1, room))}", PLAIN)
+    return [text]
+
+
+def _tripped(view: DoctorView) -> str:
+    """When it tripped, and what the motor did then, as far as this panel saw it."""
+    record = view.record
+    if record is None:
+        return "tripped before this panel watched it"
+    before = [moment for moment in record.moments if moment.wall < record.wall]
+    texts = before[-1].texts if before else ()  # at the trip itself the motor is free already
+    values = dict(zip(record.codes, texts, strict=False))
+    parts = []
+    for quantity, name in TOLD_OF_A_TRIP.items():
+        parameter = view.profile.quantity(quantity)
+        value = values.get(parameter.code, "") if parameter else ""
+        if parameter and value not in ("", NOT_AVAILABLE):
+            parts.append(f"{name}{value} {parameter.unit}".rstrip())
+    when = time.strftime("%H:%M:%S", time.localtime(record.wall))
+    return f"tripped {when}" + (f" at {', '.join(parts)}" if parts else "")
+
+
+def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
+    """Lines behind a heading that stands before the first."""
+    return [
+        Text.assemble((f"  {label if not number else '':<{LABEL - 2}}", FAINT)).append_text(line)
+        for number, line in enumerate(lines)
+    ]
+
+
+def _probable(view: DoctorView, width: int) -> list[Text]:
+    fault, help_ = view.fault, view.help
+    if fault is None:
+        return []
+    room = max(10, width - LABEL - 12)
+    if help_ is None:
+        cause = fault.cause or "The manual in hand gives no cause."
+        return _labelled("Probably", [Text(part, PLAIN) for part in wrapped(cause, room, 3)])
+    lines = [Text(cut(cause, room), PLAIN) for cause in help_.probable]
+    lines[0].append(f" {TRUST[help_.confidence]:>10}", FAINT)
+    return _labelled("Probably", lines)
+
+
+def _look_at(view: DoctorView, width: int) -> list[Text]:
+    lines = []
+    for number, look in enumerate(view.look_at):
+        reading = view.readings.get(look.code)
+        chosen = number == view.at
+        text = Text(no_wrap=True)
+        text.append(f"{look.code:<{CODE_WIDTH}}", STRONG)
+        value, style = _value(reading)
+        text.append(f"{cut(value, LOOK_VALUE_WIDTH)} ", style)
+        hint = "Enter opens" if chosen else ""
+        room = max(4, width - LABEL - text.cell_len - 14)
+        text.append(cut(look.why, room), PLAIN if chosen else FAINT)
+        text.append(f" {hint:<12}", FAINT)
+        if chosen:
+            text.stylize(CURSOR)
+        lines.append(text)
+    return _labelled("Look at", lines)
+
+
+def _value(reading: Reading | None) -> tuple[str, Style]:
+    if reading is None:
+        return NOT_AVAILABLE, FAINT
+    value = reading.physical or reading.value
+    if value is None:
+        return NOT_AVAILABLE, FAINT
+    return f"{value.text} {value.unit}".rstrip(), PLAIN if reading.quality == "good" else STALE
+
+
+def _checks(view: DoctorView, width: int) -> list[Text]:
+    fault, help_ = view.fault, view.help
+    room = max(10, width - LABEL - 1)
+    if help_ is not None and help_.check:
+        return _labelled("Check", [Text(cut(check, room), PLAIN) for check in help_.check])
+    if fault is not None and fault.remedy:
+        return _labelled("Check", [Text(part, PLAIN) for part in wrapped(fault.remedy, room, 3)])
+    return []
+
+
+def _reset(view: DoctorView, width: int) -> list[Text]:
+    if not view.present:
+        return []
+    said = RESETS[view.help.reset if view.help else ""]
+    key, _, rest = said.partition(", ")
+    text = Text(no_wrap=True)
+    if key == "x":
+        text.append("x", KEY)
+        text.append(f", {rest}", PLAIN)
+    else:
+        text.append(said, PLAIN)
+    text.truncate(max(1, width - LABEL), overflow="ellipsis")
+    return _labelled("Reset", [text])
+
+
+def _history(view: DoctorView, width: int, height: int) -> list[Text]:
+    """The drive's own list, scrolled to the cursor; each with what it stored."""
+    if height < 1:
+        return []
+    if not view.history:
+        return _labelled("History", [Text("not known on this drive", FAINT)])
+    rows = [_past(view, number, code, width) for number, code in enumerate(view.history)]
+    chosen = view.at - len(view.look_at)
+    top = max(0, min(chosen - height + 1, len(rows) - height)) if chosen >= 0 else 0
+    return _labelled("History", rows[top : top + height])
+
+
+def _past(view: DoctorView, number: int, code: str, width: int) -> Text:
+    faults, chosen = view.profile.data.faults, number == view.at - len(view.look_at)
+    reading = view.readings.get(code)
+    text = Text(no_wrap=True)
+    text.append(f"{number + 1 if number else 'last':<5}", FAINT)
+    stored = _stored(view, faults.stored[number]) if number < len(faults.stored) else ""
+    room = max(8, width - LABEL - 5 - 28)
+    if reading is None or reading.raw is None:
+        text.append(cut(NOT_AVAILABLE, room), FAINT)
+    else:
+        known, none = view.profile.fault(reading.raw), reading.raw == faults.none
+        name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
+        text.append(cut(name, room), FAINT if none else PLAIN)
+        stored = "" if none else stored
+    text.append(f"{stored:<28}", FAINT)
+    if chosen:
+        text.stylize(CURSOR)
+    text.truncate(max(1, width - LABEL))
+    return text
+
+
+def _stored(view: DoctorView, codes: Sequence[str]) -> str:
+    """Frequency, current and hours of a fault, each at its place."""
+    found = dict.fromkeys(STORED_UNITS, "")
+    for code in codes:
+        reading = view.readings.get(code)
+        if reading is not None and reading.unit in found and not found[reading.unit]:
+            found[reading.unit] = f"{reading.text} {reading.unit}"
+    return "".join(f"{text:>9}" for text in found.values())
