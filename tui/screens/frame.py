@@ -31,7 +31,7 @@ TABS: tuple[Tab, ...] = (
     Tab(MONITOR, "2", "Monitor", "Mon"),
     Tab(PARAMETERS, "3", "Parameters", "Par", 3),
     Tab(BLOCKS, "4", "Scanner", "Scan", 3),
-    Tab(FAULTS, "5", "Faults", "Flt", 2),
+    Tab(FAULTS, "5", "Faults", "Flt", 3),
     Tab(SOURCES, "6", "Control", "Ctl"),
     Tab(FRAMES, "7", "Frames", "Frm"),
 )

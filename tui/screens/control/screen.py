@@ -1,4 +1,4 @@
-"""Control source: who commands the drive today, what another configuration would change."""
+"""Control: who commands the drive today, what another configuration would change."""
 
 from __future__ import annotations
 
@@ -12,16 +12,15 @@ from textual.widgets import OptionList
 from tui.bus.errors import LineError
 from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
-from tui.screens.control.view import change_lines, diagram, note_lines
 from tui.session.console import DriveConsole
-from tui.widgets.drawing import armed_text, rule
+from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
-from tui.widgets.outcome import outcome_lines
-from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.palette import FAINT, PLAIN, STRONG
 from tui.widgets.plain import entry
 
 from ..command.command_keys import OrderKeys
 from ..keys.table import SOURCES, bindings
+from .view import change_lines, diagram, note_lines, now_lines
 
 
 class ControlSourceScreen(OrderKeys):
@@ -43,10 +42,9 @@ class ControlSourceScreen(OrderKeys):
 
     def body(self) -> ComposeResult:
         """The list above, what belongs to the chosen one below."""
-        yield Lines(id="title")
+        yield Lines(id="now")
         yield OptionList(id="sources", compact=True)
         yield Lines(id="detail")
-        yield Lines(id="message")
 
     def on_mount(self) -> None:
         """Show the list, and read what the drive holds."""
@@ -93,7 +91,7 @@ class ControlSourceScreen(OrderKeys):
         self.look()
 
     def draw(self, width: int) -> None:
-        """Show the chosen configuration, and what became of the last order."""
+        """Show the chosen configuration, and who commands now."""
         super().draw(width)
         found = source_changes(self.session.profile, self._chosen, self._raws)
         lines = [rule("So it works", width), *diagram(self._chosen)]
@@ -102,26 +100,15 @@ class ControlSourceScreen(OrderKeys):
             lines += change_lines(self.session.profile, found, width)
         lines += [Text(""), *note_lines(self._chosen, found, width)]
         self.put("detail", lines)
-        self._head(width)
+        self.put("now", now_lines(self._today(), self.console.latest, self._trouble, width))
         outcome = self.commander.outcome
         if outcome is not None and outcome is not self._seen and outcome.kind != "working":
             self._seen = outcome
             self.run_worker(self._read(), exclusive=True, group="sources")
 
-    def _head(self, width: int) -> None:
-        title = rule(f"Control source · {self.session.profile.name}", width - 12)
-        title.append_text(armed_text(self.commander.armed_for))
-        self.put("title", [title])
-        control = self.control(self.app.clock.monotonic())
-        if control.outcome is not None:
-            message = [Text(" ") + line for line in outcome_lines(control.outcome, width - 2)]
-        elif self._trouble:
-            message = [Text(f" {self._trouble}", ALARM)]
-        elif source_in_force(self.session.profile, self._raws) is None:
-            message = [Text(" Today's setting is none of these.", FAINT)]
-        else:
-            message = [Text("")]
-        self.put("message", message)
+    def _today(self) -> ControlSource | None:
+        """The configuration in force, as far as it was read."""
+        return source_in_force(self.session.profile, self._raws) if self._raws else None
 
     def on_option_list_option_selected(self) -> None:
         """Enter in the list."""
@@ -133,7 +120,7 @@ class ControlSourceScreen(OrderKeys):
         if self._armed_or_told() and found and self._raws:
             codes = ", ".join(change.parameter.code for change in found)
             follows = (
-                f"Writes {codes}, each read back. A run order that waits at the new source"
+                f"Writes {codes}, each read back. A run command that waits at the new source"
                 " starts the motor."
             )
             work = partial(self.commander.configure, self._chosen)

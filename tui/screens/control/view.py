@@ -11,11 +11,30 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import ControlSource, Way
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE
+from tui.session.monitor.monitor import Snapshot
 from tui.widgets.drawing import cut, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
 
 SOURCE_WIDTH = 16
 WIRE = 18
+
+
+def now_lines(
+    today: ControlSource | None, latest: Snapshot | None, trouble: str, width: int
+) -> list[Text]:
+    """Who commands the drive now, by its own words, and by which configuration; three lines."""
+    lines = [Text("")]
+    state = latest.state if latest is not None and not latest.error else None
+    text = Text("  Commanded by  ", FAINT, no_wrap=True)
+    text.append((state.channel if state else "") or NOT_AVAILABLE, STRONG)
+    if trouble:
+        text.append(f"   {trouble}", ALARM)
+    elif today is None:
+        text.append("   today's setting is none of these", ALARM)
+    else:
+        text.append(f"   set up: {today.name}", FAINT)
+    text.truncate(width, overflow="ellipsis")
+    return [*lines, text, Text("")]
 
 
 def diagram(source: ControlSource) -> list[Text]:

@@ -89,14 +89,24 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
         _reset(view, width),
     ]
     parts = [part for part in parts if part]
-    known = sum(len(part) for part in parts)
-    least = min(3, len(view.history) or 1)
-    airy = known + len(parts) + least + 1 <= height
-    lines = [Text("")] if airy else []
+    least = min(3, max(1, _told(view)))
+    spare = height - sum(len(part) for part in parts) - max(least, _told(view))
+    lines: list[Text] = [Text("")] if spare > len(parts) else []
+    spare -= len(lines)
     for part in parts:
-        lines += [*part, *([Text("")] if airy else [])]
+        lines += part
+        if spare > 0:
+            lines.append(Text(""))
+            spare -= 1
     lines = lines[: max(1, height - least)]
     return lines + _history(view, width, height - len(lines))
+
+
+def _told(view: DoctorView) -> int:
+    """How many faults of the history are worth a line: those behind the last one are none."""
+    raws = [r.raw if (r := view.readings.get(code)) else None for code in view.history]
+    some = [n for n, raw in enumerate(raws) if raw not in (None, view.profile.data.faults.none)]
+    return max([1, *(n + 1 for n in some), view.at - len(view.look_at) + 1])
 
 
 def _headline(view: DoctorView, width: int) -> list[Text]:
@@ -218,7 +228,8 @@ def _history(view: DoctorView, width: int, height: int) -> list[Text]:
         return []
     if not view.history:
         return _labelled("History", [Text("not known on this drive", FAINT)])
-    rows = [_past(view, number, code, width) for number, code in enumerate(view.history)]
+    told = view.history[: max(_told(view), 1)]
+    rows = [_past(view, number, code, width) for number, code in enumerate(told)]
     chosen = view.at - len(view.look_at)
     top = max(0, min(chosen - height + 1, len(rows) - height)) if chosen >= 0 else 0
     return _labelled("History", rows[top : top + height])
