@@ -11,7 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import ControlSource, Way
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.monitor.monitor import Snapshot
+from tui.session.monitor.snapshot import Snapshot
 from tui.widgets.drawing import cut, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
 
