@@ -1,28 +1,39 @@
-"""Frames: the last bytes on the line, as they went out and came in."""
+"""Frames: what went over the line, in codes and values, and as bytes."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 
 from tui.bus.api import Frame
+from tui.bus.link import TcpLink
+from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
-from tui.widgets.drawing import rule, short
+from tui.widgets.drawing import cut, rule, short
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, FAINT, PLAIN
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+from tui.widgets.strip import cut_at_word
 from tui.wire.frames import hex_text
 
 from ..base import PanelScreen
 from ..keys.table import FRAMES, bindings
+from .decoded import decoded
 
 FEWEST = 12
 """Columns of bytes that are shown, however long the note on the frame is."""
 
 
+BYTES_WIDTH = 44
+"""Columns of the bytes where they stand beside the words."""
+BESIDE_BYTES = 110
+"""Columns from which on words and bytes stand side by side."""
+
+
 class FramesScreen(PanelScreen):
-    """The frame log of the line; the newest at the bottom."""
+    """The frame log of the line in words; the newest at the bottom."""
 
     CSS_PATH = "frames.tcss"
     BINDINGS: ClassVar = bindings(FRAMES)
@@ -34,35 +45,66 @@ class FramesScreen(PanelScreen):
         self.console = console
         self._line = console.session.line
         self._held: tuple[Frame, ...] | None = None
+        self._bytes = False
 
     def body(self) -> ComposeResult:
-        """One list and the keys."""
+        """One list."""
         yield Lines(id="frames")
 
     def draw(self, width: int) -> None:
         """Show the newest frames that fit."""
         super().draw(width)
         frames = self._held if self._held is not None else tuple(self._line.trace)
-        room = max(1, self.size.height - 2)
-        title = "Frames on the line" + (" (held)" if self._held is not None else "")
-        lines = [rule(title, width, f"{len(frames)} kept")]
+        room = max(1, self.size.height - 5)
+        # one more than fits: a reply at the top is told by its request
+        told = decoded(
+            frames[-room - 1 :], self._profile, self._raws, tcp=isinstance(self._line.link, TcpLink)
+        )[-room:]
+        held = " (held)" if self._held is not None else ""
+        lines = [rule(f"Frames on the line{held}", width, f"{len(frames)} kept")]
         now = self.app.clock.monotonic()
-        lines += [frame_line(frame, now, width) for frame in frames[-room:]]
+        for frame, words in zip(frames[-room:], told, strict=True):
+            if self._bytes:
+                words = ""
+            lines.append(frame_line(frame, now, width, words))
         self.put("frames", lines)
+
+    def _profile(self, device: int) -> Profile | None:
+        console = self.app.fleet.console(device) if self.app.fleet else None
+        return console.session.profile if console else None
+
+    def _raws(self, device: int) -> Mapping[str, int]:
+        console = self.app.fleet.console(device) if self.app.fleet else None
+        return console.session.image.raws if console else {}
 
     def action_hold(self) -> None:
         """Hold the list still, or let it run."""
         self._held = tuple(self._line.trace) if self._held is None else None
         self.look()
 
+    def action_other_page(self) -> None:
+        """The bytes as they are, or words."""
+        self._bytes = not self._bytes
+        self.look()
 
-def frame_line(frame: Frame, now: float, width: int) -> Text:
-    """One frame: how long ago, direction, as many bytes as fit, and what was said of it."""
+
+def frame_line(frame: Frame, now: float, width: int, words: str = "") -> Text:
+    """One frame: how long ago, direction, what it says or its bytes, and what was said of it.
+
+    Bytes that form no frame, and all where there are no `words`, are shown as they are.
+    """
     text = Text(no_wrap=True)
-    text.append(f" {now - frame.time:7.2f} s ago  ", FAINT)
-    text.append(f"{frame.direction:<4}", FAINT)
+    text.append(f" {now - frame.time:6.2f} s ", FAINT)
+    text.append("→ " if frame.direction == "out" else "  ← ", STRONG)
     note = f"  {frame.note}" if frame.note else ""
     room = max(FEWEST, width - text.cell_len - len(note))
-    text.append(short(hex_text(frame.data), room), PLAIN)
+    if not words:
+        text.append(short(hex_text(frame.data), room), PLAIN)
+    elif width >= BESIDE_BYTES:
+        left = max(FEWEST, room - BYTES_WIDTH)
+        text.append(cut(words, left), PLAIN)
+        text.append(f" {short(hex_text(frame.data), BYTES_WIDTH - 1)}", FAINT)
+    else:
+        text.append(cut_at_word(words, room), PLAIN)
     text.append(note, ALARM)
     return text

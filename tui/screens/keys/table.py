@@ -89,6 +89,7 @@ ACTIONS: tuple[Action, ...] = (
     *on(
         (FRAMES,),
         ("hold", "h", "hold", "Hold the list still, or let it run."),
+        ("other_page", "tab", "bytes", "The bytes as they are, or codes and values."),
         ("leave", "escape", "back", "Go back to Monitor."),
     ),
     *on(

@@ -1,0 +1,175 @@
+"""Frames in words: which drive, which function, which parameters with which values."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
+
+from tui.bus.api import Frame
+from tui.drive.profile.profile import Profile
+from tui.drive.shown import shown
+from tui.drive.values import from_words, word_count
+
+READ, WRITE_ONE, WRITE_MANY, READ_WRITE, IDENTIFY_DRIVE = 3, 6, 16, 23, 43
+FUNCTIONS: Mapping[int, str] = {
+    READ: "read",
+    WRITE_ONE: "write",
+    WRITE_MANY: "write",
+    READ_WRITE: "read and write",
+    IDENTIFY_DRIVE: "identify",
+    8: "diagnostics",
+}
+EXCEPTION_BIT = 0x80
+MBAP_BYTES = 7
+"""Bytes before the function code on Modbus TCP."""
+SHORTEST_PDU = 2
+CODES_TOLD = 3
+"""Parameters of a request that are named; the others are counted."""
+
+ProfileOf = Callable[[int], Profile | None]
+RawsOf = Callable[[int], Mapping[str, int]]
+
+
+@dataclass(frozen=True, slots=True)
+class Pdu:
+    """Device, function and what stands behind it."""
+
+    device: int
+    function: int
+    body: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Asked:
+    """What a request has asked for: the words of a read, or none."""
+
+    device: int
+    function: int
+    address: int
+    count: int
+
+
+def pdu_of(data: bytes, *, tcp: bool) -> Pdu | None:
+    """The parts of a frame; None of bytes that form none."""
+    if tcp:
+        return Pdu(data[6], data[7], data[8:]) if len(data) > MBAP_BYTES else None
+    return Pdu(data[0], data[1], data[2:-2]) if len(data) >= SHORTEST_PDU + 2 else None
+
+
+def decoded(
+    frames: Sequence[Frame], profile_of: ProfileOf, raws_of: RawsOf, *, tcp: bool
+) -> list[str]:
+    """A sentence for each frame; empty where it is none. A reply is told by its request."""
+    asked: Asked | None = None
+    found = []
+    for frame in frames:
+        pdu = pdu_of(frame.data, tcp=tcp)
+        if pdu is None:
+            found.append("")
+            continue
+        words = _Words(pdu.device, profile_of(pdu.device), raws_of(pdu.device))
+        try:
+            if frame.direction == "out":
+                asked = _asked(pdu)
+                found.append(_request(pdu, words))
+            else:
+                found.append(_reply(pdu, asked, words))
+        except (struct.error, IndexError):
+            found.append("")  # cut short: its bytes tell all that there is
+    return found
+
+
+def _asked(pdu: Pdu) -> Asked | None:
+    if pdu.function not in (READ, READ_WRITE):
+        return None
+    address, count = struct.unpack_from(">HH", pdu.body)
+    return Asked(pdu.device, pdu.function, address, count)
+
+
+def _request(pdu: Pdu, words: _Words) -> str:
+    who, name = pdu.device or "all", FUNCTIONS.get(pdu.function, f"function {pdu.function}")
+    head = f"{who} {name}"
+    match pdu.function:
+        case 3:
+            address, count = struct.unpack_from(">HH", pdu.body)
+            return f"{head} {words.names(address, count)}"
+        case 6:
+            address, raw = struct.unpack_from(">HH", pdu.body)
+            return f"{head} {words.values(address, [raw], '←')}"
+        case 16:
+            address, count = struct.unpack_from(">HH", pdu.body)
+            raws = struct.unpack_from(f">{count}H", pdu.body, 5)
+            return f"{head} {words.values(address, raws, '←')}"
+        case 23:
+            address, count, target, written = struct.unpack_from(">HHHH", pdu.body)
+            raws = struct.unpack_from(f">{written}H", pdu.body, 9)
+            return f"{head} {words.names(address, count)}; {words.values(target, raws, '←')}"
+    return head
+
+
+def _reply(pdu: Pdu, asked: Asked | None, words: _Words) -> str:
+    if pdu.function & EXCEPTION_BIT:
+        name = FUNCTIONS.get(pdu.function & ~EXCEPTION_BIT, "")
+        return f"{pdu.device} refuses to {name or 'do it'}: exception {pdu.body[0]}"
+    if pdu.function in (READ, READ_WRITE):
+        raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
+        if asked is None or (asked.device, asked.function) != (pdu.device, pdu.function):
+            return f"{pdu.device} {len(raws)} words"
+        return f"{pdu.device} {words.values(asked.address, raws)}"
+    if pdu.function == WRITE_ONE:
+        return f"{pdu.device} wrote {words.values(*_one(pdu))}"
+    if pdu.function == WRITE_MANY:
+        address, count = struct.unpack_from(">HH", pdu.body)
+        return f"{pdu.device} wrote {words.names(address, count)}"
+    return f"{pdu.device} {FUNCTIONS.get(pdu.function, f'function {pdu.function}')}"
+
+
+def _one(pdu: Pdu) -> tuple[int, list[int]]:
+    address, raw = struct.unpack_from(">HH", pdu.body)
+    return address, [raw]
+
+
+@dataclass(frozen=True, slots=True)
+class _Words:
+    """Words of one drive by their parameters, as far as its profile knows them."""
+
+    device: int
+    profile: Profile | None
+    raws: Mapping[str, int]
+
+    def names(self, address: int, count: int) -> str:
+        """The parameters of a stretch of words; the address where none is known."""
+        found = [code for code, _, _ in self._cut(address, [0] * count)]
+        named = [code for code in found if code]
+        if not named:
+            return f"{address} ({address:#06x}), {count} word{'' if count == 1 else 's'}".replace(
+                "0x", "16#"
+            )
+        more = len(found) - CODES_TOLD
+        return " ".join(c or "?" for c in found[:CODES_TOLD]) + (f" and {more}" if more > 0 else "")
+
+    def values(self, address: int, raws: Sequence[int], sign: str = "") -> str:
+        """The parameters with their values, each at most once."""
+        parts = []
+        for code, text, where in self._cut(address, raws):
+            parts.append(f"{code or where} {sign + ' ' if sign else ''}{text}")
+        return " · ".join(parts)
+
+    def _cut(self, address: int, raws: Sequence[int]) -> Iterable[tuple[str, str, str]]:
+        """Code, value and address of each parameter in a stretch of words."""
+        at = 0
+        while at < len(raws):
+            parameter = self.profile.at(address + at) if self.profile else None
+            if parameter is None or self.profile is None:
+                yield "", f"16#{raws[at]:04X}", str(address + at)
+                at += 1
+                continue
+            wide = word_count(parameter)
+            part = raws[at : at + wide]
+            if len(part) < wide:
+                yield parameter.code, f"16#{part[0]:04X}", ""
+            else:
+                raw = from_words(parameter, list(part))
+                yield parameter.code, shown(self.profile, parameter, raw, self.raws).display, ""
+            at += wide
