@@ -45,7 +45,7 @@ SAID_STYLES: dict[str, Style] = {
     "working": ATTENTION,
     "done": PLAIN,
 }
-WARNS = frozenset({"fault", "failed", "error", "refused", "alarm"})
+WARNS = frozenset({"fault", "failed", "error", "refused", "alarm", "told"})
 """Kinds of a message that is shown whole for a while, on more lines where it takes them."""
 WHOLE_FOR = 15.0
 """Seconds for which a message that warns takes more lines than its own."""

@@ -10,6 +10,7 @@ from textual.containers import Horizontal
 
 from tui.drive.blocks.assignment import describe, no_blocks
 from tui.drive.blocks.slot_rules import refusing
+from tui.drive.blocks.wire_cost import Saving
 from tui.drive.profile.schema import Block
 from tui.screens.blocks.view import (
     WIDE_SLOTS,
@@ -20,16 +21,14 @@ from tui.screens.blocks.view import (
     user_word_lines,
 )
 from tui.session.console import DriveConsole
-from tui.widgets.drawing import armed_text, rule, wrapped
+from tui.widgets.drawing import rule, wrapped
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, ATTENTION, FAINT
 
-from ..command.news import news
 from ..keys.table import BLOCKS, bindings
 from .block_keys import BlockKeys
 
 LINES_BESIDE_SLOTS = 16
-"""Lines that are no slots: title, headings, details, cost, words, message, keys."""
+"""Lines that are no slots: the frame, headings, details, cost, words, keys."""
 
 
 class BlocksScreen(BlockKeys):
@@ -54,15 +53,13 @@ class BlocksScreen(BlockKeys):
         return blocks[self._side % len(blocks)] if blocks else None
 
     def body(self) -> ComposeResult:
-        """Title, tables, details, cost, user words, news, keys."""
-        yield Lines(id="title")
+        """Tables, details, cost, user words."""
         with Horizontal(id="tables"):
             yield Lines(id="first")
             yield Lines(id="second")
         yield Lines(id="detail")
         yield Lines(id="cost")
         yield Lines(id="words")
-        yield Lines(id="message")
 
     def on_mount(self) -> None:
         """Begin to look."""
@@ -78,9 +75,7 @@ class BlocksScreen(BlockKeys):
     def draw(self, width: int) -> None:
         """The block editor's state, and what it has come to."""
         super().draw(width)
-        self.put("title", [self._title(width)])
         self.put("words", user_word_lines(self.block_editor, self.block_editor.words, width))
-        self.put("message", self._message(width))
         if self.block_editor.proposals.blocks:
             self._show_tables(width)
         else:
@@ -106,26 +101,6 @@ class BlocksScreen(BlockKeys):
         stretches = self.block_editor.proposals.stretches()
         found = stretch_lines(self.block_editor, stretches, width, room)
         self.put("first", [*why, Text(""), head, *found])
-
-    def _title(self, width: int) -> Text:
-        title = rule(
-            f"Blocks · {self.session.profile.name} · device {self.session.device}", width - 12
-        )
-        return title.append_text(armed_text(self.commander.armed_for))
-
-    def _message(self, width: int) -> list[Text]:
-        block_editor, now = self.block_editor, self.app.clock.monotonic()
-        text, style = "", FAINT
-        if told := news(block_editor.said, now, busy=block_editor.busy, passed=self.passed):
-            text, style = told
-        elif block_editor.trouble:
-            text, style = block_editor.trouble, ALARM
-        elif count := block_editor.proposals.count:
-            text, style = f"{count} slots proposed otherwise: w writes them, u drops.", ATTENTION
-        elif why := self.session.arming.why_disarmed:
-            text = why
-        lines = [Text(f" {line}", style) for line in wrapped(text, width - 2, 2)]
-        return [*lines, Text(""), Text("")][:2]
 
     # Keys that move
 
@@ -179,6 +154,19 @@ class BlocksScreen(BlockKeys):
                 self.block_editor.proposals.factory(block)
 
         self._try(work)
+
+    def action_best(self) -> None:
+        """Propose the slots that save most for what Monitor shows."""
+        found: list[Saving | None] = []
+        self._try(lambda: found.append(self.block_editor.proposals.best()))
+        if found and found[0] is not None:
+            before, after = found[0].before.microseconds, found[0].after.microseconds
+            self.app.tell(
+                f"Proposed: Monitor's cycle takes {after / 1000:.1f} ms in place of"
+                f" {before / 1000:.1f} ms. w writes it, u drops it."
+            )
+        elif found:
+            self.app.tell("Nothing to propose: no other slots make Monitor's cycle shorter.")
 
     def action_undo(self) -> None:
         """Propose nothing."""

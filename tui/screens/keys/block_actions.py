@@ -7,6 +7,7 @@ from .action import BLOCKS, on
 BLOCK_ACTIONS = on(
     (BLOCKS,),
     ("pick", "enter", "pick", "Choose what the slot stands for."),
+    ("best", "p", "propose", "Propose the slots that save most for what Monitor shows."),
     ("write", "w", "write", "Write what is proposed; armed, motor at rest, asks."),
     ("other_table", "tab,left,right", "", "Inputs or outputs."),
     ("move(-1)", "up", "", "One slot up."),

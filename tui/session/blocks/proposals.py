@@ -17,6 +17,7 @@ from tui.drive.blocks.assignment import (
     slot_changes,
     slots_of,
 )
+from tui.drive.blocks.best import best_assignment
 from tui.drive.blocks.picking import pick
 from tui.drive.blocks.slot_rules import Problem, assignment_problems
 from tui.drive.blocks.wire_cost import Saving, Stretch, saving, stretches
@@ -98,6 +99,26 @@ class Proposals:
     def factory(self, block: Block) -> None:
         """Propose what the drive left the factory with. Raises MappingError."""
         self.propose(factory(self.session.profile, block))
+
+    def best(self) -> Saving | None:
+        """Propose what saves most for what Monitor reads; what it saves, None where nothing.
+
+        Raises MappingError where the block is not known or something is being written.
+        """
+        block = next((block for block in self.blocks if block.direction == "read"), None)
+        if block is None:
+            raise MappingError("This drive has no block that is read.")
+        timing, profile = wire_timing(self.session), self.session.profile
+        today = self._base(block)
+        others = slots_of([plan for plan in self.assignments if plan.block is not block])
+        codes = rates_of(profile).fast
+        plan = best_assignment(profile, block, codes, timing, others)
+        before, after = {**others, **today.slots}, {**others, **plan.slots}
+        found = saving(profile, codes, timing, before, after)
+        if found.microseconds <= 0:
+            return None
+        self.propose(plan)
+        return found
 
     def drop(self) -> None:
         """Propose nothing any more."""
