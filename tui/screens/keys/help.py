@@ -11,7 +11,7 @@ from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 
-from tui.widgets.palette import ALARM, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
 from tui.widgets.plain import Plain
 
 from ..frame import Framed
@@ -19,16 +19,27 @@ from .table import of_screen
 
 SIGNS: tuple[tuple[str, str, str], ...] = (
     ("▶", "green", "the motor runs"),
-    ("■", "red", "the drive is in fault"),
+    ("□", "white", "it stands; STANDBY: the next command from here runs it"),
+    ("▼", "cyan", "a stop is on its way"),
+    ("■", "red", "a drive is in fault; on Line: another one than that of the strip"),
     ("?", "amber", "state not known, or (behind a name) not confirmed by a manual"),
     ("-----", "grey", "no value: not read yet, or the drive does not have it"),
     ("12s", "amber", "an old value, with its age in place of its unit"),
     ("│", "white", "on a bar: the reference"),
     ("●", "white", "a bit that is 1"),
+    ("●2", "cyan", "so many edits or slots are staged and not written"),
+    ("S", "amber", "settings were written that are lost at power-off until S keeps them"),
 )
 WITHOUT_KEY = "^p"
 """Where an action without a key of its own is found: in the list of all."""
-HELP_STYLES = {"green": RUNNING, "red": FAULT, "amber": ALARM, "grey": FAINT, "white": PLAIN}
+HELP_STYLES = {
+    "green": RUNNING,
+    "red": FAULT,
+    "amber": ALARM,
+    "cyan": ATTENTION,
+    "grey": FAINT,
+    "white": PLAIN,
+}
 
 
 class HelpScreen(Framed, ModalScreen[None]):
