@@ -20,8 +20,8 @@ from .connect.identify import DriveIdentity
 from .console import DriveConsole
 from .drive import DriveSession
 from .events import EventLog
-from .journal import Journal
-from .monitor.alarms import LineAlarms
+from .journal import Entry, Journal, now_text
+from .monitor.alarms import LineAlarms, PresentFault
 from .monitor.line_watch import LineWatch
 from .starts.keeper import StartKeeper
 from .work import Outcome, OutcomeKind
@@ -66,7 +66,7 @@ class Fleet:
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.stopper = Stopper(line, journal, self.events)
-        self.alarms = LineAlarms(self.events)
+        self.alarms = LineAlarms(self.events, self._record_fault)
         """The faults of all of them."""
         self._lock = threading.Lock()
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})
@@ -123,6 +123,21 @@ class Fleet:
     def _note_outcome(self, device: int, outcome: Outcome) -> None:
         if outcome.kind is not OutcomeKind.WORKING:
             self.events.add(outcome.kind, outcome.text, device)
+
+    def _record_fault(self, fault: PresentFault, what: str) -> None:
+        """Put a trip, or its end, into the journal."""
+        console = self.console(fault.device)
+        if console is None:
+            return
+        session = console.session
+        codes = session.profile.data.faults.codes
+        raw = next((one.raw for one in codes if one.code == fault.code), 0)
+        self.journal.add(
+            Entry(
+                now_text(), session.line_text, session.device, session.profile.id, fault.code,
+                0, None, "", raw, fault.name, what, None, "seen from here", kind="fault",
+            )
+        )  # fmt: skip
 
     def _put(self, drive: FoundDrive) -> None:
         with self._lock:

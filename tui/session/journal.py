@@ -14,6 +14,7 @@ from collections import deque
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
+from typing import Literal
 
 from .journal_file import JournalFile
 from .paths import state_folder
@@ -36,7 +37,7 @@ log = logging.getLogger(__name__)
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """One word that was written, or refused on the way."""
+    """One word that was written, or refused on the way; or a trip that was seen."""
 
     time: str
     """Local time with its zone, to the millisecond."""
@@ -53,7 +54,9 @@ class Entry:
     """`ok`, or what the drive or the line said instead."""
     read_back: int | None
     why: str
-    """The order or edit that it belongs to."""
+    """The command or edit that it belongs to."""
+    kind: Literal["write", "fault"] = "write"
+    """`fault` for a trip that was seen: `code` and `new` are the fault's, nothing was written."""
 
 
 class Journal:
@@ -88,9 +91,9 @@ class Journal:
 
     @property
     def recent(self) -> tuple[Entry, ...]:
-        """The entries since the start, oldest first; on the disk or not."""
+        """What was written since the start, oldest first; on the disk or not."""
         with self._changed:
-            return tuple(self._recent)
+            return tuple(entry for entry in self._recent if entry.kind == "write")
 
     @property
     def lost(self) -> int:

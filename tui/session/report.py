@@ -45,13 +45,16 @@ def _entries(file: Path) -> Iterator[Entry]:
             told = json.loads(line)
         except ValueError:
             continue
-        if isinstance(told, dict) and set(told) == names:
+        # entries of the time before trips were kept have no kind
+        if isinstance(told, dict) and {*told, "kind"} == names:
             yield Entry(**told)
 
 
 def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]) -> str:
     """The whole report; `entries` are those of the journal about this drive, oldest first."""
-    maker = _Report(profile, values, entries)
+    written = [entry for entry in entries if entry.kind == "write"]
+    trips = [entry for entry in entries if entry.kind == "fault"]
+    maker = _Report(profile, values, written, trips)
     parts = (
         maker.head(),
         maker.line(),
@@ -60,6 +63,7 @@ def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]
         maker.blocks(),
         maker.watch(),
         maker.faults(),
+        maker.seen(),
         maker.journal(),
     )
     return "\n".join(line for part in parts for line in (*part, ""))
@@ -70,6 +74,7 @@ class _Report:
     profile: Profile
     values: ParameterSet
     entries: Sequence[Entry]
+    trips: Sequence[Entry]
 
     def head(self) -> list[str]:
         """What the drive is, and when and where it was read."""
@@ -188,6 +193,15 @@ class _Report:
         if fault is None:
             return "none" if raw == self.profile.data.faults.none else self.text(code)
         return f"{fault.code} {fault.name}"
+
+    def seen(self) -> list[str]:
+        """The trips of this drive that were seen from this machine."""
+        rows = [
+            (e.time[:19].replace("T", " "), e.code, e.new, e.answer)
+            for e in self.trips[-ENTRIES_SHOWN:]
+        ]
+        head = ("time", "fault", "name", "")
+        return ["## Trips seen from here", "", *_table(head, rows)] if rows else []
 
     def journal(self) -> list[str]:
         """What was written to this drive from this machine."""

@@ -37,6 +37,7 @@ def run_panel(
     low_bandwidth: bool = False,
     on_hangup: str = STOP,
     mouse: bool = False,
+    bell: bool = True,
 ) -> None:
     """Run the panel until it is left."""
     if not _has_terminal():
@@ -54,6 +55,7 @@ def run_panel(
         low_bandwidth=low_bandwidth,
         leave_running=on_hangup == LEAVE_RUNNING,
         mouse=mouse,
+        bell=bell,
         on_shown=_collect_garbage,
     )
     with ending_by_signal(app, stop=on_hangup == STOP):
@@ -97,14 +99,27 @@ mouse_option = click.option(
 )
 
 
+bell_option = click.option(
+    "--bell/--no-bell", default=True, show_default=True, help="Ring once for a new fault."
+)
+
+
 @click.command()
 @low_bandwidth_option
 @on_hangup_option
 @mouse_option
+@bell_option
 @told
-def demo(low_bandwidth: bool, on_hangup: str, mouse: bool) -> None:
+def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool) -> None:
     """Open the panel on one simulated line with five running drives."""
-    run_panel(DEMO_LINE, None, low_bandwidth=low_bandwidth, on_hangup=on_hangup, mouse=mouse)
+    run_panel(
+        DEMO_LINE,
+        None,
+        low_bandwidth=low_bandwidth,
+        on_hangup=on_hangup,
+        mouse=mouse,
+        bell=bell,
+    )
 
 
 @click.command(hidden=True)
@@ -120,6 +135,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool) -> None:
 @low_bandwidth_option
 @on_hangup_option
 @mouse_option
+@bell_option
 @told
 def panel(
     line_text: str | None,
@@ -128,6 +144,7 @@ def panel(
     low_bandwidth: bool,
     on_hangup: str,
     mouse: bool,
+    bell: bool,
 ) -> None:
     """Open the panel."""
     if device is not None and line_text is None:
@@ -139,4 +156,5 @@ def panel(
         low_bandwidth=low_bandwidth,
         on_hangup=on_hangup,
         mouse=mouse,
+        bell=bell,
     )

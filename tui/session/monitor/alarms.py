@@ -26,11 +26,18 @@ class PresentFault:
 class LineAlarms:
     """Follows the faults of the drives of one line, in the order in which they came.
 
-    Belongs to one loop. What came and went is told to the log of events.
+    Belongs to one loop. What came and went is told to the log of events, and by `record` to the
+    journal.
     """
 
-    def __init__(self, events: EventLog, wall: Callable[[], float] = time.time) -> None:
+    def __init__(
+        self,
+        events: EventLog,
+        record: Callable[[PresentFault, str], None],
+        wall: Callable[[], float] = time.time,
+    ) -> None:
         self._events = events
+        self._record = record
         self._wall = wall
         self._active: dict[int, PresentFault] = {}
 
@@ -63,6 +70,7 @@ class LineAlarms:
             if was is not None:
                 del self._active[device]
                 self._events.add("done", f"{_called(was)} is reset.", device)
+                self._record(was, "reset")
             return False
         fault = state.fault
         code, name = (fault.code, fault.name) if fault else ("", "")
@@ -77,6 +85,7 @@ class LineAlarms:
         now = PresentFault(device, code, name, self._wall())
         self._active[device] = now
         self._events.add("fault", f"tripped: {_called(now)}{_behind(first, device)}.", device)
+        self._record(now, "tripped")
         return True
 
     def acknowledge(self, device: int) -> None:

@@ -1,0 +1,92 @@
+"""Faults of a line: first-out, told once, looked at, reset, and kept in the journal."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tui.drive.profile import library
+from tui.drive.profile.schema import FaultCode
+from tui.session.drive_state import DriveState, drive_state
+from tui.session.events import EventLog
+from tui.session.monitor.alarms import LineAlarms, PresentFault
+
+RUNS = replace(drive_state(library.load("atv71"), {}), kind="running")
+OBF = FaultCode(raw=18, code="ObF", name="Overbraking")
+OLF = FaultCode(raw=17, code="OLF", name="Motor overload")
+
+
+def tripped(fault: FaultCode | None) -> DriveState:
+    return replace(RUNS, kind="fault", fault=fault)
+
+
+class Bench:
+    def __init__(self) -> None:
+        self.now = 0.0
+        self.log = EventLog(lambda: self.now)
+        self.kept: list[tuple[int, str, str]] = []
+        self.alarms = LineAlarms(self.log, self.keep, lambda: self.now)
+
+    def keep(self, fault: PresentFault, what: str) -> None:
+        self.kept.append((fault.device, fault.code, what))
+
+    @property
+    def said(self) -> list[str]:
+        return [f"{event.device} {event.kind}: {event.text}" for event in self.log.events]
+
+
+@pytest.fixture
+def bench() -> Bench:
+    return Bench()
+
+
+def test_the_first_fault_stays_first_and_each_is_new_once(bench: Bench) -> None:
+    assert not bench.alarms.take({1: RUNS, 3: RUNS, 17: RUNS})
+    assert bench.alarms.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
+    assert not bench.alarms.take({1: RUNS, 3: RUNS, 17: tripped(OLF)})
+    bench.now = 60.0
+    assert bench.alarms.take({1: RUNS, 3: tripped(OBF), 17: tripped(OLF)})
+    assert [fault.device for fault in bench.alarms.active] == [17, 3]
+    assert bench.said[0] == "17 fault: tripped: OLF Motor overload."
+    assert bench.said[1].startswith("3 fault: tripped: ObF Overbraking; drive 17 tripped first, ")
+    assert bench.kept == [(17, "OLF", "tripped"), (3, "ObF", "tripped")]
+
+
+def test_looking_at_it_acknowledges_one_drive(bench: Bench) -> None:
+    bench.alarms.take({3: tripped(OBF), 17: tripped(OLF)})
+    bench.alarms.acknowledge(3)
+    assert bench.alarms.unseen
+    bench.alarms.acknowledge(17)
+    assert not bench.alarms.unseen
+    assert len(bench.alarms.active) == 2
+
+
+def test_a_reset_ends_it_and_the_same_fault_again_is_new(bench: Bench) -> None:
+    bench.alarms.take({3: tripped(OBF)})
+    bench.alarms.acknowledge(3)
+    assert not bench.alarms.take({3: RUNS})
+    assert bench.alarms.active == ()
+    assert bench.said[-1] == "3 done: ObF Overbraking is reset."
+    assert bench.alarms.take({3: tripped(OBF)})
+    assert bench.alarms.unseen
+
+
+def test_a_drive_that_is_not_known_now_keeps_its_fault(bench: Bench) -> None:
+    bench.alarms.take({3: tripped(OBF)})
+    assert not bench.alarms.take({3: replace(RUNS, kind="unknown")})
+    assert [fault.code for fault in bench.alarms.active] == ["ObF"]
+    bench.alarms.take({})
+    assert bench.alarms.active == ()
+
+
+def test_a_code_that_comes_later_is_told_and_rings_no_second_time(bench: Bench) -> None:
+    assert bench.alarms.take({3: tripped(None)})
+    assert not bench.alarms.take({3: tripped(OBF)})
+    assert [fault.code for fault in bench.alarms.active] == ["ObF"]
+    assert bench.said[-1] == "3 fault: the fault is ObF Overbraking."
+
+
+def test_another_fault_of_the_same_drive_is_new(bench: Bench) -> None:
+    bench.alarms.take({3: tripped(OBF)})
+    assert bench.alarms.take({3: tripped(OLF)})
