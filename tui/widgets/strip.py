@@ -18,6 +18,7 @@ from .drive_signs import STATE_SIGNS, age_text
 from .palette import (
     ALARM,
     ATTENTION,
+    ATTENTION_BLOCK,
     CURSOR,
     FAINT,
     FAULT,
@@ -29,10 +30,14 @@ from .palette import (
     STRONG,
 )
 
-STATE_AT, STATE_WIDTH = 20, 14
-"""Column and width of the state at 80 columns; what is wider goes to the name."""
+STATE_WIDTH = 14
 VALUES_WIDTH = 26
 """`123.4 → 123.4 Hz  123.4 A`, each at its place."""
+RIGHT_WIDTH, NARROW_RIGHT = 24, 13
+"""Kept for the faults of the line and for ARMED, whether they are there or not."""
+NARROW = 72
+"""Columns below which these are short."""
+NAME_WIDEST = 44
 STRIP_STYLES: Mapping[str, Style] = {
     "running": RUNNING,
     "fault": FAULT_BLOCK,
@@ -84,40 +89,32 @@ class StripView:
 
 def strip_line(view: StripView, width: int) -> Text:
     """The first line: the open drive, or the line where none is open."""
-    left, right = Text(no_wrap=True), _right(view)
+    right = _right(view, narrow=width < NARROW)
     if view.drive is None:
-        room = max(0, width - right.cell_len - 1)
-        head = " Drive Panel"
-        left.append(head, STRONG)
-        left.append(short(f" · {view.line}" if view.line else "", max(0, room - len(head))), FAINT)
-        left.truncate(room)
+        left = Text(" Drive Panel", STRONG, no_wrap=True)
+        left.append(f" · {plain(view.line)}" if view.line else "", FAINT)
+        left.truncate(max(0, width - right.cell_len - 1), overflow="ellipsis")
     else:
-        left = _drive(view.drive, max(1, width - right.cell_len - 1), width)
+        left = _drive(view.drive, width)
+        left.truncate(max(0, width - right.cell_len))
     left.append(" " * max(0, width - left.cell_len - right.cell_len))
     left.append_text(right)
     left.truncate(width)
     return left
 
 
-def _drive(drive: DriveNow, room: int, width: int) -> Text:
-    """The drive in as much room as there is: the state first, then values, then who it is."""
-    text = Text(no_wrap=True)
-    name_width = STATE_AT if width < 100 else STATE_AT + min(24, width - 100)
-    if room < STATE_AT + STATE_WIDTH + VALUES_WIDTH:
-        name_width = max(4, room - STATE_WIDTH - VALUES_WIDTH)
-    text.append(f"{drive.device:>2} ", FAINT)
+def _drive(drive: DriveNow, width: int) -> Text:
+    """Who it is, its state and values; the name has what the other parts may leave."""
+    right = RIGHT_WIDTH if width >= NARROW else NARROW_RIGHT
+    room = max(4, min(NAME_WIDEST, width - STATE_WIDTH - VALUES_WIDTH - right))
+    who = Text(no_wrap=True)
+    who.append(f"{drive.device:>2} ", FAINT)
     name, model = plain(drive.name), plain(drive.model)
-    if name:
-        text.append(short(name, name_width - 4), STRONG)
-        if model and (rest := name_width - text.cell_len - 4) >= 4:
-            text.append(f" · {short(model, rest)}", FAINT)
-    else:
-        text.append(short(model, name_width - 4), STRONG)
-    text.append(" " * max(1, name_width - text.cell_len))
-    text.append_text(_state(drive))
-    text.append_text(_values(drive))
-    text.truncate(room)
-    return text
+    who.append(name or model, STRONG)
+    if name and model and room - who.cell_len > 6:
+        who.append(f" · {model}", FAINT)
+    who.truncate(room - 1, overflow="ellipsis", pad=True)
+    return who.append(" ").append_text(_state(drive)).append_text(_values(drive))
 
 
 def _state(drive: DriveNow) -> Text:
@@ -146,20 +143,22 @@ def _values(drive: DriveNow) -> Text:
     return text
 
 
-def _right(view: StripView) -> Text:
+def _right(view: StripView, *, narrow: bool) -> Text:
     """What concerns the whole line, and whether keys move this drive's motor."""
-    text = Text(no_wrap=True)
+    text, drive = Text(no_wrap=True), view.drive
     if view.faults:
         count = f"■ {view.faults} fault{'' if view.faults == 1 else 's'}"
-        text.append(f" {count} " if view.unseen else count, FAULT_BLOCK if view.unseen else FAULT)
+        count = f"■{view.faults}" if narrow else count
+        style = FAULT_BLOCK if view.unseen else FAULT
+        text.append(f" {count} " if view.unseen and not narrow else count, style)
         text.append(" ")
-    drive = view.drive
     if drive is not None and drive.armed is not None:
-        text.append_text(armed_text(drive.armed))
+        armed = Text(f" ARM {drive.armed:2.0f} ", ATTENTION_BLOCK) if narrow else None
+        text.append_text(armed or armed_text(drive.armed))
     elif view.read_only:
         text.append("read-only ", FAINT)
     elif drive is not None and drive.by:
-        text.append(f"by {short(drive.by, 12)} ", FAINT)
+        text.append(f"by {short(drive.by, 10)} ", FAINT)
     if drive is None:
         load = f"load {view.load * 100:3.0f} %  " if view.load is not None else ""
         text.append(f"{load}{view.clock} ", FAINT)

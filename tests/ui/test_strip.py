@@ -1,0 +1,128 @@
+"""The strip and the tabs: each part at its place, whatever the values, the width and the drive."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.cells import cell_len
+
+from tui.screens.frame import TABS, Said, said_lines
+from tui.screens.keys.table import MONITOR, PLACES
+from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
+from tui.widgets.strip import DriveNow, StripView, cut_at_word, strip_line, tabs_line
+
+RUNS = DriveNow(
+    device=2,
+    name="MACHINE 4",
+    model="ATV71HU15M3",
+    kind="running",
+    words="FORWARD",
+    frequency="30.0",
+    reference="40.0",
+    current="3.2",
+    armed=56.4,
+)
+VIEW = StripView(drive=RUNS, faults=1, unseen=True, load=0.4, clock="14:02:11")
+
+
+def test_the_strip_at_80_columns() -> None:
+    line = strip_line(VIEW, 80)
+    assert line.cell_len == 80
+    for part in ("MACHINE 4", "▶ FORWARD", "30.0 →  40.0 Hz", "3.2 A", "■ 1 fault", "ARMED 56 s"):
+        assert part in line.plain
+
+
+def cells_before(text: str, part: str) -> int:
+    return cell_len(text[: text.rindex(part)])
+
+
+@given(
+    words=st.sampled_from(["FORWARD", "FAULT ObF", "STANDBY", "NOT READY", "STOPPING", "reading"]),
+    frequency=st.sampled_from(["0.0", "-40.0", "599.0", "-----", ""]),
+    current=st.sampled_from(["0.0", "120.4", "-----"]),
+    name=st.text(max_size=30),
+    armed=st.sampled_from([None, 0.2, 59.0]),
+    faults=st.integers(0, 31),
+    width=st.sampled_from([60, 72, 80, 100, 120, 200]),
+)
+def test_nothing_moves_when_a_value_changes(
+    words: str,
+    frequency: str,
+    current: str,
+    name: str,
+    armed: float | None,
+    faults: int,
+    width: int,
+) -> None:
+    plain = strip_line(StripView(drive=RUNS), width).plain
+    drive = replace(RUNS, words=words, frequency=frequency, current=current, name=name, armed=armed)
+    other = strip_line(StripView(drive=drive, faults=faults), width)
+    assert other.cell_len == width
+    if width >= 80 and faults < 10:
+        assert cells_before(other.plain, "▶") == cells_before(plain, "▶")
+        assert cells_before(other.plain, " A ") == cells_before(plain, " A ")
+
+
+def test_a_drive_that_is_not_heard_is_told_by_its_age() -> None:
+    line = strip_line(replace(VIEW, drive=replace(RUNS, age=12.0)), 80).plain
+    assert "? 12s ago" in line
+    assert "FORWARD" not in line
+
+
+def test_a_fault_that_was_looked_at_shouts_no_more() -> None:
+    def style_of(unseen: bool) -> object:
+        line = strip_line(replace(VIEW, unseen=unseen), 80)
+        at = line.plain.index("■")
+        return next(span.style for span in line.spans if span.start <= at < span.end)
+
+    assert style_of(unseen=True) == FAULT_BLOCK
+    assert style_of(unseen=False) == FAULT
+
+
+def test_who_commands_where_it_is_not_this_panel() -> None:
+    drive = replace(RUNS, armed=None, by="Terminals")
+    assert "by Terminals" in strip_line(StripView(drive=drive), 80).plain
+
+
+def test_without_a_drive_the_strip_tells_the_line() -> None:
+    view = StripView(line="/dev/ttyUSB0 19200 8E1 · 31 drives", faults=2, load=0.74, clock="14:02")
+    line = strip_line(view, 80).plain
+    assert "31 drives" in line
+    assert "■ 2 faults" in line
+    assert "load  74 %" in line
+
+
+@pytest.mark.parametrize("width", [60, 72, 79, 80, 120])
+@pytest.mark.parametrize("chosen", [place for place, _, _ in PLACES])
+def test_every_tab_has_its_key_and_fits(width: int, chosen: str) -> None:
+    marks = {"parameters": ("●12", ATTENTION), "faults": ("■", FAULT), "line": ("■", FAULT)}
+    line = tabs_line(TABS, chosen, marks, width)
+    assert line.cell_len <= width
+    assert [tab.key for tab in TABS] == [key for _, key, _ in PLACES]
+    for tab in TABS:
+        assert f"{tab.key} " in line.plain
+    assert any(span.style == CURSOR for span in line.spans)
+
+
+def test_a_mark_moves_no_tab() -> None:
+    bare = tabs_line(TABS, MONITOR, {}, 80).plain
+    marked = tabs_line(TABS, MONITOR, {"parameters": ("●2", ATTENTION)}, 80).plain
+    assert bare.index("4 Scanner") == marked.index("4 Scanner")
+
+
+def test_a_message_that_warns_is_whole_at_first_and_one_line_later() -> None:
+    text = "Not sent: 80.0 Hz is above the high speed HSP, 60.0 Hz. Raise HSP on Parameters first."
+    new = said_lines(Said("14:02:11", text, "refused", 1.0), 80)
+    later = said_lines(Said("14:02:11", text, "refused", 60.0), 80)
+    assert " ".join(" ".join(line.plain for line in new).split()).endswith(text)
+    assert len(later) == 1
+    assert "…" in later[0].plain
+    assert "m messages" in later[0].plain
+
+
+@given(st.text(max_size=200), st.integers(1, 120))
+def test_a_text_is_cut_at_a_word(text: str, width: int) -> None:
+    assert len(cut_at_word(text, width)) <= max(width, 1)
