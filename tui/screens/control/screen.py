@@ -100,11 +100,15 @@ class ControlSourceScreen(OrderKeys):
             lines += change_lines(self.session.profile, found, width)
         lines += [Text(""), *note_lines(self._chosen, found, width)]
         self.put("detail", lines)
-        self.put("now", now_lines(self._today(), self.console.latest, self._trouble, width))
+        self.put("now", self._now(width))
         outcome = self.commander.outcome
         if outcome is not None and outcome is not self._seen and outcome.kind != "working":
             self._seen = outcome
             self.run_worker(self._read(), exclusive=True, group="sources")
+
+    def _now(self, width: int) -> list[Text]:
+        profile, latest = self.session.profile, self.console.latest
+        return now_lines(profile, self._today(), latest, self._trouble, width)
 
     def _today(self) -> ControlSource | None:
         """The configuration in force, as far as it was read."""

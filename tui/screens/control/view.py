@@ -11,6 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import ControlSource, Way
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE
+from tui.session.drive_state import channel_text
 from tui.session.monitor.snapshot import Snapshot
 from tui.widgets.drawing import cut, wrapped
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, LINE, PLAIN, STRONG
@@ -20,13 +21,17 @@ WIRE = 18
 
 
 def now_lines(
-    today: ControlSource | None, latest: Snapshot | None, trouble: str, width: int
+    profile: Profile,
+    today: ControlSource | None,
+    latest: Snapshot | None,
+    trouble: str,
+    width: int,
 ) -> list[Text]:
     """Who commands the drive now, by its own words, and by which configuration; three lines."""
     lines = [Text("")]
     state = latest.state if latest is not None and not latest.error else None
     text = Text("  Commanded by  ", FAINT, no_wrap=True)
-    text.append((state.channel if state else "") or NOT_AVAILABLE, STRONG)
+    text.append((state.channel if state else "") or _channel(profile, latest), STRONG)
     if trouble:
         text.append(f"   {trouble}", ALARM)
     elif today is None:
@@ -35,6 +40,14 @@ def now_lines(
         text.append(f"   set up: {today.name}", FAINT)
     text.truncate(width, overflow="ellipsis")
     return [*lines, text, Text("")]
+
+
+def _channel(profile: Profile, latest: Snapshot | None) -> str:
+    """Who commands, by the drive's word for it, where its chart does not tell."""
+    parameter = profile.quantity("command_channel")
+    if parameter is None or latest is None or latest.error:
+        return NOT_AVAILABLE
+    return channel_text(parameter, latest.readings.get(parameter.code)) or NOT_AVAILABLE
 
 
 def diagram(source: ControlSource) -> list[Text]:
