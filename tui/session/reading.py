@@ -85,7 +85,15 @@ class Reading:
 
     def decoded(self, value: Value, physical: Value | None) -> Reading:
         """The same reading with what its raw value comes to now."""
-        return replace(self, value=value, physical=physical)
+        return Reading(
+            self.parameter,
+            self.raw,
+            value,
+            self.quality,
+            self.time,
+            physical=physical,
+            origin=self.origin,
+        )
 
     @classmethod
     def undecoded(cls, parameter: Parameter, raw: int, time: float, origin: Origin) -> Reading:
