@@ -32,7 +32,7 @@ HELD = {
     "INR": 1, "ACC": 30, "DEC": 30, "AC2": 50, "DE2": 50, "HSP": 500, "LSP": 0, "TFR": 600,
     "BFR": 0, "NPR": 15, "UNS": 400, "NCR": 41, "NSP": 1450, "FRS": 500, "ITH": 41, "CTT": 3,
     "SFR": 40, "STT": 0, "CHCF": 1, "FR1": 164, "CD1": 10, "CCS": 98, "TTO": 100, "SLL": 6,
-    "LAC": 0, "LAC2": 1, "ADD": 2, "TBR": 32, "TFO": 3, "BRA": 1, "RPT": 0, "CLI": 62,
+    "LAC": 0, "ADD": 2, "TBR": 32, "TFO": 3, "BRA": 1, "RPT": 0, "CLI": 62,
 }  # fmt: skip
 
 
