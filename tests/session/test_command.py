@@ -14,7 +14,7 @@ from typing import NamedTuple
 import pytest
 
 from tests.session.sets_bench import state_known
-from tui.bus.line import Line
+from tui.bus.line import Line, Timing
 from tui.bus.link import SerialLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
@@ -102,14 +102,21 @@ class Bench(NamedTuple):
 
 @asynccontextmanager
 async def bench(
-    family: str, *, armed: bool = True, read_only: bool = False, **spec: object
+    family: str,
+    *,
+    armed: bool = True,
+    read_only: bool = False,
+    timing: Timing | None = None,
+    **spec: object,
 ) -> AsyncIterator[Bench]:
     """A simulated drive with a monitor and a commander, armed."""
     clock = FakeClock()
     specs = [DriveSpec(family, 1, **spec)]  # type: ignore[arg-type]
     simulation = Simulation(specs, clock=clock.monotonic)
     simulation.start()
-    line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
+    line = Line(
+        SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only, timing=timing
+    )
     line.open(wait=5.0)
     journal = Journal()
     console = DriveConsole(DriveSession(line, 1, library.load(family), clock=clock), journal)

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from tui.bus.line import Timing
 from tui.drive.errors import ValueRefused
 from tui.drive.settings.parameter_set import dump_set
 from tui.drive.settings.selection import FILTERS, rows
@@ -205,7 +206,9 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
 
 
 async def test_what_waits_for_a_reset_is_told_until_the_drive_was_off() -> None:
-    async with editing("atv21") as (made, editor):
+    # a line that does not wait long for late replies: how long it does is not the matter here
+    timing = Timing(first_timeout=0.3, late_reply=0.3)
+    async with editing("atv21", timing=timing) as (made, editor):
         await read(made, editor, "F875")
         editor.staging.stage_raw("F875", 2)
         editor.apply()
