@@ -20,6 +20,7 @@ from tui.screens.blocks.view import (
     table_lines,
     user_word_lines,
 )
+from tui.session.blocks.proposals import monitoring_stretches
 from tui.session.console import DriveConsole
 from tui.widgets.drawing import rule, wrapped
 from tui.widgets.lines import Lines
@@ -98,7 +99,7 @@ class BlocksScreen(BlockKeys):
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]
         head = rule("Neighbours of the monitoring set, one request each", width)
         room = max(3, self.size.height - len(why) - 8)
-        stretches = self.block_editor.proposals.stretches()
+        stretches = monitoring_stretches(self.session)
         found = stretch_lines(self.block_editor, stretches, width, room)
         self.put("first", [*why, Text(""), head, *found])
 

@@ -160,7 +160,8 @@ class Proposals:
             }
         return self._costs[key]
 
-    def stretches(self) -> list[Stretch]:
-        """For families without blocks: which neighbours to read in one request."""
-        codes = monitoring_codes(self.session.profile)
-        return stretches(self.session.profile, codes, wire_timing(self.session))
+
+def monitoring_stretches(session: DriveSession) -> list[Stretch]:
+    """For families without blocks: which neighbours to read in one request."""
+    codes = monitoring_codes(session.profile)
+    return stretches(session.profile, codes, wire_timing(session))
