@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
+from typing import Any
 
 import pytest
 
@@ -25,6 +26,7 @@ from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
 from tui.session.monitor.monitor import Monitor
 from tui.session.settings.write import NotTaken
+from tui.session.starts.keeper import StartKeeper
 from tui.session.work import Permit
 
 EXAMPLE_IN = ["ETA", "RFRD", "LCR", "OTR", "ULN", "THD", "THR", "LFT"]
@@ -162,6 +164,29 @@ async def test_what_stands_between_two_named_ones_keeps_its_value() -> None:
         assert done.outputs == {"HSP": 450, "LSP": 41, "ACC": 45}
         assert sent(here, 23) == []
         assert sent(here, 16)[-1].endswith("31db00030601c20029002d")
+
+
+async def test_a_start_is_on_record_before_its_frame_and_counts_from_it_on(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A look at the rest before the frame must not end the record."""
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        _, outputs = await both(here)
+        keeper = here.session.starts = StartKeeper("test")
+        told: list[tuple[str, int]] = []
+        for name in ("begin", "sent"):
+            honest = getattr(keeper, name)
+
+            def note(*what: object, name: str = name, honest: Any = honest) -> None:
+                told.append((name, len(sent(here, 16))))
+                honest(*what)
+
+            monkeypatch.setattr(keeper, name, note)
+        await exchange(here, outputs, {"ACC": 45})
+        assert told == []
+        await exchange(here, outputs, {"CMD": 6})
+        assert told == [("begin", 1), ("sent", 2)]
+        keeper.close()
 
 
 async def test_nothing_named_is_nothing_written() -> None:

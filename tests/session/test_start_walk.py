@@ -10,6 +10,7 @@ import pytest
 from tui.session.command import access, motor_start
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
+from tui.session.read.reader import Reader
 from tui.session.work import OutcomeKind
 
 from .slow_drive import ENABLED, READY, STATUS, SWITCHED_ON, SlowBench, until
@@ -72,6 +73,19 @@ async def test_what_cannot_be_put_on_record_is_not_started(here: SlowBench) -> N
     assert kind is OutcomeKind.REFUSED
     assert "was not recorded" in text
     assert here.line.words == []
+
+
+async def test_a_refused_start_keeps_the_record_of_the_motor_that_runs(here: SlowBench) -> None:
+    await here.start()
+    here.line.dead_to_writes = True
+    kind, _ = await here.start()
+    assert kind is OutcomeKind.REFUSED
+    assert here.starts.close(5.0)
+    assert len(here.records) == 1
+    here.rest()
+    await Reader(here.session).read(["ETA"])
+    assert here.starts.close(5.0)
+    assert here.records == [], "its standstill counts as before"
 
 
 async def test_a_record_ends_with_the_standstill_and_not_with_the_stop(here: SlowBench) -> None:

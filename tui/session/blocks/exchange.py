@@ -100,20 +100,24 @@ class _Exchange:
         known = {code: raw for code, raw in raws.items() if raw is not None}
         self.checks.check_values(known)
         permit.check()
-        await self._record_start(permit)
-        reply, back = await self._send(known, held)
+        recorded = await self._record_start(permit)
+        try:
+            reply, back = await self._send(known, held)
+        finally:
+            # not before: a look at the rest before the frame would end the record
+            if recorded and self.session.starts is not None:
+                self.session.starts.sent(self.session)
         await self.checks.check_slots("after")
         self._see_taken(known, held, back)
         return Exchanged(known, self._read(reply))
 
-    async def _record_start(self, permit: Permit) -> None:
-        """A command word that goes out with them may start the motor."""
+    async def _record_start(self, permit: Permit) -> bool:
+        """A command word that goes out with them may start the motor; whether one does."""
         commands = {chart.command for chart in self.session.profile.data.charts}
         if commands.isdisjoint(parameter.code for parameter in self.targets):
-            return
+            return False
         await record_start(self.session, "forward", permit)
-        if self.session.starts is not None:
-            self.session.starts.sent(self.session)
+        return True
 
     async def _read_scales(self) -> None:
         """What scales and units depend on: errors and the journal tell engineering values."""

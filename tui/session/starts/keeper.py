@@ -66,6 +66,8 @@ class StartKeeper:
         self._begun: dict[int, StartRecord] = {}
         self._sent: dict[int, float] = {}
         self._left: dict[int, StartRecord] = {}
+        self._runs_on: frozenset[int] = frozenset()
+        """Devices whose motor was started before the start that was begun last."""
 
     def begin(self, session: Startable, order: Literal["forward", "reverse"]) -> None:
         """Put a start on the disk. Raises StartNotRecorded."""
@@ -88,11 +90,14 @@ class StartKeeper:
             if not self.unrecorded:
                 raise
             log.warning("%s", error)
+        if session.device in self._begun and self._sent.get(session.device, math.inf) < math.inf:
+            self._runs_on |= {session.device}
         self._sent = {**self._sent, session.device: math.inf}
         self._begun = {**self._begun, session.device: record}
 
     def sent(self, session: Startable) -> None:
         """The run frame went out: a standstill seen from now on ends the record."""
+        self._runs_on -= {session.device}
         self._sent = {**self._sent, session.device: self._clock.monotonic()}
         self._starts.sent(session.line_text, session.device)
 
@@ -113,8 +118,13 @@ class StartKeeper:
         self._left = {d: one for d, one in self._left.items() if d != session.device}
 
     def never_sent(self, session: Startable) -> None:
-        """The start was refused before its run frame went out."""
-        if session.device in self._begun:
+        """The start was refused before its run frame went out.
+
+        A motor that was started before runs on: its standstill ends the record, not this.
+        """
+        if session.device in self._runs_on:
+            self.sent(session)
+        elif session.device in self._begun:
             self._begun = {d: one for d, one in self._begun.items() if d != session.device}
             self._starts.note_stop(session.line_text, session.device)
 
