@@ -23,6 +23,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from queue import SimpleQueue
+from threading import Lock
 
 from tests.defects import bus, commanding, drive, watching
 from tests.defects.defect import Defect
@@ -174,6 +175,7 @@ def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
         if why := fit_to_judge(defects, made[0]):
             raise SystemExit(f"The tests cannot judge: {why}")
         free: SimpleQueue[Path] = SimpleQueue()
+        keeping = Lock()
         for copy in made:
             free.put(copy)
 
@@ -183,6 +185,8 @@ def plant_all(defects: Sequence[Defect], jobs: int) -> list[Planted]:
                 result = plant(defect, copy)
             finally:
                 free.put(copy)
+            with keeping:
+                remember(result)
             print(f"{result.seconds:6.1f} s  {result.name}: {result.noticed_by}", flush=True)
             return result
 
@@ -199,10 +203,10 @@ def last_run() -> dict[str, Planted]:
     return {name: Planted(**one) for name, one in told.items()}
 
 
-def remember(results: Iterable[Planted]) -> None:
-    """Keep results beside those of defects that were not planted this time."""
-    kept = {**last_run(), **{one.name: one for one in results}}
+def remember(result: Planted) -> None:
+    """Keep a result beside those of the defects that were planted before."""
     names = {defect.name for defect in DEFECTS}
+    kept = {**last_run(), result.name: result}
     told = {name: asdict(one) for name, one in kept.items() if name in names}
     LAST_RUN.write_text(json.dumps(told, indent=1), "utf-8")
 
@@ -254,7 +258,6 @@ def main() -> int:
     if asked.list:
         return _listed(defects)
     results = plant_all(defects, min(asked.jobs, len(defects)))
-    remember(results)
     missed = [one for one in results if not one.noticed]
     print(f"\n{'defect':42} {'s':>6}  noticed by")
     for one in results:

@@ -220,6 +220,22 @@ DEFECTS = (
         ),
     ),
     Defect(
+        "rest-behind-the-run-word-counts",
+        "tui/session/command",
+        "last = goal == ENABLED",
+        "last = goal == ENABLED and self.session.starts.sent(self.session) is None",
+        "A motor whose drive was slow to start is forgotten by the next program.",
+        ("tests/session/test_start_walk.py",),
+    ),
+    Defect(
+        "refused-start-takes-the-record-along",
+        "tui/session/starts",
+        "if session.device in self._runs_on:",
+        "if not session.device:",
+        "A running motor is forgotten since a second start of it was refused.",
+        ("tests/session/test_start_walk.py",),
+    ),
+    Defect(
         "start-let-through-unrecorded",
         "tui/session/starts",
         "if not self.unrecorded:\n                raise",
