@@ -100,7 +100,7 @@ DEFECTS = (
     Defect(
         "arming-never-runs-out",
         "tui/session/arming.py",
-        "if until <= time.monotonic():",
+        "if until <= self._clock.monotonic():",
         "if until <= 0.0:",
         "A panel left alone for an hour starts a motor by the key that somebody leans on.",
         ("tests/session/test_command.py::test_arming_ends_by_itself",),
@@ -116,7 +116,7 @@ DEFECTS = (
     Defect(
         "walk-does-not-wait",
         "tui/session/command",
-        "reached = await self._wait(chart, {goal, ENABLED})",
+        "reached = await access.wait_for(chart, {goal, ENABLED})",
         "reached = next(s for s in chart.states if s.id == goal)",
         "A slow drive misses the words of its start and stays where it was.",
         ("tests/session/test_start_walk.py",),
@@ -124,8 +124,8 @@ DEFECTS = (
     Defect(
         "interlock-ignored",
         "tui/session/command",
-        "if refused := interlock(chart, id, raws):",
-        'if refused := "":',
+        "(refused := interlock(found, wanted, self.raws))",
+        '(refused := "")',
         "A motor is started although its enable or its channel forbids it.",
         ("tests/session/test_command.py::test_refusals",),
     ),
@@ -254,8 +254,8 @@ DEFECTS = (
     Defect(
         "outputs-not-looked-at-before",
         "tui/session/blocks",
-        'await self._check_slots("before")',
-        "self.check_named()",
+        'await self.checks.check_slots("before")',
+        "self.checks.check_named()",
         "Words go to what another program has put into the slots meanwhile.",
         (
             "tests/session/test_exchange.py"

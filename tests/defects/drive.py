@@ -167,7 +167,7 @@ DEFECTS = (
     ),
     Defect(
         "limits-written-in-any-order",
-        "tui/drive/settings/edits.py",
+        "tui/drive/settings/write_sequence.py",
         "chosen = next(free, waiting[0])",
         "chosen = waiting[0]",
         "Restoring is refused by the drive since a limit stands in the way.",
@@ -175,7 +175,7 @@ DEFECTS = (
     ),
     Defect(
         "scale-written-after-what-follows-it",
-        "tui/drive/settings/edits.py",
+        "tui/drive/settings/write_sequence.py",
         "(0 if code in sources else 1)",
         "(1 if code in sources else 0)",
         "Restored ramps are ten times too long or too short.",

@@ -8,8 +8,8 @@ DEFECTS = (
     Defect(
         "values-of-the-monitor-not-noted",
         "tui/session/read/reader.py",
-        "image.take(found, Origin.POLL if priority >= Priority.POLL else Origin.READ)",
-        "priority < Priority.POLL and image.take(found, Origin.READ)",
+        "        image.take(found)\n",
+        "        _ = priority < Priority.POLL and image.take(found)\n",
         "Parameters and stops do not know what Monitor shows.",
         ("tests/session/test_reader.py",),
     ),
