@@ -28,7 +28,7 @@ class PanelScreen(Framed):
     DEFAULT_CSS = """
     PanelScreen { layout: vertical; overflow: hidden; }
     PanelScreen { background: $background; color: $foreground; }
-    PanelScreen #head { height: 2; }
+    PanelScreen #frame-room { height: 2; }
     PanelScreen #keys { height: 1; margin-top: 1; background: $surface; }
     """
     LOOK: ClassVar[float | None] = None
@@ -37,7 +37,7 @@ class PanelScreen(Framed):
     def compose(self) -> ComposeResult:
         """The frame, what the screen itself shows, and its keys."""
         yield from self.framed()
-        yield Lines(id="head")  # the place of strip and tabs
+        yield Lines(id="frame-room")  # the place of strip and tabs
         yield from self.body()
         yield Lines(id="keys")
 
