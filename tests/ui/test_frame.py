@@ -1,0 +1,130 @@
+"""The frame on a real line: what it tells on every screen and over every dialog, live."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import AsyncIterator, Callable
+from contextlib import asynccontextmanager
+
+import pytest
+from textual.pilot import Pilot
+
+from tui.app import DrivePanelApp
+from tui.screens.dialogs.question import Question
+from tui.screens.faults.screen import FaultsScreen
+from tui.screens.parameters.screen import ParametersScreen
+from tui.session.connect.open_line import demo_line
+from tui.simulator import Simulation
+from tui.widgets.lines import Lines
+
+
+class Panel:
+    """The panel on two simulated drives, the first of them on Monitor."""
+
+    def __init__(self, app: DrivePanelApp, pilot: Pilot[None]) -> None:
+        self.app, self.pilot = app, pilot
+
+    @property
+    def simulation(self) -> Simulation:
+        assert self.app.opened is not None
+        assert self.app.opened.simulation is not None
+        return self.app.opened.simulation
+
+    def shown(self, place: str) -> str:
+        """What stands at a place of the screen on top."""
+        found = self.app.screen.query(f"#{place}").results(Lines)
+        return "\n".join(line.plain for lines in found for line in lines.lines)
+
+    async def until(self, holds: Callable[[], object], seconds: float = 30.0) -> None:
+        end = time.monotonic() + seconds
+        while not holds():
+            assert time.monotonic() < end, (
+                f"{self.shown('strip')!r} {self.shown('tabs')!r} {self.shown('said')!r}"
+            )
+            await self.pilot.pause(0.05)
+
+    async def on(self, place: str) -> None:
+        """Go to a screen of the first drive."""
+        await self.pilot.press(place)
+        await self.until(lambda: self.shown("strip").strip())
+
+
+@asynccontextmanager
+async def panel() -> AsyncIterator[Panel]:
+    app = DrivePanelApp(
+        open_line=lambda *_, **__: demo_line({"atv71": 30.0, "atv312": 0.0}), start="demo", device=1
+    )
+    bells: list[None] = []
+    app.bell = lambda: bells.append(None)  # type: ignore[method-assign]
+    async with app.run_test(size=(80, 24)) as pilot:
+        made = Panel(app, pilot)
+        await made.until(lambda: app.chosen is not None)
+        await made.until(lambda: "FORWARD" in made.shown("strip"))
+        made.bells = bells  # type: ignore[attr-defined]
+        yield made
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+@pytest.mark.parametrize("key", ["1", "2", "3", "4", "5", "6", "7", "m"])
+async def test_the_strip_tells_the_motor_on_every_screen(key: str) -> None:
+    async with panel() as made:
+        await made.on(key)
+        await made.until(lambda: "FORWARD" in made.shown("strip") and "Hz" in made.shown("strip"))
+        assert "1 Line" in made.shown("tabs")
+
+
+@pytest.mark.parametrize("key", ["3", "4", "q", "question_mark", "ctrl+p"])
+async def test_a_trip_is_told_there_and_over_dialogs(key: str) -> None:
+    async with panel() as made:
+        await made.pilot.press(key)
+        made.simulation.drive(1).provoke("ObF")
+        await made.until(lambda: "FAULT ObF" in made.shown("strip"))
+        await made.until(lambda: "tripped: ObF" in made.shown("said"))
+        assert "1 fault" in made.shown("strip")
+        assert made.bells == [None]  # type: ignore[attr-defined]
+
+
+async def test_a_fault_stays_unseen_until_faults_was_looked_at() -> None:
+    async with panel() as made:
+        made.simulation.drive(1).provoke("ObF")
+        await made.until(lambda: made.app.fleet is not None and made.app.fleet.alarms.unseen)
+        await made.on("3")
+        assert isinstance(made.app.screen, ParametersScreen)
+        assert made.app.fleet is not None
+        assert made.app.fleet.alarms.unseen
+        await made.on("5")
+        assert isinstance(made.app.screen, FaultsScreen)
+        await made.until(lambda: made.app.fleet is not None and not made.app.fleet.alarms.unseen)
+        await made.until(lambda: "Probably" in made.shown("doctor"))
+        assert made.app.fleet.journal.recent == ()
+
+
+async def test_enter_opens_the_parameter_that_a_fault_points_at() -> None:
+    async with panel() as made:
+        made.simulation.drive(1).provoke("ObF")
+        await made.on("5")
+        await made.until(lambda: "Enter opens" in made.shown("doctor"))
+        await made.pilot.press("enter")
+        await made.until(lambda: isinstance(made.app.screen, ParametersScreen))
+        await made.until(lambda: made.shown("detail").lstrip().startswith("DEC"))
+
+
+async def test_a_stop_is_told_where_it_was_given() -> None:
+    async with panel() as made:
+        await made.on("3")
+        await made.pilot.press("space")
+        await made.until(lambda: "STOPPING" in made.shown("strip"))
+        await made.until(lambda: "topped" in made.shown("said"), 60.0)
+
+
+async def test_a_question_leaves_the_strip_live() -> None:
+    async with panel() as made:
+        await made.pilot.press("z")
+        await made.until(lambda: isinstance(made.app.screen, Question))
+        before = made.shown("strip")
+        made.simulation.drive(1).run(10.0)
+        await made.until(lambda: made.shown("strip") != before)
