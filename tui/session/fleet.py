@@ -66,7 +66,7 @@ class Fleet:
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.stopper = Stopper(line, journal, self.events)
-        self.alarms = LineAlarms(self.events, self._record_fault)
+        self.alarms = LineAlarms(self.events, self._record_fault, clock.wall)
         """The faults of all of them."""
         self._lock = threading.Lock()
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})

@@ -6,13 +6,14 @@ import time
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
+from ..clock import REAL_CLOCK
 from ..drive_state import DriveState
 from ..events import EventLog
 
 
 @dataclass(frozen=True, slots=True)
 class PresentFault:
-    """A fault that a drive is in now; `wall` is when it was first seen, time.time()."""
+    """A fault that a drive is in now; `wall` is when it was first seen, in seconds since 1970."""
 
     device: int
     code: str
@@ -34,7 +35,7 @@ class LineAlarms:
         self,
         events: EventLog,
         record: Callable[[PresentFault, str], None],
-        wall: Callable[[], float] = time.time,
+        wall: Callable[[], float] = REAL_CLOCK.wall,
     ) -> None:
         self._events = events
         self._record = record
