@@ -186,7 +186,7 @@ class BlocksScreen(BlockKeys):
         """Say what follows, and write it."""
         block_editor = self.block_editor
         proposals = block_editor.proposals
-        todo = proposals.changed
+        todo = [block for block in proposals.blocks if proposals.changes(block)]
         if not todo:
             self._refuse("Nothing is proposed: Enter picks what the slot stands for.")
             return

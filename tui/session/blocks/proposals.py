@@ -61,11 +61,6 @@ class Proposals:
         return [plan for block in self.blocks if (plan := self.proposed(block))]
 
     @property
-    def changed(self) -> list[Block]:
-        """The blocks that writing the proposals would change now."""
-        return [block for block in self.blocks if self.changes(block)]
-
-    @property
     def count(self) -> int:
         """How many slots writing the proposals would change now."""
         return sum(len(self.changes(block)) for block in self.blocks)
