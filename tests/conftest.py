@@ -7,11 +7,14 @@ import os
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from hypothesis import settings
 
+from tui.bus.line import Timing, timing_of
+from tui.bus.link import Link
 from tui.cli.shared.logs import stop_logging
 
 # each worker and each program of a test would compile all that it imports again
@@ -40,6 +43,21 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
     monkeypatch.setenv("TZ", "UTC")
     yield tmp_path
     stop_logging()
+
+
+@pytest.fixture
+def patient_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Lines wait a whole second for every answer, unless a test gives them a timing of its own.
+
+    A line learns how fast its devices are and waits 0.15 s at least; a simulated drive takes
+    longer where the machine has something else to do.
+    """
+
+    def patient(link: Link) -> Timing:
+        timing = timing_of(link)
+        return replace(timing, min_timeout=timing.first_timeout)
+
+    monkeypatch.setattr("tui.bus.line.timing_of", patient)
 
 
 @pytest.fixture

@@ -94,7 +94,7 @@ class Bench:
         self._until(LineStatus.CONNECTED)
 
     def _until(self, status: LineStatus) -> None:
-        end = time.monotonic() + 20
+        end = time.monotonic() + 60
         while self.session.line.state.status is not status:
             assert time.monotonic() < end, f"the line does not become {status}"
             time.sleep(0.02)

@@ -83,7 +83,7 @@ class Bench(NamedTuple):
         """Let the time of the session and of the drive go by until something holds."""
         await let_go_until(self.clock, holds)
 
-    async def until(self, holds: Callable[[], bool], seconds: float = 20.0) -> None:
+    async def until(self, holds: Callable[[], bool], seconds: float = 60.0) -> None:
         end = time.monotonic() + seconds
         while not holds():
             assert time.monotonic() < end, "it did not come to that"

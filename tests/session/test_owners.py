@@ -29,7 +29,7 @@ from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 
 
-async def until(holds: Callable[[], object], seconds: float = 20.0) -> None:
+async def until(holds: Callable[[], object], seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end, "it did not come to that"

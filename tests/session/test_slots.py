@@ -48,7 +48,7 @@ class Start(Protocol):
     ) -> tuple[Simulation, OpenLine]: ...
 
 
-async def until(holds: Callable[[], bool], seconds: float = 20.0) -> None:
+async def until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end, "it did not come to that"

@@ -104,7 +104,7 @@ async def test_every_family_stops_on_its_ramp(start: Start, journal: Journal, fa
     assert len({round(value) for value in seen if 0.5 < value < 19}) > 3
 
 
-async def wait_for(holds: Callable[[], bool], seconds: float = 20.0) -> None:
+async def wait_for(holds: Callable[[], bool], seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end, "it did not come to that"

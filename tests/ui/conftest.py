@@ -24,6 +24,11 @@ def quick_hands(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
+def patience(patient_lines: None) -> None:
+    """How long a line waits is looked at in tests/bus; here a busy machine must not matter."""
+
+
+@pytest.fixture(autouse=True)
 def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A fifth of the time of a test of the panel would go into the same style sheets."""
     monkeypatch.setattr(Stylesheet, "_parse_rules", parse_once)

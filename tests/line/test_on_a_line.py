@@ -38,6 +38,8 @@ from tui.session.read.reader import Reader
 from tui.session.reading import Quality
 from tui.simulator import DriveSpec, Simulation
 
+pytestmark = pytest.mark.usefixtures("patient_lines")
+
 DRIVES = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
 ADDRESSES = {profile: address for address, profile in enumerate(DRIVES, start=1)}
 
@@ -54,7 +56,7 @@ def session(opened: OpenLine, profile: str) -> DriveSession:
     return DriveSession(opened.line, ADDRESSES[profile], library.load(profile))
 
 
-async def until(holds: Callable[[], bool], seconds: float = 20.0) -> None:
+async def until(holds: Callable[[], bool], seconds: float = 60.0) -> None:
     end = time.monotonic() + seconds
     while not holds():
         assert time.monotonic() < end, "it did not come to that"
