@@ -15,8 +15,9 @@ MOST_METHODS = 15
 """Public methods and properties of one class; those of its bases count there."""
 
 EXCEPTIONS: dict[str, tuple[int, str]] = {
-    "app.py": (402, "being cut"),
-    "app.py:DrivePanelApp": (22, "being cut"),
+    "bus/api.py:ModbusLine": (18, "what all of a line is asked for; the fake has the same"),
+    "bus/fake.py:FakeLine": (18, "the same as the line that it stands for"),
+    "screens/app_port.py:Panel": (19, "all that screens ask of the app, most of it abstract"),
     "screens/connection/state.py:ConnectionView": (16, "being cut"),
     "screens/monitor/screen.py": (321, "being cut"),
     "screens/parameters/view.py": (327, "being cut"),

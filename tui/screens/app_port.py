@@ -118,6 +118,15 @@ class Panel(App[None]):
 
     @property
     @abstractmethod
+    def journal_trouble(self) -> str:
+        """Why what is written is not on record; empty while it is."""
+
+    @abstractmethod
+    def say_first(self, happened: str, next_step: str, kind: str = "") -> None:
+        """Say something on Line, where a person begins."""
+
+    @property
+    @abstractmethod
     def stops_whom(self) -> str:
         """The words of the stop key in the line of keys."""
 

@@ -1,0 +1,176 @@
+"""Keys before they reach a screen: stops before everything, and each key at its turn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from textual.events import Event, Key, Paste
+
+from tui.bus.errors import LineClosed
+from tui.terminal.admission import Admission
+from tui.terminal.fields import takes_space
+from tui.terminal.loop import soon_in_loop
+from tui.terminal.names import STOP_KEYS
+from tui.terminal.stroke import stroke_of
+from tui.terminal.type_ahead import TypeAhead
+
+from .app_port import Panel
+
+if TYPE_CHECKING:
+    from tui.drive.profile.schema import OrderId
+    from tui.session.console import DriveConsole
+    from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
+    from tui.terminal.stroke import Stroke
+
+STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
+
+
+class Hands(Panel):
+    """What keys do to the whole panel; the first part of it is asked in the thread of the keys."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._stops = 0
+        self._trying_f12 = False
+        self._typed = TypeAhead(self, Admission(self, self).admits)
+
+    def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
+        """Stop, if the key means that now; may be called in any thread.
+
+        `left_at` is when a key was read that may leave a text, like Escape: a Space behind it is no
+        text, though that key may not have had its effect yet.
+        """
+        left = left_at is not None and left_at > self._typed.done_to
+        if key not in STOP_KEYS:
+            return False
+        if key == STOP_OUTSIDE_TEXT and takes_space(self.focused) and not left:
+            return False
+        self._stop(everything=key == STOP_ALL)
+        if key == STOP and self._trying_f12:
+            self._f12_arrived()
+        return True
+
+    def sequence_swallowed(self, data: bytes) -> None:
+        """A key came that no known terminal sends; in the thread that reads the keys."""
+        if self._trying_f12:
+            from tui.screens.keys.first_keys import unknown_text
+
+            self._from_keys(self.say_first, unknown_text(data), "", "alarm")
+
+    def try_f12(self) -> None:
+        """On the first start on a terminal: does F12 arrive?"""
+        from tui.screens.keys.first_keys import OFFER, was_tried
+
+        self._trying_f12 = not self.is_headless and not was_tried()
+        if self._trying_f12:
+            self.say_first(OFFER, "Or choose a line and press Enter, or n to type one.")
+
+    def _f12_arrived(self) -> None:
+        """F12 came while it was tried; in the thread that reads the keys."""
+        from tui.screens.keys.first_keys import ARRIVED, remember
+
+        self._trying_f12 = False
+        remember()
+        self._from_keys(self.say_first, ARRIVED, "Choose a line and press Enter.")
+
+    def _from_keys(self, tell: Callable[..., None], *words: str) -> None:
+        """Do something in the screen's loop, from the thread that reads the keys."""
+        soon_in_loop(self, tell, *words)
+
+    def stop_stamp(self) -> object:
+        """Another object after every stop; may be called in any thread."""
+        return self._stops
+
+    @property
+    def stroke(self) -> Stroke | None:
+        """What is known of the key that has its effect now; None while there is none."""
+        return self._typed.stroke
+
+    def keys_not_taken(self, count: int, *, late: bool = False) -> None:
+        """Tell that keys came at once, or too late, and did nothing."""
+        came = "came too late" if late else "came at once" if count > 1 else "did not come alone"
+        keys = f"{count} keys {came} and were" if count > 1 else f"1 key {came} and was"
+        self.notify(f"{keys} not taken.", severity="warning")
+
+    def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
+        """A space belongs to the text that is being typed."""
+        if action == "stop_by_space":
+            return not takes_space(self.focused)
+        return super().check_action(action, parameters)
+
+    def action_stop_by_space(self) -> None:
+        """Stop the drive that is shown, while no text is being typed."""
+        self._stop(everything=False)
+
+    def action_stop(self) -> None:
+        """Stop the drive that is shown."""
+        self._stop(everything=False)
+
+    def action_stop_all(self) -> None:
+        """Stop every drive of the line."""
+        self._stop(everything=True)
+
+    def _stop(self, *, everything: bool) -> None:
+        self._stops += 1
+        fleet = self.fleet
+        if fleet is None:
+            return
+        self._stop_sessions(fleet, fleet.sessions if everything else self._meant(fleet))
+
+    def _stop_sessions(
+        self, fleet: Fleet, sessions: list[DriveSession], order: OrderId = "stop"
+    ) -> None:
+        """Stop drives, and end the questions about them; may be called in any thread."""
+        if not sessions:
+            return
+        with suppress(LineClosed):
+            fleet.stop(sessions, order)
+        devices = [session.device for session in sessions]
+        soon_in_loop(self, self._void_questions, devices)
+
+    def _void_questions(self, devices: list[int]) -> None:
+        from .dialogs.question import void_questions
+
+        for device in devices:
+            void_questions(self, device)
+
+    def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
+        """Stop one drive, in its own way."""
+        self._stops += 1
+        if self.fleet is not None:
+            self._stop_sessions(self.fleet, [console.session], order)
+
+    async def on_event(self, event: Event) -> None:
+        """A key keeps an armed drive armed; the next one waits for it."""
+        if isinstance(event, Key | Paste) and not event.is_forwarded:
+            if not self._typed.admit(event):
+                return
+            if isinstance(event, Key):
+                for session in self.fleet.sessions if self.fleet else ():
+                    session.arming.touch()
+        elif isinstance(event, Key) and self._is_void(event):
+            return
+        await super().on_event(event)
+
+    def _is_void(self, key: Key) -> bool:
+        """Whether a stop came while a key went through the screen, before it has its effect."""
+        stroke = stroke_of(key)
+        return stroke is not None and stroke.stamp != self.stop_stamp()
+
+    def _meant(self, fleet: Fleet) -> list[DriveSession]:
+        """Whom the stop key stops: the drive that was opened, else every drive of the line."""
+        chosen = self.chosen
+        if chosen is not None and chosen in fleet.consoles:
+            return [chosen.session]
+        return fleet.sessions
+
+    @property
+    def stops_whom(self) -> str:
+        """The words of the stop key in the line of keys."""
+        fleet, chosen = self.fleet, self.chosen
+        if fleet is not None and chosen is not None and chosen in fleet.consoles:
+            return f"STOP {chosen.device}"
+        return "STOP ALL"

@@ -1,0 +1,54 @@
+"""What is looked at on every screen, now and then: the frame, new faults, stops that failed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .app_port import Panel
+from .frame import Framed
+from .frame_source import FrameSource
+
+if TYPE_CHECKING:
+    from tui.session.command.stop_report import StopReport
+    from tui.session.fleet import Fleet
+
+FRAME_LOOK = 0.25
+"""Seconds between two looks at what stands around every screen."""
+
+
+class Lookout(Panel):
+    """Draws the frame of the screen on top, and says what must be heard wherever one is."""
+
+    bell_rings = True
+    """Whether a new fault rings."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._cried: list[StopReport] = []
+        """Stops that failed, and of which that was said."""
+        self._frame = FrameSource(self)
+        self._journal_trouble = ""
+
+    def look_around(self) -> None:
+        """What must be seen on every screen: the frame, a new fault, a stop that failed."""
+        if self.fleet is not None:
+            if self.fleet.alarms.take(self.fleet.line_watch.states) and self.bell_rings:
+                self.bell()
+            self._cry_for_stops(self.fleet)
+        trouble = self.journal_trouble
+        if trouble and trouble != self._journal_trouble:
+            self.notify(trouble, severity="error")
+        self._journal_trouble = trouble
+        self.draw_frame()
+
+    def draw_frame(self) -> None:
+        """Put the frame of the screen on top as it is now."""
+        if isinstance(self.screen, Framed):
+            self.screen.draw_frame(self._frame.view())
+
+    def _cry_for_stops(self, fleet: Fleet) -> None:
+        """Say over everything, once, that a motor does not stop."""
+        for report in fleet.stopper.reports.values():
+            if report.phase.value == "failed" and report not in self._cried:
+                self.cry(f"Device {report.device}: {report.text}")
+        self._cried = [r for r in fleet.stopper.reports.values() if r.phase.value == "failed"]
