@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from tui.bus.errors import DeviceException
 from tui.bus.line import Line, LineStatus
 from tui.bus.link import RtuTcpLink, SerialLink
 from tui.drive.profile import library
@@ -18,7 +19,8 @@ from tui.session.drive import DriveSession
 from tui.session.journal import Journal
 from tui.session.monitor.monitor import Monitor
 from tui.session.read.retrying_reader import RetryingReader
-from tui.session.settings.apply import Applied, apply_edits
+from tui.session.settings.applied import Applied
+from tui.session.settings.apply import apply_edits
 from tui.session.work import Permit
 from tui.simulator import DriveSpec, FaultRates, Simulation
 from tui.simulator.drive import SimulatedDrive
@@ -76,6 +78,17 @@ class Bench:
             return answered
 
         self.session.line.write = counted  # type: ignore[method-assign]
+
+    def refuse(self, code: str) -> None:
+        """From now on the drive refuses to take this parameter, as one that is busy does."""
+        honest, refused = self.session.line.write, self.profile[code].address
+
+        async def picky(device: int, address: int, *what: Any, **how: Any) -> float:
+            if address == refused:
+                raise DeviceException(device, 6, address, 4)
+            return await honest(device, address, *what, **how)
+
+        self.session.line.write = picky  # type: ignore[method-assign]
 
     def writes(self) -> list[tuple[int, int]]:
         """Registers and words of all writes of one word so far."""

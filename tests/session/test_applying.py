@@ -11,7 +11,8 @@ from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.settings.memory_orders import MemoryRefused
 from tui.session.read import retrying_reader
-from tui.session.settings.apply import Applied, EditOutcome, Result, apply_edits
+from tui.session.settings.applied import Applied, EditOutcome, Result
+from tui.session.settings.apply import apply_edits
 from tui.session.settings.eeprom import factory_reset, save_to_eeprom
 from tui.simulator import FaultRates
 
@@ -66,6 +67,47 @@ async def test_a_value_past_another_is_not_sent() -> None:
         assert "above HSP = 50.0 Hz" in text(applied, "LSP")
         assert "LSP" in applied.left
         assert 3105 not in [register for register, _ in made.writes()]
+
+
+async def test_what_builds_on_a_refused_edit_is_held_back() -> None:
+    """A limit that was to be raised first was not: what would pass it is not sent."""
+    with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
+        edits = await made.stage(TFR="80", HSP="75", LSP="10", ACC="4 s")
+        made.refuse("TFR")
+        applied = await made.write(edits)
+        assert outcomes(applied) == {
+            "TFR": EditOutcome.DRIVE_REFUSED,
+            "HSP": EditOutcome.HELD_BACK,
+            "LSP": EditOutcome.DONE,
+            "ACC": EditOutcome.DONE,
+        }
+        assert "TFR, which it builds on, was not written" in text(applied, "HSP")
+        assert {edit.code for edit in applied.left} == {"TFR", "HSP"}
+        assert made.drive.raw("HSP") == 500
+
+
+async def test_what_counts_by_a_refused_scale_is_held_back() -> None:
+    with bench("atv71", sets={"INR": 1, "ACC": 30}) as made:
+        edits = await made.stage(INR="0.01", ACC="4.55 s")
+        made.refuse("INR")
+        applied = await made.write(edits)
+        assert outcomes(applied) == {
+            "INR": EditOutcome.DRIVE_REFUSED,
+            "ACC": EditOutcome.HELD_BACK,
+        }
+        assert made.drive.raw("ACC") == 30
+
+
+async def test_after_a_failure_the_rest_waits_for_an_answer_where_one_can_be_asked() -> None:
+    with bench("atv71", sets={"TFR": 600, "HSP": 500, "LSP": 0}) as made:
+        edits = await made.stage(TFR="80", HSP="75", LSP="10", ACC="4 s")
+        made.refuse("TFR")
+        applied = await made.write(edits, ask_after_failure=True)
+        assert set(applied.waits) == {"LSP", "ACC"}
+        assert outcomes(applied)["HSP"] is EditOutcome.HELD_BACK
+        assert applied.written == ()
+        assert len(applied.left) == 4
+        assert made.writes() == []
 
 
 async def test_a_change_by_somebody_else_is_not_overwritten() -> None:

@@ -19,7 +19,7 @@ from tui.drive.settings.writable import is_setting, line_setting
 from tui.drive.values import raw_range
 from tui.session.connect.identify import identify_drive
 from tui.session.read.upload import Upload
-from tui.session.settings.apply import EditOutcome, Result
+from tui.session.settings.applied import EditOutcome, Result
 from tui.session.settings.eeprom import factory_reset
 from tui.session.settings.restore import Mark, Restored, plan_for, restore_set
 

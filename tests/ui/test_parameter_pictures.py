@@ -18,7 +18,7 @@ from tui.screens.parameters.view import news_lines
 from tui.session.console import DriveConsole
 from tui.session.drive_state import DriveState
 from tui.session.reading import Reading
-from tui.session.settings.apply import EditOutcome, Result
+from tui.session.settings.applied import EditOutcome, Result
 from tui.session.settings.editor import Editor
 from tui.session.settings.favourites import Marks
 from tui.session.settings.watched_values import WatchedValues

@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.read.upload import Upload
-    from tui.session.settings.apply import Result
+    from tui.session.settings.applied import Result
 
 OUTAGE = 20.0
 """Seconds for which a read-out waits for a lost line to come back."""
@@ -141,13 +141,14 @@ def say_result(done: int, of: int, result: Result) -> None:
 
 def status_of_results(results: Iterable[Result]) -> int:
     """The exit status of a number of writes: the worst that has happened."""
-    from tui.session.settings.apply import EditOutcome
+    from tui.session.settings.applied import EditOutcome
 
     table = {
         EditOutcome.DRIVE_REFUSED: DRIVE_REFUSED,
         EditOutcome.NOT_TAKEN: DRIVE_REFUSED,
         EditOutcome.REFUSED: REFUSED_HERE,
         EditOutcome.CHANGED: REFUSED_HERE,
+        EditOutcome.HELD_BACK: REFUSED_HERE,
         EditOutcome.UNKNOWN: LINE_TROUBLE,
         EditOutcome.NOT_SENT: LINE_TROUBLE,
     }

@@ -6,9 +6,8 @@ staged. Nothing is printed: a screen or a command tells what the results say.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 
 from tui.bus.errors import (
     ChecksumFault,
@@ -19,6 +18,7 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.drive.errors import DriveError
+from tui.drive.settings.dependence import builds_on
 from tui.drive.settings.edits import Edit, Edits
 from tui.drive.settings.limits import edit_problems, limit_pairs
 from tui.drive.settings.writable import cuts_line, option_code, waits_for_reset, write_refusal
@@ -30,65 +30,12 @@ from ..drive import DriveSession
 from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
 from ..work import Permit, Stopped
+from .applied import Applied, EditOutcome, Result, WriteProgress
 from .link_change import LinkChange, link_change
 from .refusals import device_refusal
 from .write import NotTaken, Writer
 
 LOST_ANSWERS = (NoAnswer, ChecksumFault, WrongReply)
-
-
-class EditOutcome(StrEnum):
-    """What became of one edit."""
-
-    DONE = "done"
-    SENT = "sent, line changed"
-    CHANGED = "changed meanwhile"
-    NOT_TAKEN = "not taken"
-    DRIVE_REFUSED = "the drive refused"
-    REFUSED = "not written"
-    UNKNOWN = "not known"
-    NOT_SENT = "not sent"
-
-
-@dataclass(frozen=True, slots=True)
-class Result:
-    """One edit with its outcome, a sentence for a person, and what the drive holds now."""
-
-    edit: Edit
-    outcome: EditOutcome
-    text: str
-    held: int | None = None
-
-    @property
-    def done(self) -> bool:
-        """Whether the drive has the new value, as far as that can be seen."""
-        return self.outcome in (EditOutcome.DONE, EditOutcome.SENT)
-
-
-@dataclass(frozen=True, slots=True)
-class Applied:
-    """What became of all edits."""
-
-    results: tuple[Result, ...]
-    left: Edits
-    """What is still staged, against the values that the drive holds now."""
-    links: tuple[LinkChange, ...] = ()
-    """What changes on the line itself, now or after a reset."""
-    after_reset: tuple[str, ...] = ()
-    """Codes whose new value is in force only once the drive was reset."""
-    unsaved: tuple[str, ...] = ()
-    """Codes whose new value is lost at power-off until the drive is told to save."""
-    stopped: str = ""
-    """Why the rest was not tried; empty where all were."""
-
-    @property
-    def written(self) -> tuple[Result, ...]:
-        """The edits that the drive has now."""
-        return tuple(result for result in self.results if result.done)
-
-
-WriteProgress = Callable[[int, int, Result], None]
-"""Called after each edit with how many are done, how many there are, and the result."""
 
 
 async def apply_edits(
@@ -100,9 +47,12 @@ async def apply_edits(
     confirmed: Collection[str] = (),
     why: str = "setting",
     progress: WriteProgress | None = None,
+    ask_after_failure: bool = False,
 ) -> Applied:
     """Write staged edits one after another, in their order, as long as the permit holds.
 
+    Where one fails, those that build on it are held back; with `ask_after_failure` the others
+    are not written either, but told in `Applied.waits`, so that a person can be asked first.
     `confirmed` are codes of unverified parameters that the user confirmed; `why` goes into the
     journal. Raises RequestRefused on a read-only line, and the line's errors while nothing has
     been written yet.
@@ -118,6 +68,12 @@ async def apply_edits(
     for number, edit in enumerate(order, start=1):
         if work.stopped:
             result = Result(edit, EditOutcome.NOT_SENT, f"{edit.code} was not sent: {work.stopped}")
+        elif (base := work.missed_base(edit)) != "":
+            text = f"{edit.code} is held back: {base}, which it builds on, was not written."
+            result = Result(edit, EditOutcome.HELD_BACK, text, edit.old)
+        elif ask_after_failure and work.missed:
+            text = f"{edit.code} is not written yet: {work.missed[0]} failed before it."
+            result = Result(edit, EditOutcome.WAITS, text, edit.old)
         elif edit.code in told:
             result = Result(edit, EditOutcome.REFUSED, told[edit.code], edit.old)
         else:
@@ -154,6 +110,16 @@ class _Work:
             follows = self.session.profile[code].scale_by
             found += [follows.parameter] if follows else []
         return list(dict.fromkeys(found))
+
+    @property
+    def missed(self) -> list[str]:
+        """Codes of the edits that the drive did not take so far."""
+        return [r.edit.code for r in self.results if not r.done]
+
+    def missed_base(self, edit: Edit) -> str:
+        """The edit before this one that it builds on and that was not written."""
+        raws = self.retrying.raws
+        return builds_on(self.session.profile, edit, self.missed, self.edits, raws)
 
     async def apply(self, edit: Edit) -> Result:
         """One edit, from the look before to the look after."""
@@ -286,6 +252,7 @@ class _Work:
             after_reset=tuple(p.code for p in parameters if waits_for_reset(profile, p)),
             unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
             stopped=self.stopped,
+            waits=tuple(r.edit.code for r in self.results if r.outcome is EditOutcome.WAITS),
         )
 
     def _left(self, done: set[str]) -> Edits:

@@ -26,7 +26,8 @@ from ..drive_state import DriveState
 from ..journal import Journal
 from ..read.retrying_reader import RetryingReader
 from ..work import Outcome, OutcomeKind, Permit, Task
-from .apply import Applied, Result, apply_edits
+from .applied import Applied, Result
+from .apply import apply_edits
 from .eeprom import factory_reset, save_to_eeprom
 from .favourites import Marks, load_marks, save_marks
 from .link_change import LinkChange
@@ -46,6 +47,8 @@ class Editor:
     staging: Staging = field(init=False)
     unsaved: set[str] = field(default_factory=set)
     waits_for_reset: set[str] = field(default_factory=set)
+    applied: Applied | None = None
+    """What the last writing came to, until a screen has shown it."""
     moved: LinkChange | None = None
     """Where the drive answers now, after a setting of the line itself was written."""
     marks: Marks = field(init=False)
@@ -127,7 +130,7 @@ class Editor:
         """Write what is staged, or only these; returns at once."""
         staging = self.staging
         edits, held_back = staging.only(codes)
-        staging.results = {}
+        staging.results, self.applied = {}, None
 
         async def work(permit: Permit) -> str:
             applied = await apply_edits(
@@ -137,8 +140,9 @@ class Editor:
                 permit=permit,
                 confirmed=self.marks.confirmed,
                 progress=self._progress,
+                ask_after_failure=True,
             )
-            staging.edits = Edits((*applied.left.asked, *held_back))
+            staging.edits, self.applied = Edits((*applied.left.asked, *held_back)), applied
             self._applied(applied)
             return _summary(applied)
 

@@ -24,7 +24,8 @@ from ..journal import Journal, now_text
 from ..paths import state_folder
 from ..read.upload import ReadProgress, Upload, setting_codes
 from ..work import Permit
-from .apply import Applied, Result, WriteProgress, apply_edits
+from .applied import Applied, Result, WriteProgress
+from .apply import apply_edits
 from .link_change import LinkChange
 
 PASSES = 5

@@ -11,7 +11,7 @@ from tui.drive.settings.edits import Edit, Edits
 from tui.drive.settings.restore_plan import RestorePlan
 
 from ..drive import DriveSession
-from .apply import Result
+from .applied import Result
 
 
 @dataclass(slots=True)
@@ -79,7 +79,8 @@ class Staging:
                 staged += 1
         if not olds:
             return "Nothing is staged, and nothing was written lately."
-        return f"{staged} old values are staged; w writes them."
+        values, them = ("old value is", "it") if staged == 1 else ("old values are", "them")
+        return f"{staged} {values} staged; w writes {them}."
 
     def undo_all(self) -> None:
         """Take every edit back."""

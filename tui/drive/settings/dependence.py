@@ -1,0 +1,46 @@
+"""What must not be written because another edit, which it builds on, was not; pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from ..profile.profile import Profile
+from ..shown import number_of
+from .edits import Edit, Edits
+from .limits import limit_pairs
+from .write_sequence import RESETS_OTHERS
+
+
+def builds_on(
+    profile: Profile,
+    edit: Edit,
+    missed: Collection[str],
+    edits: Edits,
+    raws: Mapping[str, int],
+) -> str:
+    """The missed edit that this one builds on, by its code; empty where there is none.
+
+    `missed` are codes of edits that the drive did not take, `edits` all that were to be written,
+    `raws` what the drive holds now. An edit builds on what gives it its scale, on what changes
+    other settings as it is written, and on a limit that it would pass as long as that stays.
+    """
+    follows = profile[edit.code].scale_by
+    if follows is not None and follows.parameter in missed:
+        return follows.parameter
+    for code in missed:
+        if code.casefold() in RESETS_OTHERS:
+            return code
+    # of what was refused it may not be known what the drive holds now: what it held before
+    held = {e.code: e.old for e in edits if e.code in missed and e.old is not None}
+    after = {**held, **raws, **{e.code: e.new for e in edits if e.code not in missed}}
+    for low, high in limit_pairs(profile):
+        other = high if edit.code == low else low
+        if edit.code not in (low, high) or other not in missed:
+            continue
+        least, most = (
+            number_of(profile, profile[code], after[code], after) if code in after else None
+            for code in (low, high)
+        )
+        if least is not None and most is not None and least > most:
+            return other
+    return ""

@@ -1,0 +1,69 @@
+"""What became of staged edits that were written, and what is left of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from enum import StrEnum
+
+from tui.drive.settings.edits import Edit, Edits
+
+from .link_change import LinkChange
+
+
+class EditOutcome(StrEnum):
+    """What became of one edit."""
+
+    DONE = "done"
+    SENT = "sent, line changed"
+    CHANGED = "changed meanwhile"
+    NOT_TAKEN = "not taken"
+    DRIVE_REFUSED = "the drive refused"
+    REFUSED = "not written"
+    UNKNOWN = "not known"
+    NOT_SENT = "not sent"
+    HELD_BACK = "held back"
+    WAITS = "waits for an answer"
+
+
+@dataclass(frozen=True, slots=True)
+class Result:
+    """One edit with its outcome, a sentence for a person, and what the drive holds now."""
+
+    edit: Edit
+    outcome: EditOutcome
+    text: str
+    held: int | None = None
+
+    @property
+    def done(self) -> bool:
+        """Whether the drive has the new value, as far as that can be seen."""
+        return self.outcome in (EditOutcome.DONE, EditOutcome.SENT)
+
+
+@dataclass(frozen=True, slots=True)
+class Applied:
+    """What became of all edits."""
+
+    results: tuple[Result, ...]
+    left: Edits
+    """What is still staged, against the values that the drive holds now."""
+    links: tuple[LinkChange, ...] = ()
+    """What changes on the line itself, now or after a reset."""
+    after_reset: tuple[str, ...] = ()
+    """Codes whose new value is in force only once the drive was reset."""
+    unsaved: tuple[str, ...] = ()
+    """Codes whose new value is lost at power-off until the drive is told to save."""
+    stopped: str = ""
+    """Why the rest was not tried; empty where all were."""
+    waits: tuple[str, ...] = ()
+    """Codes that could be written yet, once a person says so: one before them failed."""
+
+    @property
+    def written(self) -> tuple[Result, ...]:
+        """The edits that the drive has now."""
+        return tuple(result for result in self.results if result.done)
+
+
+WriteProgress = Callable[[int, int, Result], None]
+"""Called after each edit with how many are done, how many there are, and the result."""
