@@ -109,8 +109,16 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
         editor.staging.stage("TFR", "65")
         editor.staging.stage("ACC", "4")
         editor.apply()
-        assert "1 written and read back; 1 still staged" in await written(made, editor)
+        assert "nothing written; 2 still staged" in await written(made, editor)
+        # a person is asked before the rest is written
+        assert editor.applied is not None
+        assert editor.applied.waits == ("ACC",)
+        assert made.drive.raw("ACC") == 30
+        made.session.work.outcome = None
+        editor.apply(editor.applied.waits)
+        assert "1 written and read back" in await written(made, editor)
         assert made.drive.raw("ACC") == 40
+        assert "TFR" in editor.edits
         assert made.drive.raw("TFR") == 600
 
 
