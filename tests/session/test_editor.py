@@ -118,7 +118,7 @@ async def test_a_running_motor_locks_what_needs_standstill() -> None:
         editor.apply(editor.applied.waits)
         assert "1 written and read back" in await written(made, editor)
         assert made.drive.raw("ACC") == 40
-        assert "TFR" in editor.edits
+        assert "TFR" in editor.staging.edits
         assert made.drive.raw("TFR") == 600
 
 

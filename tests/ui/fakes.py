@@ -30,7 +30,7 @@ from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.open_line import OpenLine
 from tui.session.console import DriveConsole
 from tui.session.drive import DriveSession
-from tui.session.drive_state import drive_state
+from tui.session.drive_state import DriveState, drive_state
 from tui.session.fleet import Fleet, FoundDrive
 from tui.session.journal import Journal
 from tui.session.monitor.line_watch import LineWatch, Look
@@ -198,6 +198,11 @@ class FakeLineWatch:
     alone: dict[int, TimeoutWatch] = field(default_factory=dict)
     commanded: list[DriveSession] = field(default_factory=list)
     looks: dict[int, Look] = field(default_factory=dict)
+
+    @property
+    def states(self) -> dict[int, DriveState]:
+        """The states of the looks."""
+        return {device: look.state for device, look in self.looks.items() if look.state}
 
     def watch(self, _device: int) -> TimeoutWatch | None:
         """The watch that the test gives."""

@@ -118,7 +118,7 @@ async def test_eeprom_stops_nothing_and_leads_to_where_it_is_saved() -> None:
         await typed(made, "eeprom")
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
-        await until(made.pilot, lambda: "arm" in shown(made.app, "message").lower())
+        await until(made.pilot, lambda: "Not armed" in said(made))
         assert not reports(made)
         assert writes(made.app) == []
         assert all(made.speed(device) > 2 for device in (1, 2, 3))
@@ -189,3 +189,9 @@ async def test_over_a_question_there_is_no_palette() -> None:
         made.app.action_command_palette()
         await made.pilot.pause()
         assert made.app.screen is asked
+
+
+def said(made: Bench) -> str:
+    """What was said last."""
+    newest = made.app.events.newest
+    return newest.text if newest is not None else ""

@@ -8,16 +8,21 @@ from pathlib import Path
 import pytest
 from textual.widgets import Input, OptionList
 
+from tui.drive.profile import library
+from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
+from tui.screens.parameters.results import RestQuestion, Results
 from tui.screens.parameters.screen import ParametersScreen
 
+from . import fakes
 from .fakes import press
 from .test_command_flows import Bench, bench, writes
 from .test_flows import shown, until
+from .test_parameter_pictures import editor_of, failed, panel
 
 
 @pytest.fixture(autouse=True)
@@ -38,7 +43,7 @@ async def find(made: Bench, code: str) -> None:
     """Search for a code; wait until its value is there."""
     made.app.screen.query_one("#search", Input).value = ""
     await made.pilot.press("slash", *code.lower(), "enter")
-    await until(made.pilot, lambda: f"\n {code} " in shown(made.app, "detail"))
+    await until(made.pilot, lambda: shown(made.app, "detail").startswith(f" {code} "))
     await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
 
 
@@ -68,9 +73,15 @@ async def open_file(made: Bench, file: Path) -> None:
     await made.pilot.press("enter")
 
 
+def table(made: Bench) -> str:
+    """The list with its columns pushed together."""
+    return " ".join(shown(made.app, "table").split())
+
+
 async def message(made: Bench, *parts: str) -> None:
     def said() -> str:
-        return " ".join(shown(made.app, "message").split())
+        newest = made.app.events.newest
+        return newest.text if newest is not None else ""
 
     await until(made.pilot, lambda: all(part in said() for part in parts))
 
@@ -82,8 +93,8 @@ async def test_find_edit_write_and_read_back() -> None:
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
         await made.pilot.press(*"7.53", "enter")
-        await until(made.pilot, lambda: "→ 7.5 s" in shown(made.app, "table"))
-        assert "7.53 is held as 7.5 s" in shown(made.app, "message")
+        await until(made.pilot, lambda: "→ 7.5 s" in table(made))
+        await message(made, "7.53 is held as 7.5 s")
         assert made.drive().raw("ACC") == 30
         await made.pilot.press("w")
         await message(made, "Not armed")
@@ -93,9 +104,10 @@ async def test_find_edit_write_and_read_back() -> None:
         await message(made, "1 written and read back")
         assert made.drive().raw("ACC") == 75
         await until(made.pilot, lambda: "1 not saved" in shown(made.app, "status"))
+        assert "was 3.0 s" in shown(made.app, "table")
         # after a write u stages what was held before; nothing is written by that
         await made.pilot.press("u")
-        await until(made.pilot, lambda: "→ 3.0 s" in shown(made.app, "table"))
+        await until(made.pilot, lambda: "→ 3.0 s" in table(made))
         assert made.drive().raw("ACC") == 75
 
 
@@ -112,7 +124,7 @@ async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() 
         await made.pilot.press("delete")
         assert [edit.code for edit in screen.editor.staging.edits] == ["DEC"]
         await made.pilot.press("delete")
-        assert "This parameter is not staged" in shown(made.app, "message")
+        await message(made, "This parameter is not staged")
         await made.pilot.press("u")
         await until(made.pilot, lambda: "0 staged" in shown(made.app, "status"))
         assert writes(made.app) == []
@@ -123,7 +135,7 @@ async def test_a_parameter_is_found_from_every_screen() -> None:
         for key in "2567":
             await made.pilot.press(key, "slash", *"hsp", "enter")
             await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
-            await until(made.pilot, lambda: "\n HSP " in shown(made.app, "detail"))
+            await until(made.pilot, lambda: shown(made.app, "detail").startswith(" HSP "))
         assert writes(made.app) == []
         assert made.app.chosen is not None
         assert not made.app.chosen.session.arming.armed
@@ -149,7 +161,7 @@ async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, PickValue))
         await made.pilot.press("down", "enter")
-        await until(made.pilot, lambda: "→ Fast stop" in shown(made.app, "table"))
+        await until(made.pilot, lambda: "→ Fast stop" in table(made))
         await made.pilot.press("u")
         await until(made.pilot, lambda: "0 staged" in shown(made.app, "status"))
         made.app.push_screen(EditBits(screen.editor, made.drive().profile["CMI"]))
@@ -176,9 +188,9 @@ async def test_steps_undo_all_and_selections() -> None:
         await to_parameters(made)
         await find(made, "HSP")
         await made.pilot.press("minus", "minus", "asterisk")
-        await until(made.pilot, lambda: "→ 49.8 Hz" in shown(made.app, "table"))
+        await until(made.pilot, lambda: "→ 49.8 Hz" in table(made))
         await made.pilot.press("escape", "d")
-        await until(made.pilot, lambda: "staged 1" in shown(made.app, "title"))
+        await until(made.pilot, lambda: "Staged 1 of 1" in shown(made.app, "status"))
         await made.pilot.press("U")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
@@ -205,7 +217,7 @@ async def test_leaving_with_staged_edits_asks() -> None:
         await made.pilot.press("minus", "q")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         follows = str(made.app.screen.query_one("#follows").render())
-        assert "1 staged edits are not written" in follows
+        assert "1 staged edit is not written" in follows
         await made.pilot.press("escape")
         # they stay when the screen is left and opened again
         await made.pilot.press("2")
@@ -228,7 +240,7 @@ async def test_back_up_change_compare_stage_and_write(
         made.drive().set("HSP", 400)
         await open_file(made, file)
         await message(made, "pump.toml: 2 differ")
-        await until(made.pilot, lambda: "differs 2" in shown(made.app, "title"))
+        await until(made.pilot, lambda: "Differs 1 of 2" in shown(made.app, "status"))
         await made.pilot.press("i")
         await until(made.pilot, lambda: "2 staged" in shown(made.app, "status"))
         if not isinstance(made.app.screen, ParametersScreen):
@@ -283,3 +295,113 @@ async def test_the_panel_follows_a_drive_to_its_new_address() -> None:
 def question(made: Bench) -> str:
     found = made.app.screen.query("#question")
     return str(found.first().render()) if found else ""
+
+
+@pytest.mark.parametrize(("code", "dialog"), [("ACC", EditNumber), ("STT", PickValue)])
+async def test_a_stop_of_the_drive_ends_a_dialog_that_only_stages(code: str, dialog: type) -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        screen = await to_parameters(made)
+        await find(made, code)
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, dialog))
+        await made.pilot.press("f12")
+        await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+        await made.stopped()
+        assert len(screen.editor.staging.edits) == 0
+
+
+async def test_a_value_past_another_parameters_limit_is_refused_with_its_name() -> None:
+    async with bench("atv71") as made:
+        screen = await to_parameters(made)
+        await find(made, "HSP")
+        await until(made.pilot, lambda: "TFR" in screen.editor.values.raws)
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+        await made.pilot.press(*"70", "enter")
+        assert "above TFR = 60.0 Hz" in str(made.app.screen.query_one("#held").render())
+        assert "(TFR)" in str(made.app.screen.query_one("#about").render())
+        assert isinstance(made.app.screen, EditNumber)
+        await made.pilot.press("escape")
+        assert len(screen.editor.staging.edits) == 0
+
+
+@pytest.mark.parametrize("key", ["y", "escape", "f12"])
+async def test_behind_a_failure_the_rest_is_asked_about(key: str) -> None:
+    async with bench("atv71") as made:
+        await made.running()
+        screen = await to_parameters(made)
+        await until(made.pilot, lambda: {"TFR", "ACC"} <= set(screen.editor.values.raws))
+        screen.editor.staging.stage("TFR", "65")  # at standstill only, so it fails
+        screen.editor.staging.stage("ACC", "4")
+        await made.pilot.press("a", "w")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        assert "Write 2 parameters?" in question(made)
+        await made.pilot.press("y")
+        await until(made.pilot, lambda: isinstance(made.app.screen, RestQuestion))
+        assert "Write the other parameter all the same?" in question(made)
+        assert made.drive().raw("ACC") == 30
+        await made.pilot.press(key)
+        await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+        if key == "y":
+            await until(made.pilot, lambda: made.drive().raw("ACC") == 40)
+            await until(made.pilot, lambda: "ACC" not in screen.editor.staging.edits)
+        else:
+            assert made.drive().raw("ACC") == 30
+            assert "ACC" in screen.editor.staging.edits
+        assert "TFR" in screen.editor.staging.edits
+
+
+@pytest.mark.parametrize(("stops_since", "dialog"), [(0, RestQuestion), (1, Results)])
+async def test_a_stop_since_the_writing_leaves_nothing_to_be_asked(
+    stops_since: int, dialog: type
+) -> None:
+    """Whoever comes back to the screen after a stop reads what became of it, and no more."""
+    console = editor_of(fakes.RUNNING, armed=52.0)
+    console.editor.applied = failed(console.editor)
+    app = panel(console)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.pause()
+        console.session.work.stops += stops_since
+        await app.push_screen(ParametersScreen(console))
+        await until(pilot, lambda: isinstance(app.screen, dialog))
+
+
+async def test_files_tell_their_drive_and_what_differs(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    profile, other = library.load("atv312"), library.load("atv71")
+    own = ParameterSet(SetHead("atv312", family="Altivar 312", device=1), {"ACC": 99, "HSP": 500})
+    write(Path("own.toml"), dump_set(profile, own))
+    alien = ParameterSet(SetHead("atv71", family="Altivar 71", device=3), {"ACC": 30})
+    write(Path("alien.toml"), dump_set(other, alien))
+    write(Path("none.toml"), "format = 1\n")
+    async with bench("atv312") as made:
+        screen = await to_parameters(made)
+        await until(made.pilot, lambda: {"ACC", "HSP"} <= set(screen.editor.values.raws))
+        await made.pilot.press("ctrl+o")
+        await until(made.pilot, lambda: isinstance(made.app.screen, PickFile))
+        files = made.app.screen.query_one(OptionList)
+
+        def lines() -> str:
+            return "\n".join(str(option.prompt) for option in files.options)
+
+        await until(made.pilot, lambda: "..." not in lines())
+        told = {line.split()[0]: line for line in lines().splitlines() if ".toml" in line}
+        assert "1 differs" in told["own.toml"]
+        assert "Altivar 71" in told["alien.toml"]
+        assert "other family" in told["alien.toml"]
+        assert "is no set" in told["none.toml"]
+        assert writes(made.app) == []
+
+
+async def test_a_search_looks_everywhere_and_goes_on_in_its_group() -> None:
+    async with bench("atv71") as made:
+        screen = await to_parameters(made)
+        await find(made, "RFR")  # no setting
+        assert screen.listed.shown_as(screen.editor).group == "Monitoring"
+        await made.pilot.press("escape")
+        assert screen.listed.chosen.group == "Monitoring"
+        assert screen.listed.code == "RFR"
+        assert screen.listed.count > 1

@@ -3,22 +3,27 @@
 from __future__ import annotations
 
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import pytest
-from rich.text import Text
 from textual.pilot import Pilot
+from textual.widgets import OptionList
 
+from tui.app import DrivePanelApp
 from tui.drive.profile import library
+from tui.drive.settings.parameter_set import ParameterSet, SetHead, dump_set
+from tui.screens.dialogs.now import MotorsNow
+from tui.screens.dialogs.pick_file import PickFile
+from tui.screens.parameters.detail_view import parameter_lines
+from tui.screens.parameters.edit_value import EditBits
 from tui.screens.parameters.screen import ParametersScreen
-from tui.screens.parameters.view import news_lines
 from tui.session.console import DriveConsole
 from tui.session.drive_state import DriveState
+from tui.session.events import EventLog
 from tui.session.reading import Reading
-from tui.session.settings.applied import EditOutcome, Result
+from tui.session.settings.applied import Applied, EditOutcome, Result
 from tui.session.settings.editor import Editor
 from tui.session.settings.favourites import Marks
 from tui.session.settings.watched_values import WatchedValues
@@ -26,6 +31,7 @@ from tui.session.work import Outcome as WorkOutcome
 from tui.session.work import OutcomeKind
 
 from . import fakes
+from .test_flows import until
 from .test_pictures import SIZES, Compare
 
 HELD = {
@@ -72,9 +78,26 @@ def editor_of(
     return console
 
 
+SAID: list[tuple[str, str]] = []
+"""What the prepared state has said: told to the events of its panel."""
+
+
+def panel(console: DriveConsole) -> DrivePanelApp:
+    """The panel on that drive, whose events all bear the same time."""
+    app = fakes.app_of()
+    app.opened = fakes.opened()
+    app.events = EventLog(lambda: WALL)
+    for kind, text in SAID:
+        app.events.add(kind, text, console.device)
+    SAID.clear()
+    fakes.choose(app, console)
+    return app
+
+
 def say(editor: Editor, kind: OutcomeKind, text: str) -> None:
     """Said at the moment of every fake."""
     editor.session.work.outcome = WorkOutcome(kind, text, fakes.NOW)
+    SAID.append((kind, text))
 
 
 def plain(_: Editor) -> None:
@@ -97,6 +120,49 @@ def refused(editor: Editor) -> None:
     )
     editor.staging.results = {"HSP": Result(edit, EditOutcome.DRIVE_REFUSED, text, 500)}
     say(editor, OutcomeKind.REFUSED, "2 written and read back; 1 still staged: HSP")
+
+
+def failed(editor: Editor) -> Applied:
+    """The limit was refused: what it limits is held back, the rest waits."""
+    for code, text in (("TFR", "80"), ("HSP", "75"), ("ACC", "5.0"), ("DEC", "4.0")):
+        editor.staging.stage(code, text)
+    edits = {edit.code: edit for edit in editor.staging.edits}
+    refusal = (
+        "TFR: the drive refused with exception 4, Not completed. The drive is running forward."
+        " Check whether the parameter can be written in this state."
+    )
+    results = (
+        Result(edits["TFR"], EditOutcome.DRIVE_REFUSED, refusal, 600),
+        Result(
+            edits["HSP"],
+            EditOutcome.HELD_BACK,
+            "HSP is held back: TFR, which it builds on, was not written.",
+            500,
+        ),
+        Result(edits["ACC"], EditOutcome.WAITS, "ACC is not written yet.", 30),
+        Result(edits["DEC"], EditOutcome.WAITS, "DEC is not written yet.", 30),
+    )
+    return Applied(results, editor.staging.edits, waits=("ACC", "DEC"))
+
+
+def rest(editor: Editor) -> None:
+    editor.applied = failed(editor)
+
+
+def stopped(editor: Editor) -> None:
+    applied = failed(editor)
+    editor.applied = Applied(applied.results, applied.left, stopped="a stop came")
+
+
+def written(editor: Editor) -> None:
+    done(editor)
+    for code, old in (("ACC", 50), ("DEC", 40)):
+        editor.staging.stage_raw(code, old)
+    edits = tuple(editor.staging.edits)
+    editor.staging.undo_all()
+    editor.staging.results = {e.code: Result(e, EditOutcome.DONE, "written", e.new) for e in edits}
+    for edit in edits:
+        editor.session.image.confirm(edit.code, edit.new, fakes.NOW)
 
 
 def elsewhere(editor: Editor) -> None:
@@ -124,6 +190,13 @@ FILES = (
 """Files that can be opened, the newest first."""
 STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
     "settings": (plain, fakes.READY, None, []),
+    "group": (plain, fakes.READY, None, ["tab", "right", "right"]),
+    "changed": (plain, fakes.READY, None, ["left"] * 4),
+    "rest": (rest, fakes.RUNNING, 52.0, []),
+    "results": (stopped, fakes.RUNNING, 52.0, []),
+    "written": (written, fakes.READY, 52.0, ["slash", *"acc", "enter"]),
+    "write-running": (staged, fakes.RUNNING, 52.0, ["w"]),
+    "past-a-limit": (plain, fakes.READY, 52.0, ["slash", *"hsp", "enter", "enter", *"70"]),
     "found": (plain, fakes.READY, None, ["slash", *"ramp", "enter"]),
     "nothing-found": (plain, fakes.READY, None, ["slash", *"xyz", "enter"]),
     "staged": (staged, fakes.READY, 52.0, ["slash", *"speed", "enter"]),
@@ -132,7 +205,7 @@ STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
     "not-armed": (staged, fakes.READY, None, ["w"]),
     "refused": (refused, fakes.RUNNING, 52.0, ["slash", *"hsp", "enter"]),
     "elsewhere": (elsewhere, fakes.READY, 52.0, ["slash", *"hsp", "enter"]),
-    "done": (done, fakes.READY, 52.0, ["d", "d"]),
+    "done": (done, fakes.READY, 52.0, []),
     "compared": (compared, fakes.READY, 52.0, ["d", "d"]),
     "number": (plain, fakes.READY, 52.0, ["slash", *"acc", "enter", "enter", *"5.03"]),
     "out-of-range": (plain, fakes.READY, 52.0, ["slash", *"hsp", "enter", "enter", *"9999"]),
@@ -145,33 +218,98 @@ STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
 }
 
 
-@SIZES
-@pytest.mark.parametrize("state", STATES)
-def test_parameters(
-    snap_compare: Compare,
-    state: str,
-    size: tuple[int, int],
-    monkeypatch: pytest.MonkeyPatch,
-    tmp_path: Path,
-) -> None:
-    prepare, drive, armed, keys = STATES[state]
+OTHER_SIZES = [
+    pytest.param(state, size, id=f"{size[0]}x{size[1]}-{state}")
+    for size in ((60, 20), (200, 60))
+    for state in ("settings", "staged", "number", "write-running")
+]
+
+
+@pytest.fixture(autouse=True)
+def folder(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """A folder with files: a set of this drive, one of another family, and no set."""
     monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
-    time.tzset()
     monkeypatch.chdir(tmp_path)
+    head = SetHead("atv71", family="Altivar 71", device=2, identity={"name": "PUMP 2"})
+    texts = {
+        FILES[0]: dump_set(library.load("atv71"), ParameterSet(head, {**HELD, "ACC": 60})),
+        FILES[1]: dump_set(
+            library.load("atv312"),
+            ParameterSet(SetHead("atv312", family="Altivar 312", device=3), {"ACC": 30}),
+        ),
+        FILES[2]: "",
+    }
     for age, name in enumerate(FILES):
-        (tmp_path / name).touch()
+        (tmp_path / name).write_text(texts[name], encoding="utf-8")
         os.utime(tmp_path / name, (WALL - 90_000 * age,) * 2)
+
+
+def picture(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+    """The screen in a state."""
+    prepare, drive, armed, keys = STATES[state]
     console = editor_of(drive, armed=armed)
     prepare(console.editor)
-    app = fakes.app_of()
-    app.opened = fakes.opened()
-    fakes.choose(app, console)
+    app = panel(console)
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(ParametersScreen(console))
         await pilot.pause()
         await pilot.press(*keys)
         await pilot.pause()
+        if isinstance(app.screen, PickFile):
+            files = app.screen.query_one(OptionList)
+            await until(pilot, lambda: not any("..." in str(o.prompt) for o in files.options))
+        if isinstance(app.screen, ParametersScreen):
+            app.screen.look()
+        app.draw_frame()
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+@SIZES
+@pytest.mark.parametrize("state", STATES)
+def test_parameters(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+    picture(snap_compare, state, size)
+
+
+@pytest.mark.parametrize(("state", "size"), OTHER_SIZES)
+def test_parameters_small_and_large(
+    snap_compare: Compare, state: str, size: tuple[int, int]
+) -> None:
+    picture(snap_compare, state, size)
+
+
+@SIZES
+def test_bits(snap_compare: Compare, size: tuple[int, int]) -> None:
+    console = editor_of(fakes.RUNNING, armed=52.0)
+    app = panel(console)
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(ParametersScreen(console))
+        await pilot.pause()
+        now = MotorsNow(app, [console.session])
+        app.push_screen(EditBits(console.editor, console.session.profile["CMI"], now))
+        await pilot.pause()
+        await pilot.press("down", "enter")
+        app.draw_frame()
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=show)
+
+
+@SIZES
+def test_read_only(snap_compare: Compare, size: tuple[int, int]) -> None:
+    console = editor_of(fakes.READY)
+    cast("fakes.StillLine", console.session.line).read_only = True
+    app = panel(console)
+    app.read_only = True
+
+    async def show(pilot: Pilot[None]) -> None:
+        await app.push_screen(ParametersScreen(console))
+        await pilot.pause()
+        await pilot.press("plus", "w")
+        app.draw_frame()
         await pilot.pause()
 
     assert snap_compare(app, terminal_size=size, run_before=show)
@@ -179,10 +317,7 @@ def test_parameters(
 
 @SIZES
 def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
-    console = editor_of(fakes.READY, reading=True)
-    app = fakes.app_of()
-    app.opened = fakes.opened()
-    fakes.choose(app, console)
+    app = panel(console := editor_of(fakes.READY, reading=True))
 
     async def show(pilot: Pilot[None]) -> None:
         await app.push_screen(ParametersScreen(console))
@@ -203,5 +338,5 @@ def test_another_hands_value_is_told_as_the_drive_counts_it() -> None:
     image.take({"Inr": Reading.bad(increment, 1.0, "exception 2", absent=True)})
     editor.staging.stage("ACC", "7 s")
     image.confirm("ACC", 30, 2.0)
-    said = "\n".join(line.plain for line in news_lines(editor, "ACC", Text(""), 100))
+    said = "\n".join(line.plain for line in parameter_lines(editor, "ACC", 100, 5))
     assert "it was 5.0 s" in said

@@ -11,8 +11,9 @@ from rich.cells import cell_len
 
 from tui.screens.frame import TABS, Said, said_lines
 from tui.screens.keys.table import MONITOR, PLACES
+from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
-from tui.widgets.strip import DriveNow, StripView, cut_at_word, strip_line, tabs_line
+from tui.widgets.strip import DriveNow, StripView, strip_line, tabs_line
 
 RUNS = DriveNow(
     device=2,

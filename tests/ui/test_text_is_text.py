@@ -110,13 +110,20 @@ async def parameters(made: Bench) -> None:
     await files(made)
 
 
+def told(made: Bench) -> str:
+    """What Scanner says, or what was said last."""
+    newest = made.app.events.newest
+    here = shown(made.app, "message") if made.app.screen.query("#message") else ""
+    return f"{here} {newest.text if newest else ''}"
+
+
 async def files(made: Bench) -> None:
     """A list of files whose names are markup; what is told of one that is no set names it."""
     for name in FILES:
         file = Path(name)
         write(file, "format = 1\n[drive\n")
         await open_file(made, file)
-        await until(made.pilot, lambda: name[:20] in shown(made.app, "message"))  # noqa: B023
+        await until(made.pilot, lambda: name[:20] in told(made))  # noqa: B023
         assert made.app.is_running
 
 

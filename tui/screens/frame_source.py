@@ -30,7 +30,7 @@ STOP_SHOWN = 10.0
 """Seconds for which a stop that failed stands in place of the state, though that is known."""
 LOOK_IS_OLD = 10.0
 """Seconds after which a look at a drive that no monitor watches is not its present any more."""
-WORDS = {"forward": "FORWARD", "reverse": "REVERSE"}
+DIRECTION_WORDS = {"forward": "FORWARD", "reverse": "REVERSE"}
 
 
 class FrameSource:
@@ -186,7 +186,7 @@ def _words(
     if state is None:
         return "", "reading"
     if state.kind == "running":
-        return state.kind, WORDS.get(state.direction or "", "RUNNING")
+        return state.kind, DIRECTION_WORDS.get(state.direction or "", "RUNNING")
     if state.kind == "fault":
         return state.kind, f"FAULT {state.fault.code}" if state.fault else "FAULT"
     if stands_by(console, state):

@@ -11,7 +11,7 @@ from tui.terminal.loop import soon_in_loop
 
 from .app_port import Panel
 from .dialogs.confirm import Confirm
-from .dialogs.leave import Choice, Leave
+from .dialogs.leave import Leave, LeaveChoice
 from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
@@ -83,7 +83,7 @@ class Leaving(Panel):
         head = "Once nobody asks them any more, drives act on their time-out, at rest too:"
         return [head, *found] if found else []
 
-    def _leave_motors(self, choice: Choice | None) -> None:
+    def _leave_motors(self, choice: LeaveChoice | None) -> None:
         if choice == "leave":
             self.run_worker(self._leave_running(), exclusive=True, group="leave")
         elif choice == "stop":
@@ -173,12 +173,15 @@ class Leaving(Panel):
             device, editor = console.device, console.begun_editor
             if editor is None:
                 continue
-            if count := len(editor.staging.edits):
-                told.append(f"Device {device}: {count} staged edits are not written.")
+            if len(editor.staging.edits):
+                count = len(editor.staging.edits)
+                edits = "edit is" if count == 1 else "edits are"
+                told.append(f"Device {device}: {count} staged {edits} not written.")
             if editor.unsaved:
                 count = len(editor.unsaved)
+                are, they = ("setting is", "it is") if count == 1 else ("settings are", "they are")
                 told.append(
-                    f"Device {device}: {count} written settings are not saved to EEPROM; they are"
-                    " lost at power-off."
+                    f"Device {device}: {count} written {are} not saved to EEPROM; {they} lost at"
+                    " power-off."
                 )
         return told

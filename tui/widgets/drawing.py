@@ -52,6 +52,15 @@ def cut(text: str, width: int) -> str:
     return f"{short(text, width):<{width}}"
 
 
+def cut_at_word(text: str, width: int) -> str:
+    """The text in at most so many cells, ended at a word with an ellipsis where it is longer."""
+    text = plain(text)
+    if len(text) <= width:
+        return text
+    at = text.rfind(" ", 0, width)
+    return f"{text[: at if at > width // 2 else width - 1].rstrip(' ,;:')}…"
+
+
 def wrapped(text: str, width: int, most: int) -> list[str]:
     """The text in lines of that width, at most so many."""
     if not text or most < 1:

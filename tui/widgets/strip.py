@@ -13,7 +13,7 @@ from rich.text import Text
 
 from tui.drive.plain import plain
 
-from .drawing import armed_text, cut, short
+from .drawing import armed_text, cut, cut_at_word, short
 from .drive_signs import STATE_SIGNS, age_text
 from .palette import (
     ALARM,
@@ -213,12 +213,3 @@ def said_line(when: str, said: str, style: Style, hint: str, width: int) -> Text
         text.append(key, KEY)
         text.append(f" {does}", FAINT)
     return text
-
-
-def cut_at_word(text: str, width: int) -> str:
-    """The text in at most so many cells, ended at a word with an ellipsis where it is longer."""
-    text = plain(text)
-    if len(text) <= width:
-        return text
-    at = text.rfind(" ", 0, width)
-    return f"{text[: at if at > width // 2 else width - 1].rstrip(' ,;:')}…"

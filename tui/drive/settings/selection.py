@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from ..profile.profile import Profile, is_verified, notations
-from ..profile.schema import Parameter
+from ..profile.schema import Parameter, Quantity
 from .edits import Edits
 from .writable import is_setting
 
@@ -37,6 +37,18 @@ FILTERS: tuple[FilterId, ...] = (
 )
 
 
+HOME_QUANTITIES: tuple[Quantity, ...] = ("acceleration", "high_speed", "line_address")
+"""What a person looks for first: the group of the first of them is shown at the start."""
+
+
+@dataclass(frozen=True, slots=True)
+class Choice:
+    """What a list shows: all that passes a filter, or one group of the profile."""
+
+    filter: FilterId = "all"
+    group: str = ""
+
+
 @dataclass(frozen=True, slots=True)
 class FilterContext:
     """What a filter decides by."""
@@ -51,8 +63,27 @@ class FilterContext:
     """Raw values of the parameter set that the drive is compared with."""
 
 
+def group_order(profile: Profile) -> list[str]:
+    """The profile's groups in its order, those with settings before those that are only read."""
+    settings = {p.group for p in profile.parameters if is_setting(profile, p)}
+    return sorted(profile.groups, key=lambda group: group not in settings)
+
+
+def home_group(profile: Profile) -> str:
+    """The group that a person most often looks for, as the keypad's menu of settings."""
+    found = (profile.quantity(quantity) for quantity in HOME_QUANTITIES)
+    return next((p.group for p in found if p is not None), group_order(profile)[0])
+
+
+def chosen_codes(facts: FilterContext, choice: Choice) -> list[str]:
+    """Codes of what a choice shows."""
+    if choice.group:
+        return [p.code for p in facts.profile.parameters if p.group == choice.group]
+    return rows(facts, choice.filter)
+
+
 def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
-    """Codes of what is shown: the best matches first, then in the profile's order.
+    """Codes of what is shown: the best matches first, settings among them, then by the profile.
 
     Of the recent ones the last edited comes first.
     """
@@ -62,11 +93,11 @@ def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
     if chosen == "recent":
         parameters = [p for code in facts.recent if (p := profile.get(code)) is not None]
     found = [
-        (rank, p.code)
+        (rank, bool(words) and not is_setting(profile, p), p.code)
         for p in parameters
         if passes(facts, chosen, p) and (rank := match(profile, p, words)) is not None
     ]
-    return [code for _, code in sorted(found, key=lambda pair: pair[0])]
+    return [code for *_, code in sorted(found, key=lambda one: one[:2])]
 
 
 def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool:
@@ -102,15 +133,20 @@ def not_factory(profile: Profile, parameter: Parameter, raw: int | None) -> bool
 
 
 def match(profile: Profile, parameter: Parameter, words: Collection[str]) -> int | None:
-    """How well every word is found: 0 in the code, 1 in name or address, 2 in a value's name."""
+    """How well every word is found, the best with 0; None where one is not.
+
+    0: it is the code, 1: the code begins with it, 2: in the code, 3: in name or address, 4: in
+    the group or a value's name.
+    """
     if not words:
         return 0
     code = parameter.code.casefold()
     if all(word in code for word in words):
-        return 0
+        first = next(iter(words))
+        return 0 if first == code else 1 if code.startswith(first) else 2
     text = " ".join((*notations(parameter), parameter.name)).casefold()
     left = [word for word in words if word not in text]
     if not left:
-        return 1
+        return 3
     values = " ".join((parameter.group, *profile.names(parameter).values())).casefold()
-    return 2 if all(word in values for word in left) else None
+    return 4 if all(word in values for word in left) else None

@@ -15,13 +15,13 @@ from .question import KeyQuestion, hint
 if TYPE_CHECKING:
     from .now import MotorsNow
 
-Choice = Literal["stop", "leave", "stay"]
+LeaveChoice = Literal["stop", "leave", "stay"]
 
 
-class Leave(KeyQuestion[Choice]):
+class Leave(KeyQuestion[LeaveChoice]):
     """Asks what becomes of the motors; to stop them is safe, so Enter does that too."""
 
-    NO: ClassVar[Choice] = "stay"
+    NO: ClassVar[LeaveChoice] = "stay"
     GUARDED = "enter,l"
     BINDINGS: ClassVar = [
         Binding("s,enter", "choose('stop')", show=False),
@@ -48,6 +48,6 @@ class Leave(KeyQuestion[Choice]):
                 id="hint",
             )
 
-    def action_choose(self, choice: Choice) -> None:
+    def action_choose(self, choice: LeaveChoice) -> None:
         """Give the choice back."""
         self.answer(choice)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import asyncio
 import time
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
@@ -14,16 +17,32 @@ from textual.containers import Vertical
 from textual.widgets import OptionList
 
 from tui.drive.plain import plain
-from tui.widgets.drawing import short
-from tui.widgets.palette import FAINT, PLAIN
+from tui.widgets.drawing import cut
+from tui.widgets.palette import ALARM, FAINT, PLAIN
 from tui.widgets.plain import Plain, entry
 
 from .question import KeyQuestion, hint
 
 FILES_LISTED = 200
 """Files that are listed at most, the newest."""
-WIDTH = 60
+NAME_WIDTH, DRIVE_WIDTH, TOLD_WIDTH = 24, 15, 14
+"""Columns of a file; between name and drive stand its date and time."""
 SUFFIX = ".toml"
+
+
+@dataclass(frozen=True, slots=True)
+class FileAbout:
+    """What a file is, found by reading it."""
+
+    drive: str = ""
+    told: str = ""
+    """How it compares with what is open, in two or three words."""
+    alarm: bool = False
+    """Whether it is of another family, or no file of the kind."""
+
+
+FileReader = Callable[[Path], FileAbout]
+"""Reads a file; called in a thread of its own, as a disk may hang."""
 
 
 class PickFile(KeyQuestion[str | None]):
@@ -31,25 +50,48 @@ class PickFile(KeyQuestion[str | None]):
 
     BINDINGS: ClassVar = [Binding("enter", "pick", show=False)]
 
-    def __init__(self, question: str, others: Sequence[tuple[str, str]], folders: Iterable[Path]):
-        """`others` are choices beside files: the answer, and how it reads."""
+    def __init__(
+        self,
+        question: str,
+        others: Sequence[tuple[str, str]],
+        folders: Iterable[Path],
+        about: FileReader | None = None,
+    ) -> None:
+        """`others` are choices beside files: the answer, and how it reads.
+
+        With `about` each file is read once the list stands, one after another, the last first.
+        """
         super().__init__()
         self._question = question
-        found = [*files_in(folders)]
-        self._answers = [answer for answer, _ in others] + [str(path) for path in found]
-        self._lines = [Text(f" {text}", PLAIN) for _, text in others]
-        self._lines += [_line(path) for path in found]
-        self._files = len(found)
+        self._found = [*files_in(folders)]
+        self._about = about
+        self._others = [Text(f" {text}", PLAIN) for _, text in others]
+        self._answers = [answer for answer, _ in others] + [str(path) for path in self._found]
 
     def dialog(self) -> ComposeResult:
         """The list and its keys."""
+        waiting = FileAbout(told="...") if self._about is not None else FileAbout()
+        lines = [*self._others, *(file_line(path, waiting) for path in self._found)]
         with Vertical(id="dialog"):
             yield Plain(self._question, id="question")
-            entries = (entry(line, id=str(at)) for at, line in enumerate(self._lines))
+            entries = (entry(line, id=str(at)) for at, line in enumerate(lines))
             yield OptionList(*entries, id="choices", compact=True)
-            if not self._files:
+            if not self._found:
                 yield Plain(f"No {SUFFIX} file in this folder, nor where backups are kept.")
             yield Plain(hint(("Enter", "opens it"), ("Esc or q", "opens nothing")), id="hint")
+
+    def on_mount(self) -> None:
+        """The last file is the one at hand; what the files are is found out meanwhile."""
+        if self._found:
+            self.query_one(OptionList).highlighted = len(self._others)
+        if self._about is not None:
+            self.run_worker(self._tell_files(self._about), exclusive=True)
+
+    async def _tell_files(self, about: FileReader) -> None:
+        for at, path in enumerate(self._found, start=len(self._others)):
+            told = await asyncio.to_thread(about, path)
+            for options in self.query("#choices").results(OptionList):
+                options.replace_option_prompt_at_index(at, file_line(path, told))
 
     def on_option_list_option_selected(self) -> None:
         """Enter in the list."""
@@ -75,11 +117,15 @@ def files_in(folders: Iterable[Path]) -> list[Path]:
     return sorted(found, key=lambda path: -found[path])[:FILES_LISTED]
 
 
-def _line(path: Path) -> Text:
-    text = Text(f" {short(plain(path.name), WIDTH - 20):<{WIDTH - 20}}", PLAIN, no_wrap=True)
+def file_line(path: Path, about: FileAbout) -> Text:
+    """A file with its date and what is known of it."""
+    text = Text(f" {cut(plain(path.name), NAME_WIDTH)} ", PLAIN, no_wrap=True)
     try:
         when = time.strftime("%Y-%m-%d %H:%M", time.localtime(path.stat().st_mtime))
     except OSError:
         when = ""
-    text.append(f" {when}", FAINT)
+    text.append(f"{when:<16} ", FAINT)
+    style: Style = ALARM if about.alarm else PLAIN
+    text.append(f"{cut(about.drive, DRIVE_WIDTH)} ", FAINT)
+    text.append(cut(about.told, TOLD_WIDTH), style)
     return text

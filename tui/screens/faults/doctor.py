@@ -14,7 +14,7 @@ from tui.drive.profile.schema import FaultCode, FaultHelp, LookAt, Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.monitor.fault_record import FaultRecord
 from tui.session.reading import Reading
-from tui.widgets.drawing import cut, wrapped
+from tui.widgets.drawing import cut, cut_at_word, wrapped
 from tui.widgets.palette import (
     CURSOR,
     FAINT,
@@ -25,7 +25,6 @@ from tui.widgets.palette import (
     STALE,
     STRONG,
 )
-from tui.widgets.strip import cut_at_word
 
 LABEL = 13
 """Columns of the headings at the left."""

@@ -12,10 +12,9 @@ from tui.bus.api import Frame
 from tui.bus.link import TcpLink
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
-from tui.widgets.drawing import cut, rule, short
+from tui.widgets.drawing import cut, cut_at_word, rule, short
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
-from tui.widgets.strip import cut_at_word
 from tui.wire.frames import hex_text
 
 from ..base import PanelScreen

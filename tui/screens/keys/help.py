@@ -27,16 +27,18 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
     ("12s", "amber", "an old value, with its age in place of its unit"),
     ("│", "white", "on a bar: the reference"),
     ("●", "white", "a bit that is 1"),
-    ("●2", "cyan", "so many edits or slots are staged and not written"),
-    ("S", "amber", "settings were written that are lost at power-off until S keeps them"),
+    ("● 2", "cyan", "behind Parameters or Scanner: so much is staged, not yet written"),
+    ("■", "amber", "of a setting: not its factory value"),
+    ("S", "amber", "of a setting: lost when the drive is off, until S keeps it in its EEPROM"),
+    ("R", "amber", "of a setting: in force only after a reset of the drive"),
 )
 WITHOUT_KEY = "^p"
 """Where an action without a key of its own is found: in the list of all."""
 HELP_STYLES = {
+    "cyan": ATTENTION,
     "green": RUNNING,
     "red": FAULT,
     "amber": ALARM,
-    "cyan": ATTENTION,
     "grey": FAINT,
     "white": PLAIN,
 }

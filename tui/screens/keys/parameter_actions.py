@@ -9,8 +9,9 @@ KEEP = "Confirm an unverified parameter, or keep an edit over another's change."
 PARAMETER_ACTIONS = on(
     (PARAMETERS,),
     ("edit", "enter", "edit", "Edit the parameter under the cursor."),
+    ("step_value(1)", "+", "step", "Stage one step more."),
     ("write", "w", "write", "Write all that is staged, each read back; armed, asks."),
-    ("filter(1)", "d", "show", "Show another selection: staged, all, and more."),
+    ("filter(1)", "d", "", "Show another selection: staged, all, and more."),
     ("filter(-1)", "D", "", "The selection before."),
     ("undo", "u", "", "Take the last edit back; after a write, stage the old values."),
     ("undo_all", "U", "", "Take every edit back; asks."),
@@ -23,7 +24,6 @@ PARAMETER_ACTIONS = on(
     ("end(1)", "end", "", "The last parameter."),
     ("group(1)", "tab,right", "", "The next group."),
     ("group(-1)", "shift+tab,left", "", "The group before."),
-    ("step_value(1)", "+", "", "Stage one step more."),
     ("step_value(-1)", "-", "", "Stage one step less."),
     ("undo_this", "delete", "", "Take the edit under the cursor back."),
     ("favourite", "*", "", "Mark as a favourite, or no more."),

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from decimal import Decimal, InvalidOperation
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
@@ -14,14 +14,18 @@ from textual.widgets import Input, OptionList
 
 from tui.drive.errors import DriveError
 from tui.drive.profile.schema import Parameter
+from tui.drive.settings.in_force import limit_passed
 from tui.drive.values import encode
-from tui.screens.parameters.view import factory_text, range_text, value_text
 from tui.session.settings.editor import Editor
 from tui.widgets.fields import NumberInput
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.widgets.plain import Plain, entry
 
 from ..dialogs.question import KeyQuestion, Question, hint
+from .value_text import factory_text, limits_now, step_text, value_text
+
+if TYPE_CHECKING:
+    from ..dialogs.now import MotorsNow
 
 STAGES_NOTHING = ("Esc", "stages nothing")
 
@@ -36,8 +40,8 @@ class EditNumber(Question[str | None]):
         Binding("pagedown", "step(-10)", "ten steps down", show=False),
     ]
 
-    def __init__(self, editor: Editor, parameter: Parameter) -> None:
-        super().__init__()
+    def __init__(self, editor: Editor, parameter: Parameter, now: MotorsNow | None = None) -> None:
+        super().__init__(now)
         self._editor, self._parameter = editor, parameter
 
     def dialog(self) -> ComposeResult:
@@ -46,16 +50,14 @@ class EditNumber(Question[str | None]):
         staged = editor.staging.edits.get(parameter.code)
         raw = staged.new if staged else editor.values.raws.get(parameter.code)
         value = editor.values.value(parameter.code, raw) if raw is not None else None
-        limits, factory = range_text(editor, parameter), factory_text(editor, parameter)
         with Vertical(id="dialog"):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
+            yield from self.now_lines()
             yield NumberInput(value.text if value else "", id="answer", select_on_focus=True)
             yield Plain("", id="held")
-            about = [f"now {value_text(editor, parameter.code)}"]
-            about += [f"range {limits}"] if limits else []
-            about += [f"factory {factory}"] if factory else []
-            yield Plain("   ".join(about), id="about")
-            keys = (("Enter", "stages it"), ("Up Down", "one step"), STAGES_NOTHING)
+            yield Plain(about_number(editor, parameter), id="about")
+            steps = (("Up Down", "step"), ("PgUp PgDn", "ten"))
+            keys = (("Enter", "stages it"), *steps, STAGES_NOTHING)
             yield Plain(hint(*keys), id="hint")
 
     def on_mount(self) -> None:
@@ -77,6 +79,11 @@ class EditNumber(Question[str | None]):
             )
         except DriveError as refused:
             held.update(Text(str(refused), ALARM))
+            return False
+        if past := limit_passed(
+            editor.session.profile, editor.staging.edits, edits, editor.values.raws
+        ):
+            held.update(Text(past, ALARM))
             return False
         edit = edits.get(parameter.code)
         if edit is None:
@@ -112,11 +119,23 @@ class EditNumber(Question[str | None]):
             self.answer(event.value.strip())
 
 
+def about_number(editor: Editor, parameter: Parameter) -> str:
+    """What a number may be: held, staged, as it left the factory; limits in force, the step."""
+    now = f"drive holds {value_text(editor, parameter.code)}"
+    edit, factory = editor.staging.edits.get(parameter.code), factory_text(editor, parameter)
+    told = [now, *([f"staged {edit.text}"] if edit else [])]
+    told += [f"factory {factory}"] if factory else []
+    limits = limits_now(editor, parameter, staged=True)
+    bounds = f"limits {limits.text}" if limits and limits.text else "limits not documented"
+    step = step_text(editor, parameter)
+    return f"{'   '.join(told)}\n{bounds}{f'   one step {step}' if step else ''}"
+
+
 class PickValue(KeyQuestion[int | None]):
     """One of the names of an enumeration."""
 
-    def __init__(self, editor: Editor, parameter: Parameter) -> None:
-        super().__init__()
+    def __init__(self, editor: Editor, parameter: Parameter, now: MotorsNow | None = None) -> None:
+        super().__init__(now)
         self._editor, self._parameter = editor, parameter
         self._names = sorted(editor.session.profile.names(parameter).items())
 
@@ -124,6 +143,7 @@ class PickValue(KeyQuestion[int | None]):
         """The list with the held value marked."""
         with Vertical(id="dialog"):
             yield Plain(f"{self._parameter.code}  {self._parameter.name}", id="question")
+            yield from self.now_lines()
             yield OptionList(
                 *(entry(self._line(raw, name)) for raw, name in self._names),
                 id="choices",
@@ -161,8 +181,8 @@ class EditBits(KeyQuestion[int | None]):
         Binding("s", "take", "stage", show=False),
     ]
 
-    def __init__(self, editor: Editor, parameter: Parameter) -> None:
-        super().__init__()
+    def __init__(self, editor: Editor, parameter: Parameter, now: MotorsNow | None = None) -> None:
+        super().__init__(now)
         self._parameter = parameter
         staged = editor.staging.edits.get(parameter.code)
         held = editor.values.raws.get(parameter.code, 0)
@@ -174,6 +194,7 @@ class EditBits(KeyQuestion[int | None]):
         parameter = self._parameter
         with Vertical(id="dialog"):
             yield Plain(f"{parameter.code}  {parameter.name}", id="question")
+            yield from self.now_lines()
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="held")
             keys = (("Enter", "turns a bit"), ("s", "stages the word"), STAGES_NOTHING)
@@ -211,12 +232,14 @@ class EditBits(KeyQuestion[int | None]):
 Dialog = EditNumber | PickValue | EditBits
 
 
-def dialog_for(editor: Editor, parameter: Parameter) -> Callable[[], Dialog]:
-    """The dialog that fits a parameter."""
+def dialog_for(
+    editor: Editor, parameter: Parameter, now: MotorsNow | None = None
+) -> Callable[[], Dialog]:
+    """The dialog that fits a parameter; a stop of the drives of `now` ends it."""
     from tui.drive.values import is_enumeration
 
     if parameter.bits:
-        return lambda: EditBits(editor, parameter)
+        return lambda: EditBits(editor, parameter, now)
     if is_enumeration(parameter):
-        return lambda: PickValue(editor, parameter)
-    return lambda: EditNumber(editor, parameter)
+        return lambda: PickValue(editor, parameter, now)
+    return lambda: EditNumber(editor, parameter, now)

@@ -19,8 +19,8 @@ class ParameterKeys(ArmingKeys):
         self.console = console
         self.session = console.session
         self.listed = ParameterList()
-        self.remark = ""
-        """What a key has come to, until the cursor moves."""
+        self.reading = ""
+        """How far the reading for a file or a comparison is; empty while there is none."""
 
     @property
     def editor(self) -> Editor:
@@ -34,10 +34,14 @@ class ParameterKeys(ArmingKeys):
             self.look()
 
     def note(self, text: str) -> None:
-        """Say something in the line of messages, in place of what work has come to."""
-        self.passed = self.editor.said
-        self.remark = text
-        self.look()
+        """Say what a key has come to."""
+        self._add("told", text)
 
     def _refuse(self, text: str) -> None:
-        self.note(text)
+        """Say why something was not done."""
+        self._add("refused", text)
+
+    def _add(self, kind: str, text: str) -> None:
+        if text:
+            self.app.events.add(kind, text, self.session.device)
+        self.look()

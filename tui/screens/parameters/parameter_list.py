@@ -5,24 +5,41 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from tui.drive.settings.selection import FILTERS, FilterContext, FilterId, rows
-from tui.screens.parameters.view import TableLine, items_of
+from tui.drive.settings.selection import (
+    FILTERS,
+    Choice,
+    FilterContext,
+    FilterId,
+    chosen_codes,
+    group_order,
+    home_group,
+    rows,
+)
 from tui.session.settings.editor import Editor
 
-USUAL: FilterId = "settings"
-"""The selection that the screen begins with and Esc comes back to."""
+from .group_view import GroupEntry
+from .table_view import TableLine, items_of
+
+FIRST: tuple[FilterId, ...] = ("not factory", "favourites", "staged", "unsaved")
+"""Filters that stand above the groups; behind a comparison `differs` stands there too."""
+LAST: tuple[FilterId, ...] = ("recent", "unverified", "read-only", "settings", "all")
+"""Filters below the groups."""
 
 
 @dataclass(slots=True)
 class ParameterList:
     """Lines of parameters and headings; the cursor is on a parameter, where there is one."""
 
-    chosen: FilterId = USUAL
+    chosen: Choice = field(default_factory=Choice)
+    searched: bool = False
+    """Whether it shows what was found in place of what was chosen."""
     items: Sequence[TableLine] = field(default_factory=list)
     at: int = 0
     """The line of the cursor."""
     top: int = 0
     """The first line that is shown."""
+    groups: Sequence[str] = ()
+    home: str = ""
 
     @property
     def code(self) -> str:
@@ -34,11 +51,31 @@ class ParameterList:
         """How many parameters there are."""
         return sum(1 for item in self.items if item.code)
 
+    @property
+    def place(self) -> int:
+        """The how many-th parameter is under the cursor, from 1."""
+        return sum(1 for item in self.items[: self.at + 1] if item.code)
+
+    def shown_as(self, editor: Editor) -> Choice:
+        """The choice that is marked: of what was found, the group of that under the cursor."""
+        if self.searched and self.code:
+            return Choice(group=editor.session.profile[self.code].group)
+        return self.chosen
+
     def fill(self, editor: Editor, search: str) -> None:
         """Make the list anew; the cursor stays on its parameter where that is still in it."""
-        before = self.code
-        codes = rows(editor.facts, self.chosen, search)
-        headings = not search and self.chosen in ("all", USUAL)
+        profile, before = editor.session.profile, self.code
+        if not self.groups:
+            self.groups, self.home = group_order(profile), home_group(profile)
+            self.chosen = Choice(group=self.home)
+        if self.searched and not search and before and self.chosen.group:
+            # where the search has led to is where the list goes on
+            self.chosen = Choice(group=profile[before].group)
+        self.searched = bool(search.split())
+        facts = editor.facts
+        codes = rows(facts, "all", search) if self.searched else chosen_codes(facts, self.chosen)
+        headings = not self.searched and self.chosen.filter in ("all", "settings")
+        headings = headings and not self.chosen.group
         self.items = items_of(editor, codes, headings=headings)
         found = [at for at, item in enumerate(self.items) if item.code and item.code == before]
         self.at = found[0] if found else self._first_row(0, 1)
@@ -47,14 +84,46 @@ class ParameterList:
         """Forget the parameter under the cursor: the next filling chooses its first."""
         self.at = len(self.items)
 
+    def entries(self, facts: FilterContext) -> list[GroupEntry]:
+        """The lines of the column at the left."""
+        # not by the rows themselves: this is drawn four times a second
+        known = sum(facts.profile.get(code) is not None for code in facts.favourites)
+        counts = {"favourites": known, "staged": len(facts.edits), "unsaved": len(facts.unsaved)}
+        counts["not factory"] = len(rows(facts, "not factory"))
+        first = [GroupEntry(Choice(one), counts[one], pinned=True) for one in FIRST]
+        if facts.other:
+            first.append(GroupEntry(Choice("differs"), len(rows(facts, "differs")), pinned=True))
+        groups = [GroupEntry(Choice(group=group)) for group in self.groups]
+        return [*first, *groups, *(GroupEntry(Choice(one)) for one in LAST)]
+
+    def choose(self, choice: Choice) -> None:
+        """Show something else; the next filling does it."""
+        self.chosen, self.searched = choice, False
+        self.best()
+
+    def go_home(self) -> None:
+        """Back to the group that the screen begins with."""
+        self.choose(Choice(group=self.home))
+
     def choose_next(self, facts: FilterContext, step: int) -> None:
-        """The next or previous selection that shows anything."""
-        at = FILTERS.index(self.chosen)
+        """The next or previous filter that shows anything."""
+        at = FILTERS.index("settings" if self.chosen.group else self.chosen.filter)
         for _ in FILTERS:
             at = (at + step) % len(FILTERS)
             if rows(facts, FILTERS[at]):
                 break
-        self.chosen = FILTERS[at]
+        self.choose(Choice(FILTERS[at]))
+
+    def group(self, editor: Editor, step: int) -> None:
+        """The next or previous line of the column at the left that shows anything."""
+        entries = self.entries(editor.facts)
+        marked = self.shown_as(editor)
+        at = next((n for n, entry in enumerate(entries) if entry.choice == marked), 0)
+        for _ in entries:
+            at = (at + step) % len(entries)
+            if chosen_codes(editor.facts, entries[at].choice):
+                break
+        self.choose(entries[at].choice)
 
     def move_to(self, at: int, step: int) -> None:
         """The cursor on this line, or the nearest parameter in the direction of `step`."""
@@ -71,14 +140,6 @@ class ParameterList:
     def end(self, to: int) -> None:
         """The first parameter for a negative number, else the last."""
         self.move_to(0 if to < 0 else len(self.items) - 1, -to)
-
-    def group(self, step: int) -> None:
-        """The first parameter of the next or previous group; stays where there is none."""
-        heads = [at for at, item in enumerate(self.items) if item.group]
-        own = max((at for at in heads if at < self.at), default=0)
-        nearest = [at for at in heads if (at > self.at if step > 0 else at < own)]
-        if nearest:
-            self.move_to((nearest[0] if step > 0 else nearest[-1]) + 1, 1)
 
     def window(self, room: int) -> Sequence[TableLine]:
         """The lines that fit, the cursor's among them, with the heading just above it."""

@@ -6,31 +6,31 @@ from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
-from textual.containers import Horizontal
+from textual.containers import Horizontal, Vertical
 from textual.widgets import Input
 
-from tui.screens.parameters.view import (
-    head_line,
-    news_lines,
+from tui.drive.settings.in_force import limits_in_force
+from tui.screens.parameters.detail_view import (
+    SHORT,
+    TALL,
+    TALL_FROM,
     parameter_lines,
-    row_line,
     status_line,
 )
-from tui.widgets.drawing import rule
+from tui.screens.parameters.group_view import FILTER_LABELS, group_lines
+from tui.screens.parameters.table_view import head_line, row_line
 from tui.widgets.fields import Field
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, ATTENTION, FAINT, STRONG
+from tui.widgets.palette import FAINT, KEY
+from tui.widgets.plain import Plain
 
-from ..command.news import news
 from ..keys.table import PARAMETERS, bindings
-from .parameter_list import USUAL
 from .set_keys import SetKeys
 from .stage_keys import StageKeys
 from .write_keys import WriteKeys
 
-LINES_BELOW_TABLE = 9
-"""Lines below the table: four of detail, three of news, the status and the keys."""
-ABOVE = 2
+NARROW, WIDE = 72, 110
+"""Columns below which there is no column of groups, and from which it is wider."""
 
 
 class ParametersScreen(StageKeys, WriteKeys, SetKeys):
@@ -43,15 +43,18 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     AUTO_FOCUS = ""
 
     def body(self) -> ComposeResult:
-        """The search above, the table, the details below."""
-        with Horizontal(id="top"):
-            yield Lines(id="title")
-            yield Field(placeholder="/ search", id="search")
-        yield Lines(id="head")
-        yield Lines(id="table")
-        yield Lines(id="detail")
-        yield Lines(id="message")
+        """The groups at the left, under the search; the list; the parameter under the cursor."""
+        with Horizontal(id="middle"):
+            with Vertical(id="left"):
+                with Horizontal(id="find"):
+                    yield Plain(Text(" / ", KEY), id="slash")
+                    yield Field(placeholder="search", id="search")
+                yield Lines(id="groups")
+            with Vertical(id="right"):
+                yield Lines(id="columns")
+                yield Lines(id="table")
         yield Lines(id="status")
+        yield Lines(id="detail")
 
     def on_mount(self) -> None:
         """Begin to read."""
@@ -65,77 +68,95 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     @property
     def _room(self) -> int:
-        return max(3, self.size.height - ABOVE - LINES_BELOW_TABLE)
+        return max(1, self.query_one("#table").size.height)
 
     def draw(self, width: int) -> None:
-        """The lines around the cursor, what is known of the one under it, and the news."""
+        """The groups, the lines around the cursor, and what is known of the one under it."""
         super().draw(width)
-        editor, room = self.editor, self._room
+        self.set_class(width < NARROW, "narrow")
+        self.set_class(width >= WIDE, "wide")
+        self.set_class(self.size.height >= TALL_FROM, "tall")
         self.offer_to_follow()
-        shown = self.listed.window(room)
+        self.show_results()
+        editor, code = self.editor, self.listed.code
+        shown = self.listed.window(self._room)
         editor.values.visible = tuple(item.code for item in shown if item.code)
+        if code:
+            limits = limits_in_force(
+                self.session.profile, self.session.profile[code], editor.values.raws
+            )
+            extra = (limits.low_by, limits.high_by) if limits is not None else ()
+            editor.values.visible += tuple(one for one in extra if one)
+        columns = self.query_one("#table").size.width
         table = [
-            row_line(editor, item, width, chosen=place == self.listed.at)
+            row_line(editor, item, columns, chosen=place == self.listed.at)
             for place, item in enumerate(shown, start=self.listed.top)
         ]
         self.put("table", table or [Text(self._empty(), FAINT)])
-        self.put("title", [self._title()])
         other = editor.other_label  # a file keeps its name as it is
-        self.put("head", [head_line(width, "Factory" if other == "factory" else other)])
-        code = self.listed.code
-        detail = parameter_lines(editor, code, width) if code else []
-        self.put("detail", [rule("", width), *detail])
-        self.put("message", news_lines(editor, code, self._message(), width))
-        self.put("status", [status_line(editor, self.commander.armed_for, width)])
+        self.put("columns", [head_line(columns, "Factory" if other == "factory" else other)])
+        self._draw_groups()
+        self.put("status", [status_line(editor, self._where(), width)])
+        height = TALL if self.size.height >= TALL_FROM else SHORT
+        self.put("detail", parameter_lines(editor, code, width, height) if code else [])
 
-    def _title(self) -> Text:
-        done, count = self.editor.values.progress
-        text = Text(no_wrap=True)
-        text.append(f" {self.session.profile.name} · device {self.session.device}", STRONG)
-        style = FAINT if self.listed.chosen == USUAL else ATTENTION
-        text.append(f" · {self.listed.chosen} {self.listed.count}", style)
-        if done < count:
-            text.append(f"   read {done} of {count}", FAINT)
-        return text
+    def _draw_groups(self) -> None:
+        place = self.query_one("#groups")
+        if place.size.height:
+            entries = self.listed.entries(self.editor.facts)
+            marked = self.listed.shown_as(self.editor)
+            lines = group_lines(entries, marked, place.size.width, place.size.height)
+            self.put("groups", lines)
+
+    def _where(self) -> str:
+        """What is listed, and where the cursor is in it."""
+        listed = self.listed
+        if self.reading:
+            return self.reading
+        name = listed.chosen.group or FILTER_LABELS[listed.chosen.filter]
+        if listed.searched:
+            name = "found"
+        return f"{name} {listed.place} of {listed.count}" if listed.count else f"{name} 0"
 
     def _empty(self) -> str:
         if self.query_one("#search", Input).value:
-            return " Nothing is called so. Esc clears the search, d shows another selection."
-        return f" No parameter is {self.listed.chosen}. d shows another selection."
-
-    def _message(self) -> Text:
-        editor = self.editor
-        now = self.app.clock.monotonic()
-        told = news(editor.said, now, busy=editor.busy, passed=self.passed)
-        return Text(*told) if told else Text(self.remark or editor.values.trouble, ALARM)
+            return " Nothing is called so. Esc clears the search."
+        return " Nothing here. Tab chooses another group."
 
     # Keys that move
-
-    def _moved(self) -> None:
-        self.remark = ""
-        self.look()
 
     def action_move(self, lines: int) -> None:
         """Up or down."""
         self.listed.move(lines)
-        self._moved()
+        self.look()
 
     def action_page(self, pages: int) -> None:
         """A screen up or down."""
-        self.listed.move(pages * (self._room - 1))
-        self._moved()
+        self.listed.move(pages * max(1, self._room - 1))
+        self.look()
 
     def action_end(self, to: int) -> None:
         """The first or the last."""
         self.listed.end(to)
-        self._moved()
-
-    def action_group(self, step: int) -> None:
-        """The first parameter of the next or previous group."""
-        self.listed.group(step)
-        self._moved()
+        self.look()
 
     # Keys that choose what is listed
+
+    def action_group(self, step: int) -> None:
+        """The next or previous group, or one of the selections above and below them."""
+        self.listed.group(self.editor, step)
+        self._clear_search()
+
+    def action_filter(self, step: int) -> None:
+        """The next selection that shows anything."""
+        self.listed.choose_next(self.editor.facts, step)
+        self._clear_search()
+
+    def _clear_search(self) -> None:
+        search = self.query_one("#search", Input)
+        with search.prevent(Input.Changed):
+            search.value = ""
+        self.list_again()
 
     def action_search(self) -> None:
         """Into the search."""
@@ -143,26 +164,22 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
 
     def on_input_changed(self) -> None:
         """Search as one types; the best match is chosen."""
-        self.listed.best()
+        if self.query_one("#search", Input).value:
+            self.listed.best()
         self.list_again()
 
     def on_input_submitted(self) -> None:
         """Back to the table."""
         self.set_focus(None)
 
-    def action_filter(self, step: int) -> None:
-        """The next selection that shows anything."""
-        self.listed.choose_next(self.editor.facts, step)
-        self.list_again()
-
     def action_leave(self) -> None:
         """Out of the search, then out of a selection, then back to Monitor."""
         search = self.query_one("#search", Input)
         if search.has_focus or search.value:
-            search.value = ""
             self.set_focus(None)
-        elif self.listed.chosen != USUAL:
-            self.listed.chosen = USUAL
+            self._clear_search()
+        elif not self.listed.chosen.group:
+            self.listed.go_home()
             self.list_again()
         else:
             self.app.pop_screen()

@@ -10,12 +10,15 @@ from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
+from tui.drive.settings.selection import Choice
 
 from ..dialogs.files import fault_of_new
 from .parameter_keys import ParameterKeys
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
+
+    from ..dialogs.pick_file import FileAbout
 
 
 class SetKeys(ParameterKeys):
@@ -67,7 +70,7 @@ class SetKeys(ParameterKeys):
         from tui.session.read.upload import Upload
 
         def progress(done: int, count: int) -> None:
-            self.note(f"Reading for {path.name}: {done} of {count}")
+            self._tell_reading(f"{path.name}: {done} of {count}")
 
         upload = Upload(self.session, progress=progress)
         try:
@@ -76,11 +79,17 @@ class SetKeys(ParameterKeys):
             # the disk may hang
             await asyncio.to_thread(lambda: write_file(path, text(values)))
         except (LineError, DriveError) as error:
-            self.note(f"No file: {error}")
+            self._refuse(f"No file: {error}")
         else:
             bad = len(upload.absent)
             without = f"; {bad} the drive does not tell" if bad else ""
             self.note(f"{len(upload.raws)} parameters{without}: {path}")
+        finally:
+            self._tell_reading("")
+
+    def _tell_reading(self, text: str) -> None:
+        self.reading = text
+        self.look()
 
     # Compare
 
@@ -102,7 +111,15 @@ class SetKeys(ParameterKeys):
             if one is not self.console
         ]
         question = "Compare with; what it has otherwise can be staged"
-        self.app.push_screen(PickFile(question, others, [Path.cwd(), state_folder()]), told)
+        folders = [Path.cwd(), state_folder()]
+        profile, raws = self.session.profile, dict(self.editor.values.raws)
+
+        def about(path: Path) -> FileAbout:
+            from .set_about import about_set
+
+            return about_set(path, profile, raws)
+
+        self.app.push_screen(PickFile(question, others, folders, about), told)
 
     async def _compare(self, text: str) -> None:
         editor = self.editor
@@ -111,7 +128,7 @@ class SetKeys(ParameterKeys):
         try:
             if typed.casefold() == "factory":
                 editor.other, editor.other_label = {}, "factory"
-                self.note("Compared with the factory settings; d shows what differs.")
+                self.note("Compared with the factory settings: Changed lists what differs.")
                 return
             if typed.isdecimal():
                 await self._compare_drive(int(typed))
@@ -120,7 +137,9 @@ class SetKeys(ParameterKeys):
             if editor.source is not None:
                 await self._look_at_source()
         except (LineError, DriveError) as error:
-            self.note(str(error))
+            self._refuse(str(error))
+        finally:
+            self._tell_reading("")
 
     async def _compare_file(self, name: str) -> None:
         from tui.drive.settings.set_file import read_set
@@ -139,7 +158,7 @@ class SetKeys(ParameterKeys):
         other = found.session
 
         def progress(done: int, count: int) -> None:
-            self.note(f"Reading device {device}: {done} of {count}")
+            self._tell_reading(f"reading drive {device}: {done} of {count}")
 
         upload = Upload(other, setting_codes(other.profile), progress)
         await upload.run()
@@ -150,18 +169,19 @@ class SetKeys(ParameterKeys):
         """Read the drive's settings, and tell what would be staged and what left out."""
         editor = self.editor
         assert editor.source is not None
-        self.note("Reading the settings to compare")
+        self._tell_reading("reading the settings")
         plan = await editor.plan()
         same_family = editor.source.head.profile == self.session.profile.id
         editor.other = dict(editor.source.raws) if same_family else plan_values(plan)
         if not editor.other:
             editor.other = {"": 0}
         writes, skips = plan.count("write"), plan.count("skip")
+        differ = "differs" if writes == 1 else "differ"
         self.note(
-            f"{editor.other_label}: {writes} differ and can be staged (i), {plan.count('equal')}"
+            f"{editor.other_label}: {writes} {differ} and can be staged (i), {plan.count('equal')}"
             f" are equal, {skips} left out."
         )
-        self.listed.chosen = "differs"
+        self.listed.choose(Choice("differs"))
         self.list_again()
 
     def action_stage_set(self) -> None:
@@ -178,11 +198,11 @@ class SetKeys(ParameterKeys):
         try:
             plan = await editor.plan()
         except (LineError, DriveError) as error:
-            self.note(str(error))
+            self._refuse(str(error))
             return
         editor.staging.take_plan(plan)
         left = [item for item in plan.of_kind("skip") if item.reason != "no setting"]
-        self.note(f"{len(plan.edits)} staged from {editor.other_label}; w writes them.")
+        self.note(f"{len(plan.edits)} staged from {editor.other_label}; w writes all.")
         if left:
             self.app.push_screen(Skipped(len(plan.edits), editor.other_label, left))
 

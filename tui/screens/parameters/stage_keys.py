@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from tui.drive.errors import DriveError
+from tui.drive.settings.in_force import limit_passed
+from tui.session.settings.editor import Editor
 
 from .parameter_keys import ParameterKeys
 
@@ -22,7 +24,9 @@ class StageKeys(ParameterKeys):
             if answer is not None:
                 self._stage(code, answer)
 
-        dialog = dialog_for(self.editor, self.session.profile[code])()
+        # a stop of the drive ends the dialog too: it is about its motor, whatever it stages
+        now = self.motor_now()
+        dialog = dialog_for(self.editor, self.session.profile[code], now)()
         self.app.push_screen(dialog, told)
 
     def _may_edit(self, code: str) -> bool:
@@ -31,24 +35,29 @@ class StageKeys(ParameterKeys):
         if refused is None or refused.reason == "running":
             if code in self.editor.values.raws:
                 return True
-            self.note(self.editor.values.absent.get(code) or f"{code} was not read yet.")
+            self._refuse(self.editor.values.absent.get(code) or f"{code} was not read yet.")
             return False
         if refused.reason == "unverified":
             self.action_confirm()
         else:
-            self.note(refused.text)
+            self._refuse(refused.text)
         return False
 
     def _stage(self, code: str, answer: str | int) -> None:
+        editor = self.editor
         try:
+            if past := limit_of_edit(editor, code, answer):
+                self._refuse(past)
+                return
             if isinstance(answer, str):
                 remark = self.editor.staging.stage(code, answer)
             else:
                 remark = self.editor.staging.stage_raw(code, answer)
         except DriveError as refused:
-            self.note(str(refused))
+            self._refuse(str(refused))
         else:
-            self.note(remark)
+            self.note(remark or _staged_text(editor, code))
+            self.list_again()
 
     def action_step_value(self, steps: int) -> None:
         """Stage the next value that the drive can hold."""
@@ -114,6 +123,7 @@ class StageKeys(ParameterKeys):
 
         count = len(self.editor.staging.edits)
         if not count:
+            self.note("Nothing is staged.")
             return
 
         def told(sure: bool | None) -> None:
@@ -121,7 +131,8 @@ class StageKeys(ParameterKeys):
                 self.editor.staging.undo_all()
                 self.list_again()
 
-        follows = f"{count} staged edits are dropped; the drive is not touched."
+        edits = "edit is" if count == 1 else "edits are"
+        follows = f"{count} staged {edits} dropped; the drive is not touched."
         asked = Confirm(
             "Undo all edits?",
             follows,
@@ -137,3 +148,25 @@ class StageKeys(ParameterKeys):
         if self.listed.code:
             self.editor.toggle_favourite(self.listed.code)
             self.look()
+
+
+def limit_of_edit(editor: Editor, code: str, answer: str | int) -> str:
+    """Which limit set by another parameter an edit would pass; empty where none.
+
+    Raises ValueRefused where the drive cannot hold it at all.
+    """
+    profile, raws, edits = editor.session.profile, editor.values.raws, editor.staging.edits
+    if isinstance(answer, str):
+        after = edits.stage(profile, code, answer, raws, editor.values.lacking)
+    else:
+        after = edits.stage_raw(profile, code, answer, raws, editor.values.lacking)
+    return limit_passed(profile, edits, after, raws)
+
+
+def _staged_text(editor: Editor, code: str) -> str:
+    edit, count = editor.staging.edits.get(code), len(editor.staging.edits)
+    if edit is None:
+        return f"{code} holds that already: not staged."
+    them = "it" if count == 1 else "both" if count == 2 else f"all {count}"
+    running = ", with the motor running" if editor.state == "running" else ""
+    return f"{code} → {edit.text}: {count} staged. w writes {them}{running}."

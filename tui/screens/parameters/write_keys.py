@@ -29,11 +29,11 @@ class WriteKeys(ParameterKeys):
             return
 
         def work(stamp: int) -> None:
-            self.remark = ""
             self.editor.apply((only,) if only else (), stamp)
 
         many = f"{len(edits)} parameters" if len(edits) > 1 else "1 parameter"
-        yes, no = "writes, each read back", "writes nothing"
+        yes = "writes it, read back" if len(edits) == 1 else "writes, each read back"
+        no = "writes nothing"
         self._ask(f"Write {only or many}?", write_text(self.editor, edits), yes, no, work)
 
     def action_write_one(self) -> None:
@@ -61,10 +61,37 @@ class WriteKeys(ParameterKeys):
         try:
             order = order_of(self.session.profile)
         except DriveError as refused:
-            self.note(str(refused))
+            self._refuse(str(refused))
             return
         if self._armed_or_told():
             self._ask(question, order.does, "does it", "leaves all as it is", work)
+
+    def show_results(self) -> None:
+        """Tell once what became of each edit; where one failed, ask before the rest."""
+        applied = self.editor.applied
+        if applied is None or self.editor.busy or self.editor.moved is not None:
+            return
+        self.editor.applied = None
+        failed = len(applied.results) - len(applied.written)
+        if not failed and len(applied.results) < 2:
+            self.list_again()
+            return  # the message says it all
+        from .results import RestQuestion, Results
+
+        self.list_again()
+        stamp = applied.stamp
+        if not applied.waits or applied.stopped or stamp != self.session.work.stops:
+            self.app.push_screen(Results(applied))
+            return
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                self.editor.apply(applied.waits, stamp)
+            else:
+                self.note(f"{len(applied.waits)} not written; they stay staged.")
+            self.look()
+
+        self.app.push_screen(RestQuestion(applied, self.motor_now()), told)
 
     def offer_to_follow(self) -> None:
         """Ask once whether to go where the drive answers now."""

@@ -8,6 +8,7 @@ from tui.drive.settings.edits import Edit, Edits, consequences
 from tui.drive.settings.limits import edit_problems
 from tui.drive.settings.writable import cuts_line
 from tui.drive.settings.write_sequence import ordered
+from tui.drive.values import NOT_AVAILABLE
 from tui.session.settings.editor import Editor
 
 EDITS_NAMED = 9
@@ -19,7 +20,12 @@ def write_text(editor: Editor, edits: Sequence[Edit]) -> str:
     profile, raws = editor.session.profile, editor.values.raws
     chosen = Edits(tuple(edits))
     order = ordered(profile, chosen, raws)
-    lines = [f"{e.code}  {e.old_text or '-----'} → {e.text}" for e in order[:EDITS_NAMED]]
+    codes = max(len(e.code) for e in order)
+    olds = max(len(e.old_text or NOT_AVAILABLE) for e in order)
+    lines = [
+        f"{e.code:<{codes}}  {e.old_text or NOT_AVAILABLE:>{olds}} → {e.text}"
+        for e in order[:EDITS_NAMED]
+    ]
     if len(order) > EDITS_NAMED:
         lines.append(f"and {len(order) - EDITS_NAMED} more")
     told = list(edit_problems(profile, chosen, raws).values())

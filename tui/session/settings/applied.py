@@ -56,6 +56,8 @@ class Applied:
     """Codes whose new value is lost at power-off until the drive is told to save."""
     stopped: str = ""
     """Why the rest was not tried; empty where all were."""
+    stamp: int = 0
+    """The count of stops under which they were written: a stop since voids what waits."""
     waits: tuple[str, ...] = ()
     """Codes that could be written yet, once a person says so: one before them failed."""
 

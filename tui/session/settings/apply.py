@@ -252,6 +252,7 @@ class _Work:
             after_reset=tuple(p.code for p in parameters if waits_for_reset(profile, p)),
             unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
             stopped=self.stopped,
+            stamp=self.writer.permit.stamp if self.writer.permit is not None else 0,
             waits=tuple(r.edit.code for r in self.results if r.outcome is EditOutcome.WAITS),
         )
 

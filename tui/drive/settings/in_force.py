@@ -1,0 +1,71 @@
+"""The limits that are in force for a number: its own, and those that other parameters set."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from decimal import Decimal
+
+from ..profile.profile import Profile
+from ..profile.schema import Parameter
+from ..shown import number_of
+from ..values import is_enumeration, raw_range
+from .edits import Edits
+from .limits import edit_problems, limit_pairs
+
+
+@dataclass(frozen=True, slots=True)
+class LimitsInForce:
+    """The lowest and the highest value of now, in the parameter's unit; None where not known."""
+
+    low: Decimal | None
+    high: Decimal | None
+    unit: str
+    step: Decimal
+    """What one count is worth."""
+    low_by: str = ""
+    """The parameter whose value the lowest is; empty where it is the parameter's own."""
+    high_by: str = ""
+
+    @property
+    def text(self) -> str:
+        """From the lowest to the highest, with what sets them."""
+        if self.low is None and self.high is None:
+            return ""
+        low, high = ("" if one is None else f"{one:f}" for one in (self.low, self.high))
+        unit = f" {self.unit}" if self.unit else ""
+        first = f"{low} ({self.low_by})" if self.low_by else low
+        last = f"{high}{unit} ({self.high_by})" if self.high_by else f"{high}{unit}"
+        return f"{first} .. {last}".strip()
+
+
+def limits_in_force(
+    profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
+) -> LimitsInForce | None:
+    """The limits of a number under these raw values; None for what is none, or has no scale."""
+    scale = profile.scale(parameter, raws, absent)
+    if parameter.access == "r" or parameter.bits or is_enumeration(parameter) or scale is None:
+        return None
+    lowest, highest = raw_range(parameter)
+    low = None if parameter.min is None else lowest * scale
+    high = None if parameter.max is None else highest * scale
+    low_by = high_by = ""
+    for under, over in limit_pairs(profile):
+        other = over if parameter.code == under else under
+        if parameter.code not in (under, over) or other not in raws:
+            continue
+        value = number_of(profile, profile[other], raws[other], raws, absent)
+        if value is None:
+            continue
+        if other == over and (high is None or value < high):
+            high, high_by = value, over
+        if other == under and (low is None or value > low):
+            low, low_by = value, under
+    return LimitsInForce(low, high, profile.unit(parameter, raws), scale, low_by, high_by)
+
+
+def limit_passed(profile: Profile, before: Edits, after: Edits, raws: Mapping[str, int]) -> str:
+    """Which limit the newest edit would pass, in a sentence that names it; empty where none."""
+    known = edit_problems(profile, before, raws)
+    told = edit_problems(profile, after, raws)
+    return next((text for code, text in told.items() if known.get(code) != text), "")

@@ -1,0 +1,189 @@
+"""What is known of the parameter under the cursor, as lines; pure functions."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from tui.drive.profile.schema import Parameter
+from tui.drive.settings.selection import not_factory
+from tui.drive.settings.writable import needs_standstill, waits_for_reset
+from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
+from tui.session.settings.editor import Editor
+from tui.widgets.drawing import wrapped
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE, STRONG
+
+from .value_text import (
+    CONFIDENCE_WORDS,
+    factory_text,
+    limits_now,
+    old_text,
+    range_text,
+    step_text,
+    text_of,
+    value_text,
+)
+
+SHORT, TALL = 5, 8
+"""Lines for one parameter; the second where the terminal has the room."""
+TALL_FROM = 32
+"""Rows of a terminal that has."""
+
+
+def parameter_lines(editor: Editor, code: str, width: int, height: int) -> list[Text]:
+    """What one parameter is, on so many lines, the last for what happened to it."""
+    parameter = editor.session.profile[code]
+    news = _news(editor, parameter)
+    # what warns is told whole, at the cost of help
+    most = 3 if height > SHORT else 1 if news.style == PLAIN else 2
+    told = wrapped(news.plain, max(20, width - 3), most)
+    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)))
+    lines += [_limits(editor, parameter, width), _place(editor, parameter, width)]
+    lines += [Text(f" {line}", news.style, no_wrap=True) for line in told]
+    return [*lines, *([Text("")] * (height - len(lines)))]
+
+
+def _help(editor: Editor, parameter: Parameter, width: int, room: int) -> list[Text]:
+    """Code, whole name, what it does; as many lines as there is room for."""
+    head = f"{parameter.code}  {parameter.name}"
+    told = _help_parts(editor, parameter)
+    words = " ".join(part if part.endswith(".") else f"{part}." for part in told)
+    parts = wrapped(f"{head}. {words}" if words else head, max(20, width - 3), room)
+    lines = [Text(f" {part}", FAINT, no_wrap=True) for part in parts]
+    # the name may reach into the second line where the terminal is narrow
+    left = len(head)
+    for line, part in zip(lines, parts, strict=True):
+        line.stylize(PLAIN, 1, 1 + max(0, min(left, len(part))))
+        left -= len(part) + 1
+    lines[0].stylize(STRONG, 1, 1 + len(parameter.code))
+    return lines
+
+
+def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
+    raw = editor.values.raws.get(parameter.code)
+    found: list[str] = []
+    if parameter.bits and raw is not None:
+        names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, raw))
+        found.append(f"Now: {names or 'no bit set'}")
+    if parameter.note:
+        found.append(parameter.note)
+    if parameter.base:
+        found.append(f"In percent of {parameter.base}")
+    if parameter.scale_by is not None and parameter.scale_by.parameter not in parameter.note:
+        found.append(f"Its step follows {parameter.scale_by.parameter}")
+    if is_enumeration(parameter) and parameter.access != "r":
+        choices = dict.fromkeys(editor.session.profile.names(parameter).values())
+        found.append(f"One of: {', '.join(choices)}")
+    return found
+
+
+def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:
+    """The limits in force, when a new value counts, how long it is kept, the factory value."""
+    text = Text(" ", no_wrap=True)
+    number = not is_enumeration(parameter) and limits_now(editor, parameter) is not None
+    if parameter.access != "r" and number:
+        limits, step = range_text(editor, parameter), step_text(editor, parameter)
+        by = step.partition(" ")[0]  # its unit stands there already
+        text.append(f"{limits} by {by}" if limits else f"in steps of {step}", PLAIN)
+        text.append(" · ", FAINT)
+    text.append(" · ".join(_effect(editor, parameter)), FAINT)
+    if parameter.storage == "ram-until-saved" and parameter.access != "r":
+        until = " · lost when off until kept: "
+        if text.cell_len + len(until) < width:
+            text.append(until, FAINT).append("S", KEY)
+        else:
+            text.append(" · ", FAINT).append("S", KEY).append(" keeps it", FAINT)
+    factory = f" · factory {factory_text(editor, parameter)}"
+    if factory_text(editor, parameter) and text.cell_len + len(factory) < width:
+        text.append(factory, FAINT)  # stands in the list too
+    return text
+
+
+def _effect(editor: Editor, parameter: Parameter) -> list[str]:
+    profile = editor.session.profile
+    if parameter.access == "r":
+        return ["can only be read"]
+    later = waits_for_reset(profile, parameter)
+    found = ["in force after a reset"] if later else []
+    if needs_standstill(profile, parameter):
+        found.append("at standstill only")
+    elif not later:
+        found.append("effective at once")
+    found += {"ram": ["lost when off"], "eeprom": ["kept at once"]}.get(parameter.storage, [])
+    return found
+
+
+def _place(editor: Editor, parameter: Parameter, width: int) -> Text:
+    """Where it lies, raw, and how surely that is known."""
+    raw, edit = editor.values.raws.get(parameter.code), editor.staging.edits.get(parameter.code)
+    hexadecimal = f"16#{parameter.address:04X}"
+    number = parameter.number if parameter.number not in (hexadecimal, parameter.code) else ""
+    parts = [part for part in (number, hexadecimal, str(parameter.address)) if part]
+    if raw is not None:
+        staged = f" → {edit.new}" if edit is not None else ""
+        word = f" = 16#{_word(edit.new if edit is not None else raw)}" if width >= 80 else ""
+        parts.append(f"raw {raw}{staged}{word}")
+    text = Text(f" {' · '.join(parts)} · from ", FAINT, no_wrap=True)
+    words = CONFIDENCE_WORDS[parameter.confidence]
+    sure = parameter.confidence not in ("analogy", "unverified")
+    sure = sure or parameter.code in editor.marks.confirmed
+    text.append(words if sure else f"{words}: unverified", FAINT if sure else ALARM)
+    return text
+
+
+def _word(raw: int) -> str:
+    return f"{raw & 0xFFFFFFFF if raw > 0xFFFF else raw & 0xFFFF:04X}"
+
+
+def _news(editor: Editor, parameter: Parameter) -> Text:
+    """What happened to it last: another's change, a refusal, an old value, a remark."""
+    code = parameter.code
+    edit, result = editor.staging.edits.get(code), editor.staging.results.get(code)
+    if code in editor.staging.changed_elsewhere:
+        before = text_of(editor, parameter, editor.staging.changed_elsewhere[code])
+        said = f"Changed by somebody else: it was {before}. Delete drops your edit, y keeps it."
+        return Text(said, ALARM)
+    if result is not None and not result.done:
+        return Text(result.text, ALARM)
+    refused = editor.refusal(code)
+    locked = refused.text if refused is not None and refused.reason == "running" else ""
+    if edit is not None and locked:
+        return Text(f"→ {edit.text} is staged. {locked}", ALARM)
+    if edit is not None:
+        said = f"{edit.old_text or NOT_AVAILABLE} → {edit.text} is staged; w writes it."
+        return Text(f"{said} {edit.remark}".strip(), ALARM if edit.remark else ATTENTION)
+    if code in editor.waits_for_reset:
+        return Text("In force only after a reset of the drive.", ALARM)
+    if old := old_text(editor, code):
+        return Text(f"Now {value_text(editor, code)}, was {old}: u stages the old value.", PLAIN)
+    if code not in editor.values.raws:
+        return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
+    if refused is not None and refused.reason != "read-only":
+        return Text(refused.text, FAINT)
+    if not_factory(editor.session.profile, parameter, editor.values.raws[code]):
+        return Text(f"Not the factory value, {factory_text(editor, parameter)}.", FAINT)
+    return Text("")
+
+
+def status_line(editor: Editor, where: str, width: int) -> Text:
+    """The line between list and detail: what waits to be written, kept or reset, and where."""
+    text, count = Text("─ ", LINE, no_wrap=True), len(editor.staging.edits)
+    text.append(f"{count} staged", ATTENTION if count else FAINT)
+    if count:
+        text.append(": w writes ", FAINT)
+        text.append("it" if count == 1 else "them", FAINT)
+    if editor.unsaved:
+        text.append(" · ", LINE)
+        text.append(f"{len(editor.unsaved)} not saved", ALARM)
+        text.append(": S", KEY)
+    if editor.waits_for_reset:
+        text.append(" · ", LINE)
+        text.append("RESET THE DRIVE: " + ", ".join(sorted(editor.waits_for_reset)), ALARM)
+    done, whole = editor.values.progress
+    if done < whole:
+        where = f"read {done} of {whole} · {where}"
+    text.truncate(max(8, width - len(where) - 5), overflow="ellipsis")
+    text.append(" ")
+    text.append("─" * max(1, width - text.cell_len - len(where) - 3), LINE)
+    text.append(f" {where} ", FAINT)
+    text.append("─", LINE)
+    return text

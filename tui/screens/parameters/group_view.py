@@ -1,0 +1,71 @@
+"""The column of groups as lines; pure functions."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from rich.text import Text
+
+from tui.drive.settings.selection import Choice
+from tui.widgets.drawing import cut_at_word, short
+from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, PLAIN, STRONG
+
+FILTER_LABELS: dict[str, str] = {
+    "not factory": "Changed",
+    "favourites": "Favourites",
+    "staged": "Staged",
+    "differs": "Differs",
+    "unsaved": "Unsaved",
+    "recent": "Recent",
+    "settings": "All settings",
+    "read-only": "Read only",
+    "unverified": "Unverified",
+    "all": "Everything",
+}
+"""How a filter is called."""
+STYLES = {"staged": ATTENTION, "unsaved": ALARM}
+"""Filters whose number is a state that wants to be seen."""
+
+
+@dataclass(frozen=True, slots=True)
+class GroupEntry:
+    """One line of the column: what it chooses, and how many parameters that are."""
+
+    choice: Choice
+    count: int | None = None
+    """None where the number tells nothing."""
+    pinned: bool = False
+    """Whether it stands above the groups however far they are scrolled."""
+
+    @property
+    def label(self) -> str:
+        """Its name with its number."""
+        name = self.choice.group or FILTER_LABELS[self.choice.filter]
+        return name if self.count is None else f"{name} {self.count}"
+
+
+def group_lines(entries: Sequence[GroupEntry], chosen: Choice, width: int, room: int) -> list[Text]:
+    """As many lines as fit: the pinned ones, and those around the chosen one."""
+    pinned = [entry for entry in entries if entry.pinned]
+    rest = [entry for entry in entries if not entry.pinned]
+    left = max(1, room - len(pinned))
+    at = next((n for n, entry in enumerate(rest) if entry.choice == chosen), 0)
+    top = min(max(0, at - left // 2), max(0, len(rest) - left))
+    shown = rest[top : top + left]
+    lines = [_line(entry, chosen, width) for entry in [*pinned, *shown]]
+    if (below := len(rest) - top - len(shown)) > 0 and len(shown) > 1:
+        lines[-1] = Text(f" … {below + 1} more", FAINT, no_wrap=True)
+    return lines[:room]
+
+
+def _line(entry: GroupEntry, chosen: Choice, width: int) -> Text:
+    here = entry.choice == chosen
+    style = STRONG if here else PLAIN if entry.count or entry.choice.group else FAINT
+    if entry.count and not here:
+        style = STYLES.get(entry.choice.filter, style)
+    label = entry.label if len(entry.label) < width - 1 else cut_at_word(entry.label, width - 2)
+    text = Text(f" {short(label, width - 2):<{width - 2}} ", style, no_wrap=True)
+    if here:
+        text.stylize(CURSOR)
+    return text

@@ -1,0 +1,113 @@
+"""What became of each edit that was to be written, and the question before the rest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.style import Style
+from rich.table import Table
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.binding import Binding
+from textual.containers import Vertical, VerticalScroll
+
+from tui.drive.plain import plain
+from tui.drive.values import NOT_AVAILABLE
+from tui.session.settings.applied import Applied, EditOutcome, Result
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, PLAIN, STRONG
+from tui.widgets.plain import Plain
+
+from ..dialogs.question import KeyQuestion, hint
+
+if TYPE_CHECKING:
+    from ..dialogs.now import MotorsNow
+
+OUTCOME_WORDS = {
+    EditOutcome.DONE: "written",
+    EditOutcome.SENT: "sent",
+    EditOutcome.HELD_BACK: "HELD BACK",
+    EditOutcome.WAITS: "waits",
+}
+"""What became of an edit, in a word; else it was not written."""
+
+
+class Results(KeyQuestion[None]):
+    """A list to read through; scrolls."""
+
+    BINDINGS: ClassVar = [Binding("enter", "no", show=False)]
+
+    def __init__(self, applied: Applied) -> None:
+        super().__init__()
+        self._applied = applied
+
+    def dialog(self) -> ComposeResult:
+        """Each with what became of it."""
+        with Vertical(id="dialog"):
+            yield Plain(results_head(self._applied), id="question")
+            with VerticalScroll(id="says"):
+                yield Plain(results_table(self._applied))
+            keys = [("Enter or Esc", "closes")]
+            if self._applied.written:
+                keys.append(("u", "afterwards stages the old values"))
+            yield Plain(hint(*keys), id="hint")
+
+
+class RestQuestion(KeyQuestion[bool]):
+    """Whether the edits behind one that failed are written all the same."""
+
+    NO = False
+    BINDINGS: ClassVar = [Binding("y", "yes", show=False)]
+
+    def __init__(self, applied: Applied, now: MotorsNow) -> None:
+        super().__init__(now)
+        self._applied = applied
+
+    def dialog(self) -> ComposeResult:
+        """What failed, what was held back with it, and what could be written yet."""
+        count = len(self._applied.waits)
+        one = count == 1
+        with Vertical(id="dialog"):
+            rest = "parameter" if one else f"{count} parameters"
+            yield Plain(f"Write the other {rest} all the same?", id="question")
+            yield from self.now_lines()
+            with VerticalScroll(id="says"):
+                yield Plain(results_table(self._applied))
+            keys = (("y", "writes it" if one else "writes them"), ("Esc or q", "writes no more"))
+            yield Plain(hint(*keys), id="hint")
+
+    def action_yes(self) -> None:
+        """Go on with the rest."""
+        self.answer(True)
+
+
+def results_head(applied: Applied) -> str:
+    """How many were written, and how many were not."""
+    done, failed = len(applied.written), len(applied.results) - len(applied.written)
+    head = f"{done} written and read back" if done else "Nothing written"
+    return f"{head}; {failed} not written, still staged" if failed else head
+
+
+def results_table(applied: Applied) -> Table:
+    """A line an edit: code, what became of it, old and new value; the reason below it."""
+    table = Table.grid(padding=(0, 2, 0, 0))
+    for result in applied.results:
+        edit = result.edit
+        values = f"{edit.old_text or NOT_AVAILABLE} → {edit.text}"
+        word = OUTCOME_WORDS.get(result.outcome, "NOT WRITTEN")
+        code = Text(edit.code, STRONG, no_wrap=True)
+        became = Text(word, _style(result), no_wrap=True)
+        table.add_row(code, became, Text(plain(values), PLAIN))
+        if not result.done and result.outcome is not EditOutcome.WAITS:
+            table.add_row("", "", Text(plain(_reason(result)), FAINT))
+    return table
+
+
+def _style(result: Result) -> Style:
+    if result.done:
+        return PLAIN
+    return ATTENTION if result.outcome is EditOutcome.WAITS else ALARM
+
+
+def _reason(result: Result) -> str:
+    """Why it was not written, without its code, which stands in front already."""
+    return result.text.removeprefix(f"{result.edit.code}: ").removeprefix(f"{result.edit.code} ")

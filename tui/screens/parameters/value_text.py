@@ -1,0 +1,77 @@
+"""What is held, staged and possible of a parameter, as text; pure functions."""
+
+from __future__ import annotations
+
+from tui.drive.profile.schema import Confidence, Parameter
+from tui.drive.settings.in_force import LimitsInForce, limits_in_force
+from tui.drive.shown import shown
+from tui.drive.values import NOT_AVAILABLE, is_enumeration
+from tui.session.settings.editor import Editor
+
+CONFIDENCE_WORDS: dict[Confidence, str] = {
+    "manual": "manual",
+    "manual+public": "manual and public files",
+    "public-x2": "two public files",
+    "public": "one public file",
+    "analogy": "a sister family",
+    "unverified": "no document",
+}
+"""Where the knowledge of a parameter comes from."""
+
+
+def value_text(editor: Editor, code: str) -> str:
+    """The held value, dashes while there is none."""
+    value = editor.values.value(code)
+    return value.display if value is not None else NOT_AVAILABLE
+
+
+def other_text(editor: Editor, parameter: Parameter) -> str:
+    """The factory value, or that of the set that the drive is compared with."""
+    if editor.other:
+        raw = editor.other.get(parameter.code)
+        return "" if raw is None else text_of(editor, parameter, raw)
+    return factory_text(editor, parameter)
+
+
+def factory_text(editor: Editor, parameter: Parameter) -> str:
+    """The factory value, or what is known of it in words."""
+    if parameter.factory is None:
+        return parameter.factory_text
+    return text_of(editor, parameter, parameter.factory)
+
+
+def text_of(editor: Editor, parameter: Parameter, raw: int) -> str:
+    """A raw value of a parameter with its unit."""
+    return shown(
+        editor.session.profile, parameter, raw, editor.values.raws, editor.values.lacking
+    ).display
+
+
+def old_text(editor: Editor, code: str) -> str:
+    """What the parameter held before it was written last; empty where it was not written."""
+    result = editor.staging.results.get(code)
+    return result.edit.old_text if result is not None and result.done else ""
+
+
+def limits_now(
+    editor: Editor, parameter: Parameter, *, staged: bool = False
+) -> LimitsInForce | None:
+    """The limits of now, or those after what is staged."""
+    raws = editor.staging.edits.after(editor.values.raws) if staged else editor.values.raws
+    return limits_in_force(editor.session.profile, parameter, raws, editor.values.lacking)
+
+
+def range_text(editor: Editor, parameter: Parameter) -> str:
+    """What it may hold: the limits in force, or how many names there are."""
+    if parameter.access == "r" or parameter.bits:
+        return ""
+    if is_enumeration(parameter):
+        return f"{len(editor.session.profile.names(parameter))} values"
+    limits = limits_now(editor, parameter)
+    return limits.text if limits is not None else ""
+
+
+def step_text(editor: Editor, parameter: Parameter) -> str:
+    """What one step is worth, with its unit; empty for what is no number."""
+    limits = limits_now(editor, parameter)
+    return f"{limits.step:f} {limits.unit}".rstrip() if limits is not None else ""
