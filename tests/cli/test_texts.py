@@ -12,6 +12,7 @@ from tests.drive.test_add_a_drive import example
 from tui.cli.shared.output import json_text
 from tui.cli.shared.say import printable
 from tui.drive.plain import commands
+from tui.drive.profile import library
 from tui.simulator import DriveSpec, Simulation
 
 from .commands import invoked, refused, run
@@ -63,6 +64,7 @@ def test_a_profile_of_ones_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     name = json.dumps(f"[/] {NAME}").replace("\x7f", "\\u007f")
     text = example().replace('"Example pump drive"', name).replace('"Level"', '"[/red]"')
     (tmp_path / "profiles" / "pump.toml").write_text(text, encoding="utf-8")
+    library.load.cache_clear()  # another test may have read one of this id
     for arguments in (["profiles"], ["profiles", "example-pump"]):
         done = invoked(*arguments)
         assert done.exit_code == 0, done.output
