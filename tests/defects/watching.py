@@ -128,7 +128,7 @@ DEFECTS = (
         'reference = texts.get(REFERENCE, "")',
         'reference = texts.get(NAME, "")',
         "A drive is taken for another family, and its words mean something else.",
-        ("tests/session/test_on_a_line.py::test_identify",),
+        ("tests/line/test_on_a_line.py::test_identify",),
     ),
     Defect(
         "fault-from-the-wrong-word",
