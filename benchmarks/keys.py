@@ -55,7 +55,8 @@ ARM = FIRST = ("a", " ARMED")
 TASKS = (
     Task(
         "open the drive that was found, run at 30 Hz",
-        [("Enter", "State"), ARM, ("r", "RUN FORWARD"), *typed("30"), ("Enter!", "RUNNING")],
+        [("Enter", "Time-out"), ARM, ("r", "RUN FORWARD"), *typed("30"),
+         ("Enter!", "accelerating")],
         [("Enter", "READY"), FIRST, ("f", "Reference"), *typed("30"), ("Enter", "DONE Ref"),
          ("r", "RUNNING")],
     ),

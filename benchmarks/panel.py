@@ -160,7 +160,7 @@ def starts(bench: Bench, size: tuple[int, int], rounds: int) -> Figures:
 def panel(bench: Bench, size: tuple[int, int]) -> dict[str, Figures]:
     """The panel at its default rate, then at 10 Hz with keys."""
     with bench.watch(size) as terminal:
-        values = terminal.see("RUNNING") - terminal.started
+        values = terminal.see("FORWARD") - terminal.started
         terminal.run(SETTLED)
         default = watched(terminal, bench.options.seconds)
         faster(terminal)
@@ -188,7 +188,7 @@ def low_bandwidth(bench: Bench, size: tuple[int, int]) -> Figures | None:
     if "low_bandwidth" not in inspect.signature(run_panel).parameters:
         return None
     with bench.watch(size, "--low-bandwidth") as terminal:
-        terminal.see("RUNNING")
+        terminal.see("FORWARD")
         terminal.run(SETTLED)
         return steady(terminal, max(LOW_SECONDS, bench.options.seconds))
 
@@ -196,7 +196,7 @@ def low_bandwidth(bench: Bench, size: tuple[int, int]) -> Figures | None:
 def slow(bench: Bench, size: tuple[int, int]) -> Figures:
     """The panel at 10 Hz on a slow terminal."""
     with bench.watch(size, rate=SLOW) as terminal:
-        terminal.see("RUNNING")
+        terminal.see("FORWARD")
         faster(terminal)
         found = watched(terminal, bench.options.seconds)
         found["key"] = press_often(terminal, WORD, bench.options.presses // 8)

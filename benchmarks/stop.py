@@ -63,8 +63,8 @@ def panel() -> None:
     from textual.driver import Driver
 
     from tui.app import DrivePanelApp
+    from tui.bus.api import Priority
     from tui.bus.errors import LineError
-    from tui.bus.line import Priority
     from tui.drive.errors import DriveError
     from tui.drive.profile.library import load
     from tui.session.console import DriveConsole

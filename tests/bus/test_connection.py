@@ -12,8 +12,9 @@ import pytest
 import serial
 from pymodbus.client import AsyncModbusSerialClient
 
+from tui.bus.api import LineState, LineStatus, Priority
 from tui.bus.errors import LineClosed, LineLost, PortBusy, PortMissing
-from tui.bus.line import Line, LineState, LineStatus, Priority, Timing
+from tui.bus.line import Line, Timing
 from tui.bus.link import RtuTcpLink, SerialLink, TcpLink
 
 from .conftest import OpenLine

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer
-from tui.bus.line import Priority, Timing
+from tui.bus.line import Timing
 
 from .conftest import BRISK, WIDE, OpenLine
 from .peer import PtyPeer, honest, silent

@@ -9,6 +9,7 @@ from collections.abc import Awaitable, Callable, Sequence
 import pytest
 from pymodbus.pdu.pdu import ModbusPDU
 
+from tui.bus.api import Priority
 from tui.bus.errors import (
     ChecksumFault,
     DeviceException,
@@ -16,7 +17,7 @@ from tui.bus.errors import (
     NoAnswer,
     WrongReply,
 )
-from tui.bus.line import Priority, Timing
+from tui.bus.line import Timing
 from tui.wire.frames import frame
 
 from .conftest import BRISK, PATIENT, OpenLine
@@ -274,6 +275,23 @@ async def test_damaged_reply_is_known_as_soon_as_the_line_is_silent(
                 await line.read(1, 5, priority=OPERATOR)
         assert line.counters.checksum == 1
         assert line.counters.timeouts == 0
+
+
+async def test_silence_counts_as_empty_only_where_nothing_ever_answered(
+    open_line: OpenLine,
+) -> None:
+    timing = Timing(first_timeout=0.2, scan_timeout=0.2, min_timeout=0.1, retries=0)
+
+    def once(request: bytes, count: int) -> Sequence[Step]:
+        return [reply(request)] if request[0] == 1 and count == 0 else []
+
+    with PtyPeer(once) as peer:
+        line = open_line(peer.path, timing)
+        await line.read(1, 5, priority=OPERATOR)
+        for device in (1, 2):
+            with pytest.raises(NoAnswer):
+                await line.read(device, 5, priority=OPERATOR)
+        assert (line.counters.timeouts, line.counters.empty) == (2, 1)
 
 
 async def test_read_is_repeated_after_a_damaged_reply(open_line: OpenLine) -> None:

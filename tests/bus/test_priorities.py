@@ -8,8 +8,9 @@ from collections.abc import Awaitable, Callable, Sequence
 
 import pytest
 
+from tui.bus.api import Priority
 from tui.bus.errors import LineBusy, NoAnswer, RequestRefused
-from tui.bus.line import Priority, Timing
+from tui.bus.line import Timing
 
 from .conftest import OpenLine
 from .peer import PtyPeer, Step, honest, reply, silent

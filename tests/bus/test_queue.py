@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import pytest
 
+from tui.bus.api import Priority
 from tui.bus.errors import LineBusy, LineClosed, Superseded
-from tui.bus.line import Priority, Timing
+from tui.bus.line import Timing
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
 from tui.bus.result import Piece
 from tui.bus.schedule.backoff import pause

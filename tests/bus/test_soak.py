@@ -8,8 +8,9 @@ from collections.abc import Sequence
 
 import pytest
 
+from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import ExchangeError
-from tui.bus.line import Line, LineStatus, Priority, Timing
+from tui.bus.line import Line, Timing
 from tui.bus.link import RtuTcpLink, SerialLink
 from tui.bus.schedule import connection
 from tui.bus.transport.serial_thread import ThreadedSerial

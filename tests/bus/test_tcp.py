@@ -7,9 +7,10 @@ from collections.abc import Callable, Sequence
 
 import pytest
 
+from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import ChecksumFault, DeviceException, LineLost, NoAnswer, WrongReply
 from tui.bus.limits import CAUTIOUS
-from tui.bus.line import LineStatus, Priority, Timing
+from tui.bus.line import Timing
 from tui.bus.link import RtuTcpLink, TcpLink
 
 from .conftest import BRISK, WIDE, OpenLine

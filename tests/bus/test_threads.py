@@ -10,8 +10,9 @@ from pathlib import Path
 
 import pytest
 
+from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineClosed, LineError
-from tui.bus.line import Line, LineStatus, Priority
+from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.bus.transport.ports import is_pseudo_terminal, list_ports
 

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from tui.bus.api import Priority
 from tui.bus.errors import (
     ChecksumFault,
     LineBusy,
@@ -23,7 +24,6 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.bus.fake import FakeLine
-from tui.bus.line import Priority
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.session.connect.addresses import parse_addresses
@@ -207,7 +207,7 @@ async def test_a_lost_line_makes_values_old_and_comes_back(five: OpenLine) -> No
     latest = monitor.latest
     assert latest is not None
     assert latest.rate == 0.0
-    assert monitor.trend[-1].values == (None, None)
+    assert monitor.trend[-1].values == (None, None, None)
     with pytest.raises(LineLost):
         await Reader(drive).read(["ACC"])
     five.simulation.replug()

@@ -9,8 +9,9 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from tui.bus.api import LineStatus
 from tui.bus.errors import DeviceException
-from tui.bus.line import Line, LineStatus
+from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink, SerialLink
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile

@@ -9,8 +9,9 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
+from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer, RequestRefused
-from tui.bus.line import Priority, Reply
+from tui.bus.line import Reply
 from tui.drive.profile import library
 from tui.session.command.commander import Commander
 from tui.session.drive import DriveSession

@@ -12,8 +12,9 @@ from typing import cast
 import pytest
 
 import tui.session
+from tui.bus.api import LineState, LineStatus
 from tui.bus.limits import Limits
-from tui.bus.line import Line, LineState, LineStatus
+from tui.bus.line import Line
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR
 from tui.session.drive import DriveSession

@@ -6,8 +6,8 @@ from decimal import Decimal
 
 import pytest
 
+from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer
-from tui.bus.line import Priority
 from tui.session.drive import DriveSession
 from tui.session.read.reader import PLANS_KEPT, Reader
 from tui.session.reading import Quality, Rating

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from tui.bus.line import Line, Priority
+from tui.bus.api import Priority
+from tui.bus.line import Line
 from tui.bus.link import SerialLink
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
 from tui.drive.profile import library

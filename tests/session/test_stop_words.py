@@ -7,8 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, NoAnswer
-from tui.bus.line import Priority, Reply
+from tui.bus.line import Reply
 from tui.drive.orders import OrderRefused, stop_in_any
 from tui.drive.profile import library
 from tui.session.command import motor_stop

@@ -101,7 +101,7 @@ def _count(terminal: int, seconds: float) -> Measured:
 
 def compare(seconds: float) -> tuple[Measured, Measured]:
     """The panel and the plain panel, one after the other."""
-    return measure(PANEL, b"RUNNING", seconds), measure(PLAIN, b"Frequency", seconds)
+    return measure(PANEL, b"FORWARD", seconds), measure(PLAIN, b"Frequency", seconds)
 
 
 def main() -> None:

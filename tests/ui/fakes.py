@@ -53,6 +53,7 @@ RUNNING = {
     "TFR": 600, "INV": 120, "UNS": 400, "DP0": 5, "DP1": 0, "DP2": 18, "DP3": 0, "DP4": 0,
     "DP5": 0, "DP6": 0, "DP7": 0, "DP8": 0, "IL1R": 0x0003, "OL1R": 1, "LRS7": 0,
 }  # fmt: skip
+REVERSE = {**RUNNING, "ETA": 0x8637, "RFR": -350, "FRH": -500, "RFRD": -1030}
 READY = {**RUNNING, "ETA": 0x0231, "RFR": 0, "RFRD": 0, "LCR": 0, "OTR": 0, "OPR": 0, "UOP": 0}
 FAULT = {**READY, "ETA": 0x0218, "LFT": 18}
 ALARM = {**RUNNING, "ETA": 0x06B7, "LRS6": 1 << 11}
@@ -198,11 +199,13 @@ class FakeLineWatch:
     alone: dict[int, TimeoutWatch] = field(default_factory=dict)
     commanded: list[DriveSession] = field(default_factory=list)
     looks: dict[int, Look] = field(default_factory=dict)
+    seen: dict[int, DriveState] = field(default_factory=dict)
 
     @property
     def states(self) -> dict[int, DriveState]:
-        """The states of the looks."""
-        return {device: look.state for device, look in self.looks.items() if look.state}
+        """The states of the looks, and what else was seen."""
+        looks = {device: look.state for device, look in self.looks.items() if look.state}
+        return {**looks, **self.seen}
 
     def watch(self, _device: int) -> TimeoutWatch | None:
         """The watch that the test gives."""
@@ -247,8 +250,16 @@ def console_of(
     """A drive whose monitor has brought this snapshot, with a trend of a start and a run."""
     session = DriveSession(StillLine(line), device, library.load(family), ATV71)
     session.arming = session.work.arming = StillArming(session.line, armed)
+    way = -1.0 if snapshot and snapshot.state.direction == "reverse" else 1.0
     trend = tuple(
-        TrendPoint(NOW - 60 + i / 2, (min(50.0, max(0.0, i - 20) * 0.8), 2.0 + (i % 30) * 0.1))
+        TrendPoint(
+            NOW - 60 + i / 2,
+            (
+                way * min(50.0, max(0.0, i - 20) * 0.8),
+                2.0 + (i % 30) * 0.1,
+                way * (50.0 if i > 18 else 0.0),
+            ),
+        )
         for i in range(120)
     )
     console = DriveConsole(session, Journal())

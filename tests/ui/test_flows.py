@@ -73,9 +73,9 @@ async def test_choose_a_drive_watch_it_and_come_back() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)
-        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
-        assert "ATV71HU15M3" in shown(app, "header")
-        await until(pilot, lambda: "Hz" in shown(app, "motor"))
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
+        assert "ATV" in shown(app, "strip")
+        await until(pilot, lambda: "Hz" in shown(app, "readouts"))
         assert screen.console.monitor.running
         await pilot.press("escape")
         await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
@@ -87,25 +87,25 @@ async def test_next_and_previous_drive() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         first = await to_monitor(app, pilot, 1)
         await pilot.press("right_square_bracket")
-        await until(pilot, lambda: "device 2" in shown(app, "header"))
+        await until(pilot, lambda: shown(app, "strip").startswith(" 2 "))
         assert not first.console.monitor.running
         await pilot.press("left_square_bracket")
-        await until(pilot, lambda: "device 1" in shown(app, "header"))
-        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
+        await until(pilot, lambda: shown(app, "strip").startswith(" 1 "))
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
 
 
 async def test_a_lost_line_is_shown_and_comes_back() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 2)
-        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
         assert app.opened is not None
         assert app.opened.simulation is not None
         app.opened.simulation.unplug()
-        await until(pilot, lambda: "LINE LOST" in shown(app, "message"))
+        await until(pilot, lambda: "LINE LOST" in shown(app, "said"))
         assert "NOT KNOWN NOW" in shown(app, "state")
         app.opened.simulation.replug()
-        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
 
 
 async def test_a_drive_that_watches_the_line_is_asked_on() -> None:
@@ -154,15 +154,15 @@ async def test_percent_becomes_amperes_once_the_rating_is_told() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         await to_monitor(app, pilot, 1)
-        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
         await press(pilot, "(rating)")
         await until(pilot, lambda: isinstance(app.screen, Ask))
         await pilot.press(*"3x", "enter", "backspace", *".3", "enter")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
 
         def in_amperes() -> bool:
-            rows = shown(app, "motor").split("\n")
-            return any("Current" in row and " A " in row for row in rows)
+            rows = shown(app, "readouts").split("\n")
+            return any(row.rstrip().endswith(" A") for row in rows)
 
         await until(pilot, in_amperes)
 
@@ -198,7 +198,7 @@ async def test_a_line_and_a_device_on_the_command_line_open_its_monitor() -> Non
     app = DrivePanelApp(start="sim:atv71@2", device=2)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
-        await until(pilot, lambda: "SWITCH" in shown(app, "state").upper())
+        await until(pilot, lambda: "a arms, r runs" in shown(app, "state"))
 
 
 def test_every_action_has_a_method_and_words() -> None:
@@ -226,8 +226,8 @@ async def test_only_changed_lines_are_drawn() -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)
-        await until(pilot, lambda: "RUNNING" in shown(app, "state"))
-        word = screen.query_one("#word", Lines)
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
+        word = screen.query_one("#message", Lines)
         await pilot.pause(1.0)
         screen.look()
         before = word.redrawn
@@ -243,18 +243,18 @@ async def test_nothing_is_drawn_below_the_help_and_it_is_told_that_values_stand_
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=(120, 40)) as pilot:
         screen = await to_monitor(app, pilot, 2)
-        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
-        header, motor = screen.query_one("#header", Lines), screen.query_one("#motor", Lines)
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
+        state, motor = screen.query_one("#state", Lines), screen.query_one("#motor", Lines)
         await pilot.press("question_mark")
         await until(pilot, lambda: isinstance(app.screen, HelpScreen))
         await pilot.pause()
         before, latest = motor.redrawn, screen.console.monitor.latest
-        await until(pilot, lambda: "as of" in header.lines[0].plain)
+        await until(pilot, lambda: any("as of" in line.plain for line in state.lines))
         # the drive is watched all the same
         await until(pilot, lambda: screen.console.monitor.latest is not latest)
         assert motor.redrawn == before
         await pilot.press("escape")
-        await until(pilot, lambda: "as of" not in shown(app, "header"))
+        await until(pilot, lambda: "as of" not in shown(app, "state"))
         await until(pilot, lambda: motor.redrawn > before)
 
 
@@ -263,12 +263,12 @@ async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
     app = DrivePanelApp(open_line=demo, start="demo")
     async with app.run_test(size=size) as pilot:
         screen = await to_monitor(app, pilot, 2)
-        await until(pilot, lambda: "RUNNING FORWARD" in shown(app, "state"))
-        part = "word" if size[0] < 110 else "word0"
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
+        part = "trend" if size[0] < 110 else "word0"
         places = {widget.id: widget.region for widget in screen.query(Lines)}
-        titles = {shown(app, part).partition(" ")[0]}
+        titles = {shown(app, part).split()[0]}
         for _ in range(3):
             await pilot.press("tab")
-            titles.add(shown(app, part).partition(" ")[0])
+            titles.add(shown(app, part).split()[0])
             assert {widget.id: widget.region for widget in screen.query(Lines)} == places
         assert len(titles) > 1

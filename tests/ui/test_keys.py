@@ -211,6 +211,10 @@ async def back_to(made: Bench, screen: str) -> None:
         await made.pilot.press("2")
         await until(made.pilot, lambda: app.place == "monitor")
     await until(made.pilot, lambda: bool(shown(app, "message")))
+    if "Esc no" in " ".join(shown(app, "message").split()):
+        await made.pilot.press("escape")
+    console = app.chosen
+    assert console is not None
     if not console.session.arming.armed:
         await made.pilot.press("a")
         await until(made.pilot, lambda: console.session.arming.armed)

@@ -134,7 +134,7 @@ async def test_nothing_stands_ready_until_a_word_was_typed() -> None:
             assert isinstance(made.app.screen, Palette)
             await made.pilot.press("escape")
             await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
-        assert "NOT ARMED" in shown(made.app, "status")
+        assert "ARMED" not in shown(made.app, "strip")
         assert not reports(made)
 
 
@@ -144,7 +144,7 @@ async def test_arming_and_stopping_by_their_names() -> None:
         await until(made.pilot, lambda: made.speed(2) > 2)
         await typed(made, "arm")
         await made.pilot.press("enter")
-        await until(made.pilot, lambda: " ARMED" in shown(made.app, "status"))
+        await until(made.pilot, lambda: " ARMED" in shown(made.app, "strip"))
         await typed(made, "stop")
         await made.pilot.press("enter")
         await until(made.pilot, lambda: bool(reports(made)))

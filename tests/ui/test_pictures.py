@@ -10,8 +10,8 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import OptionList
 
+from tui.bus.api import LineState
 from tui.bus.errors import PortBusy
-from tui.bus.line import LineState
 from tui.drive.profile import library
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.monitor.screen import MonitorScreen
@@ -25,18 +25,6 @@ from . import fakes
 
 SIZES = pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
 Compare = Callable[..., bool]
-STATES: dict[str, tuple[Any, LineState]] = {
-    "connecting": (None, fakes.CONNECTING),
-    "running": ({"raws": fakes.RUNNING}, fakes.CONNECTED),
-    "ready": ({"raws": fakes.READY}, fakes.CONNECTED),
-    "fault": ({"raws": fakes.FAULT}, fakes.CONNECTED),
-    "alarm": ({"raws": fakes.ALARM}, fakes.CONNECTED),
-    "stale": (
-        {"raws": fakes.RUNNING, "age": 14.0, "error": "Device 2 did not answer (function 3)."},
-        fakes.CONNECTED,
-    ),
-    "lost": ({"raws": fakes.RUNNING, "age": 12.0, "error": "The line is lost."}, fakes.LOST),
-}
 
 
 @pytest.fixture(autouse=True)
@@ -47,65 +35,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
 
 
-@SIZES
-@pytest.mark.parametrize("state", STATES)
-def test_monitor(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
-    how, line = STATES[state]
-    profile = library.load("atv71")
-    snapshot = fakes.snapshot_of(profile, line=line, **how) if how else None
-    app = fakes.app_of()
-    app.opened = fakes.opened(line)
-
-    console = fakes.console_of(snapshot, line)
-    fakes.choose(app, console)
-
-    async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(MonitorScreen(console))
-        await pilot.pause()
-        app.screen.look()  # type: ignore[attr-defined]
-        await pilot.pause()
-
-    assert snap_compare(app, terminal_size=size, run_before=show)
-
-
 WATCH = TimeoutWatch(10.0, library.load("atv71").data.communication_fault.reactions[6], active=True)  # type: ignore[union-attr]
-LOST_WATCHED = {"raws": fakes.RUNNING, "age": 12.0, "error": "The line is lost."}
-SPECIAL: dict[str, tuple[dict[str, Any], LineState, float, bool]] = {
-    "watched": ({"raws": fakes.RUNNING}, fakes.CONNECTED, 0.2, False),
-    "hungry": (
-        {"raws": fakes.RUNNING, "rate": 0.7, "block": "Scanner inputs"},
-        fakes.CONNECTED,
-        6.2,
-        False,
-    ),
-    "lost-watched": (LOST_WATCHED, fakes.LOST, 7.0, False),
-    "low-bandwidth": ({"raws": fakes.RUNNING}, fakes.CONNECTED, 0.2, True),
-}
-
-
-@SIZES
-@pytest.mark.parametrize("state", SPECIAL)
-def test_watched(
-    snap_compare: Compare, monkeypatch: pytest.MonkeyPatch, state: str, size: tuple[int, int]
-) -> None:
-    how, line, age, low = SPECIAL[state]
-    snapshot = fakes.snapshot_of(library.load("atv71"), line=line, **how)
-    app = fakes.app_of()
-    app.opened, app.low_bandwidth = fakes.opened(line), low
-    console = fakes.console_of(snapshot, line)
-    heard = fakes.StillLine(line, heard=fakes.NOW - age).device_state
-    monkeypatch.setattr(console.session.line, "device_state", heard)
-    found = FoundDrive(fakes.ATV71, console)
-    app.fleet = fakes.StillFleet(found, line_watch=fakes.FakeLineWatch(WATCH), line=line)
-    fakes.choose(app, console)
-
-    async def show(pilot: Pilot[None]) -> None:
-        await app.push_screen(MonitorScreen(console))
-        await pilot.pause()
-        app.screen.look()  # type: ignore[attr-defined]
-        await pilot.pause()
-
-    assert snap_compare(app, terminal_size=size, run_before=show)
 
 
 def found_drives(line: LineState = fakes.CONNECTED) -> fakes.StillFleet:

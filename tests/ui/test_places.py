@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -13,28 +15,22 @@ from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
 from tui.screens.frames.screen import frame_line
 from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, of_screen
+from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
+from tui.screens.monitor.assembly import monitor_parts, words_of
 from tui.screens.monitor.commands import order_keys
-from tui.screens.monitor.motor import motor_lines
-from tui.screens.monitor.state import (
-    header,
-    history_lines,
-    line_lines,
-    message_lines,
-    panel_lines,
-    state_lines,
-)
-from tui.screens.monitor.trends import stacked_trends, trend_lines
+from tui.screens.monitor.motor import motor_lines, other_values, value_cells
+from tui.screens.monitor.readouts import readout_lines
 from tui.screens.monitor.view import View
-from tui.screens.monitor.words import bit_lines, word_pages
 from tui.session.monitor.trend import TrendPoint
 from tui.session.reading import Quality
-from tui.widgets.drawing import aligned, bar, key_line, trend
+from tui.widgets.drawing import key_line
+from tui.widgets.gauge import gauge
 from tui.widgets.palette import STOP_KEY
+from tui.widgets.trend import trend_rows
 
 from . import fakes
 
 PROFILES = [listing.id for listing in library.listings()]
-WIDTHS = st.sampled_from([47, 48, 85])
 
 
 def view_of(profile: Profile, raws: dict[str, int], age: float = 0.1) -> View:
@@ -42,17 +38,12 @@ def view_of(profile: Profile, raws: dict[str, int], age: float = 0.1) -> View:
     line = fakes.StillLine()
     return View(
         profile=profile,
-        identity=fakes.ATV71,
-        device=2,
-        line_label="serial:/dev/ttyUSB0,19200,8E1",
         snapshot=snapshot,
         line=line.state,
         counters=line.counters,
-        load=0.5,
-        trend=tuple(TrendPoint(fakes.NOW - i, (i * 1.0, None)) for i in range(60, 0, -1)),
+        trend=tuple(TrendPoint(fakes.NOW - i, (i * 1.0, None, 50.0)) for i in range(60, 0, -1)),
         period=0.5,
         now=fakes.NOW,
-        clock="14:02:11",
     )
 
 
@@ -72,21 +63,11 @@ def any_raws(draw: st.DrawFn, profile: Profile) -> dict[str, int]:
     }
 
 
-def all_lines(view: View, width: int) -> dict[str, list[Text]]:
-    words = [p for v in view.values if (p := view.profile[v.parameter]).bits]
-    pages = word_pages(words, 12)
-    return {
-        "header": header(view, width),
-        "state": state_lines(view, width),
-        "motor": motor_lines(view, width, 30),
-        "messages": message_lines(view, width),
-        "status": panel_lines(view, width),
-        "history": history_lines(view, width, 10),
-        "line": line_lines(view, width, 10),
-        "trend": trend_lines(view, width, 6),
-        "stacked": stacked_trends(view, width, 12),
-        "words": [line for page in pages for line in bit_lines(view, page, width)],
-    }
+SIZES = st.sampled_from([(40, 12), (60, 20), (80, 24), (100, 30), (120, 40), (200, 60)])
+
+
+def room_of(profile: Profile, size: tuple[int, int]) -> Arrangement:
+    return arrange(*size, len(other_values(profile)))
 
 
 @pytest.mark.parametrize("profile_id", PROFILES)
@@ -94,66 +75,110 @@ def all_lines(view: View, width: int) -> dict[str, list[Text]]:
 @given(data=st.data())
 def test_every_part_keeps_its_size_and_its_width(profile_id: str, data: st.DataObject) -> None:
     profile = library.load(profile_id)
-    width = data.draw(WIDTHS)
-    first = all_lines(view_of(profile, data.draw(any_raws(profile))), width)
-    second = all_lines(view_of(profile, data.draw(any_raws(profile)), age=20.0), width)
+    room = room_of(profile, data.draw(SIZES))
+    word = data.draw(st.none() | st.integers(0, 9))
+    views = [
+        replace(view_of(profile, data.draw(any_raws(profile)), age=age), word=word)
+        for age in (0.1, 20.0)
+    ]
+    first, second = (monitor_parts(view, room, words_of(profile)) for view in views)
     for part, lines in first.items():
         assert len(lines) == len(second[part]), part
         for line in (*lines, *second[part]):
-            assert line.cell_len <= width, (part, line.plain)
+            assert line.cell_len <= room.width, (part, line.plain)
+
+
+@given(width=st.integers(20, 220), height=st.integers(5, 80), count=st.integers(0, 20))
+def test_the_parts_fill_the_terminal_and_no_more(width: int, height: int, count: int) -> None:
+    room = arrange(width, height, count)
+    rows = (room.top, room.values, room.trend, room.words, room.bottom)
+    assert min(rows) >= 0
+    assert sum(rows) <= max(1, height - OUTSIDE)
+    assert room.top >= min(5, height - OUTSIDE)
+
+
+@pytest.mark.parametrize("size", [(60, 20), (80, 24), (120, 40), (200, 60)])
+@pytest.mark.parametrize("profile_id", PROFILES)
+def test_the_parts_have_the_rows_that_they_are_given(
+    profile_id: str, size: tuple[int, int]
+) -> None:
+    profile = library.load(profile_id)
+    room = room_of(profile, size)
+    parts = monitor_parts(view_of(profile, {}), room, words_of(profile))
+    assert len(parts["readouts"]) == room.top
+    assert len(parts["state"]) == room.top
+    assert len(parts["motor"]) == room.values
+    assert len(parts["trend"]) == room.trend
+    assert len(parts["message"]) == room.bottom
+    assert max(len(parts[part]) for part in parts if part.startswith("word")) <= room.words
 
 
 @pytest.mark.parametrize("profile_id", PROFILES)
 @settings(max_examples=40)
 @given(data=st.data())
 def test_numbers_end_and_units_begin_at_one_place(profile_id: str, data: st.DataObject) -> None:
-    """Spans of a measurement: its name, its number, its unit."""
+    """Each column has its numbers to the right, and the units behind them."""
     profile = library.load(profile_id)
-    rows = [motor_lines(view_of(profile, data.draw(any_raws(profile))), 48, 30) for _ in range(2)]
-    places = {(line.spans[0].end, line.spans[1].end) for lines in rows for line in measured(lines)}
-    assert len({number for _, number in places}) <= 1
-    assert len({name for name, _ in places}) <= 1
+    room = room_of(profile, (80, 24))
+    for _ in range(2):
+        view = view_of(profile, data.draw(any_raws(profile)))
+        lines = motor_lines(view, 80, room.values - 1, room.columns)
+        cells = 78 // room.columns
+        for line in lines:
+            for column in range(room.columns):
+                part = line.plain[2 + column * cells : 2 + (column + 1) * cells]
+                end = value_cells(cells, any(v.high for v in other_values(profile))) - 4
+                assert not part.strip() or (part[end - 1] != " " and part[end] == " "), part
 
 
-def measured(lines: list[Text]) -> list[Text]:
-    """The lines that show a value, by the spans that they are made of: name, number, unit."""
-    return [line for line in lines[1:] if len(line.spans) >= 3]
-
-
-@given(st.decimals(-(10**6), 10**6, places=2), st.integers(0, 2))
-def test_decimal_points_are_below_each_other(number: object, places: int) -> None:
-    text = f"{number:.{places}f}"
-    shown = aligned(text, 8, 2)
-    assert len(shown) == 11
-    assert shown.strip() == text
-    assert (shown.index(".") == 8) if places else shown.endswith("   ")
+def test_large_digits_stand_at_one_place_whatever_their_value() -> None:
+    profile = library.load("atv71")
+    found = set()
+    for raw in (0, 5, 500, 5999, -500):
+        rows = readout_lines(view_of(profile, {**fakes.RUNNING, "RFR": raw}), 56)
+        found.add(rows[3].plain.index(" Hz"))
+        assert len({row.cell_len for row in rows}) == 1
+    assert len(found) == 1
 
 
 @given(
-    st.floats(-1e4, 1e4),
+    st.none() | st.floats(-1e4, 1e4),
     st.floats(-200, 0),
     st.floats(1, 200),
     st.integers(4, 60),
     st.none() | st.floats(-1e4, 1e4),
 )
 def test_a_bar_has_its_width_whatever_its_value(
-    value: float, low: float, high: float, width: int, mark: float | None
+    value: float | None, low: float, high: float, width: int, mark: float | None
 ) -> None:
-    drawn = bar(value, low, high, width, mark)
+    drawn = gauge(value, low, high, width, mark)
     assert drawn.cell_len == width
-    assert drawn.plain.count("│") == (mark is not None)
+    assert drawn.plain.count("┃") == (mark is not None)
+
+
+def test_a_bar_is_filled_from_zero_to_either_side() -> None:
+    forward, reverse = gauge(30, 0, 60, 22).plain, gauge(-30, -60, 60, 22).plain
+    assert forward == "├━━━━━━━━━━──────────┤"
+    assert reverse == "├─────━━━━━┼─────────┤"
 
 
 @given(
     st.lists(st.none() | st.floats(-500, 500), max_size=100),
-    st.integers(1, 80),
     st.integers(1, 12),
+    st.booleans(),
 )
 def test_a_trend_has_its_size_whatever_its_values(
-    points: list[float | None], width: int, height: int
+    points: list[float | None], height: int, signed: bool
 ) -> None:
-    rows = trend(points, 60.0, width, height)
-    assert [row.cell_len for row in rows] == [width] * height
+    rows = trend_rows(points, points[::-1], 60.0, height, signed=signed)
+    assert [row.cell_len for row in rows] == [len(points)] * height
+
+
+def test_a_trend_shows_the_sign_and_the_reference_as_a_line_of_its_own() -> None:
+    up = [row.plain for row in trend_rows([0, 30, 60], [60, 60, 60], 60, 2)]
+    assert up == ["▔▔█", "▁██"]
+    down = [row.plain for row in trend_rows([0, -60, None], [-60, -60, 30], 60, 2, signed=True)]
+    assert down == ["▁ ─", "▁█ "]
 
 
 def keys_shown(screen: str, width: int, stops: str = "STOP") -> Text:
@@ -204,6 +229,8 @@ def test_a_value_older_than_three_cycles_is_dimmed_with_its_age() -> None:
     reading = view.reading("RFR")
     assert reading is not None
     assert reading.quality is Quality.STALE
-    row = next(line for line in motor_lines(view, 48, 30) if "Output" in line.plain)
+    heading, *_ = readout_lines(view, 56)
+    assert "Output 7s old" in " ".join(heading.plain.split())
+    row = motor_lines(view, 80, 3, 3)[0]
     assert "7s" in row.plain
-    assert "Hz" not in row.plain
+    assert "rpm" not in row.plain

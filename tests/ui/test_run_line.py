@@ -13,7 +13,7 @@ from tui.screens.monitor import run_line
 from tui.screens.monitor.run_line import RunLine, proposed
 
 from . import fakes
-from .test_command_flows import Bench, bench, writes
+from .test_command_flows import Bench, bench, disarmed, said, writes
 from .test_flows import shown, until
 
 MOMENT = 0.3
@@ -101,12 +101,8 @@ async def ready() -> AsyncIterator[Bench]:
         yield made
 
 
-def said(made: Bench) -> str:
-    return " ".join(shown(made.app, "message").split())
-
-
 def open_lines(made: Bench) -> Callable[[], bool]:
-    return lambda: "Enter" in said(made) and ("RUN " in said(made) or "REFERENCE" in said(made))
+    return lambda: "Esc no" in said(made.app)
 
 
 async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -131,8 +127,7 @@ async def test_enter_before_the_moment_runs_nothing(monkeypatch: pytest.MonkeyPa
 
 async def test_from_arming_to_a_running_motor_in_five_keys() -> None:
     async with bench("atv71") as made:
-        await made.pilot.press("a")
-        await until(made.pilot, lambda: " ARMED" in shown(made.app, "status"))
+        await made.armed()
         await made.pilot.press("r", "3", "0")
         await made.pilot.pause(0.3)
         assert writes(made.app) == []
@@ -171,7 +166,7 @@ async def test_a_stop_closes_the_line_and_enter_comes_too_late(
         await until(made.pilot, lambda: not open_lines(made)())
         assert made.drive().raw("LFR") == 300
         assert made.drive().raw("CMD") == 7
-        assert "NOT ARMED" in shown(made.app, "status")
+        await disarmed(made)
 
 
 async def test_the_end_of_arming_closes_the_line() -> None:
@@ -189,11 +184,11 @@ async def test_the_end_of_arming_closes_the_line() -> None:
 async def test_arrows_edit_the_line_and_step_a_reference_without_one() -> None:
     async with ready() as made:
         await made.pilot.press("f", "up", "up", "pagedown", "backspace", "2", "7")
-        await until(made.pilot, lambda: "REFERENCE at 27 Hz" in said(made))
+        await until(made.pilot, lambda: "REFERENCE at 27 Hz" in said(made.app))
         assert made.drive().raw("LFR") == 300
         await made.pilot.press("enter")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 270)
-        await until(made.pilot, lambda: "DONE" in said(made))
+        await until(made.pilot, lambda: "Esc no" not in said(made.app))
         await made.pilot.press("down")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 260)
 
@@ -204,7 +199,7 @@ async def test_a_step_past_a_limit_goes_to_the_limit() -> None:
         made.drive().set("LSP", 280)
         await made.pilot.press("pageup")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 330)
-        await until(made.pilot, lambda: "DONE" in said(made))
+        await until(made.pilot, lambda: "Esc no" not in said(made.app))
         await made.pilot.press("pagedown")
         await until(made.pilot, lambda: made.drive().raw("LFR") == 280)
 
@@ -212,8 +207,11 @@ async def test_a_step_past_a_limit_goes_to_the_limit() -> None:
 async def test_an_arrow_opens_the_line_where_it_would_start_the_motor() -> None:
     async with bench("atv71") as made:
         await made.armed()
-        await made.refer("0")
+        await made.refer("30")
         await made.run("r")
+        await until(made.pilot, lambda: made.speed() > 2)
+        await made.refer("0")
+        await until(made.pilot, lambda: made.speed() == 0)
         screen = made.app.screen
         await until(made.pilot, lambda: screen._would_start())  # type: ignore[attr-defined]
         before = writes(made.app)
@@ -230,8 +228,48 @@ async def test_a_drive_whose_reference_is_not_given_from_here_has_a_line_without
     async with bench("varmeca") as made:
         await made.armed()
         await made.pilot.press("r")
-        await until(made.pilot, lambda: "the reference is given at the drive" in said(made))
+        await until(made.pilot, lambda: "the reference is given at the drive" in said(made.app))
         await made.pilot.press("3")
-        await until(made.pilot, lambda: "RUN FORWARD" not in said(made))
+        await until(made.pilot, lambda: "RUN FORWARD" not in said(made.app))
         await made.pilot.press("f")
-        await made.message("NOT DONE", "is not known")
+        await made.message("is not known")
+
+
+async def test_at_0_hz_r_says_so_and_takes_a_reference() -> None:
+    async with bench("atv71") as made:
+        await made.armed()
+        await made.pilot.press("r")
+        await until(made.pilot, lambda: "The reference is 0" in said(made.app))
+        before = writes(made.app)
+        await made.pilot.press("enter")
+        await made.message("At 0 the motor would not turn")
+        assert writes(made.app) == before
+        await made.pilot.press("2", "0")
+        await until(made.pilot, lambda: "At 0" not in said(made.app))
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: made.speed() > 2)
+
+
+async def test_the_line_says_before_enter_why_it_has_no_effect_and_what_opens_the_way() -> None:
+    async with bench("atv71") as made:
+        made.drive().set("FR1", 1)  # a terminal gives command and reference
+        await made.armed()
+        await made.message("No effect from here", "not commanded by Modbus", "6 opens Control")
+        await made.pilot.press("r", "2", "0")
+        await made.message("No effect: The drive", "Esc, then 6 opens Control")
+        before = writes(made.app)
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: "Esc no" not in said(made.app))
+        await made.message("The drive is not commanded by Modbus.")
+        assert writes(made.app) == before
+
+
+async def test_the_line_of_keys_shows_only_those_of_the_line() -> None:
+    async with ready() as made:
+        await made.pilot.press("r")
+        await until(made.pilot, lambda: shown(made.app, "keys").split() == KEYS_OF_THE_LINE)
+        await made.pilot.press("escape")
+        await until(made.pilot, lambda: "leave" in shown(made.app, "keys"))
+
+
+KEYS_OF_THE_LINE = ["Space", "STOP", "1", "Enter", "run", "Esc", "no"]

@@ -85,6 +85,8 @@ class LineCounters:
     requests: int = 0
     replies: int = 0
     timeouts: int = 0
+    empty: int = 0
+    """Those of the time-outs that were at addresses where nothing ever answered."""
     checksum: int = 0
     wrong: int = 0
     exceptions: int = 0

@@ -14,6 +14,7 @@ class Tally:
     requests: int = 0
     replies: int = 0
     timeouts: int = 0
+    empty: int = 0
     checksum: int = 0
     wrong: int = 0
     exceptions: int = 0

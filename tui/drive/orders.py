@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from .chart import state_of
 from .errors import DriveError
 from .profile.profile import Profile
-from .profile.schema import Chart, Order, OrderId, Parameter
+from .profile.schema import Chart, Interlock, Order, OrderId, Parameter, When
 
 GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
 """Ways to stop that trip no drive, the gentlest first."""
@@ -159,19 +159,41 @@ MOVING_ORDERS: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking
 
 def interlock(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
     """Why an order must not be sent now, with what to do; empty when it may."""
-    if id in STOP_ORDERS:
+    lock = locked_by(chart, id, raws)
+    if lock is None:
         return ""
+    if lock.parameter not in raws:
+        return f"{lock.parameter} is not known, and it decides: {lock.text}"
+    return f"{lock.text} {lock.remedy}".strip()
+
+
+def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock | None:
+    """The first interlock that holds an order back now, or whose word is not known."""
+    if id in STOP_ORDERS:
+        return None
     for lock in chart.interlocks:
         if id not in (lock.orders or MOVING_ORDERS):
             continue
         if not all(raws.get(when.parameter) in when.values for when in lock.when):
             continue
         raw = raws.get(lock.parameter)
-        if raw is None:
-            return f"{lock.parameter} is not known, and it decides: {lock.text}"
-        if raw & lock.mask not in lock.values:
-            return f"{lock.text} {lock.remedy}".strip()
-    return ""
+        if raw is None or raw & lock.mask not in lock.values:
+            return lock
+    return None
+
+
+def unmet(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> When | None:
+    """A condition of every form of an order that surely does not hold now, whatever the state."""
+    first = None
+    for order in chart.orders:
+        if order.id != id:
+            continue
+        known = [when for when in order.when if when.parameter in raws]
+        wrong = next((w for w in known if raws[w.parameter] not in w.values), None)
+        if wrong is None:
+            return None
+        first = first or wrong
+    return first
 
 
 def interlock_codes(chart: Chart) -> list[str]:

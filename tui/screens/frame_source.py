@@ -198,11 +198,12 @@ def stands_by(console: DriveConsole, state: DriveState) -> bool:
     """Whether the motor stands and the next command from here runs it."""
     if state.kind not in ("blocked", "ready", "stopped"):
         return False
-    from tui.drive.orders import chart_in_force, interlock
+    from tui.drive.orders import chart_in_force
 
-    raws = console.session.image.raws
-    chart = chart_in_force(console.session.profile, raws)
-    return chart is not None and not interlock(chart, "forward", raws)
+    from .command.control import hindrance
+
+    profile, raws = console.session.profile, console.session.image.raws
+    return chart_in_force(profile, raws) is not None and hindrance(profile, raws) is None
 
 
 def _value(console: DriveConsole, readings: dict[str, Reading], quantity: str) -> tuple[str, str]:

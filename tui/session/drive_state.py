@@ -107,6 +107,15 @@ def _headline(chart: ChartState, fault: FaultCode | None) -> str:
     return words
 
 
+def with_direction(parameter: Parameter, number: float, state: DriveState) -> float:
+    """A frequency with the sign of its direction.
+
+    A drive that gives it without one tells the direction of its motor beside it.
+    """
+    signed = parameter.type.startswith("int")
+    return -number if not signed and state.direction == "reverse" else number
+
+
 def channel_text(parameter: Parameter, reading: Reading | None) -> str:
     """Who commands or gives the reference, from an enumeration or a word of one bit a channel."""
     if reading is None or reading.raw is None:

@@ -1,10 +1,9 @@
-"""Drawing with characters: numbers at their place, bars, rules, trends; pure functions."""
+"""Drawing with characters: rules, cut and wrapped text, lines of keys; pure functions."""
 
 from __future__ import annotations
 
 import textwrap
 from collections.abc import Callable, Collection, Sequence
-from decimal import Decimal
 
 from rich.style import Style
 from rich.text import Text
@@ -14,19 +13,13 @@ from tui.drive.plain import plain
 from .palette import (
     ALARM,
     ATTENTION_BLOCK,
-    BAR,
-    BAR_REST,
     FAINT,
     KEY,
     LINE,
-    MARK,
-    PLAIN,
     STOP_KEY,
     STRONG,
     TITLE,
 )
-
-EIGHTHS_HIGH = " ▁▂▃▄▅▆▇█"
 
 
 def rule(title: str, width: int, right: str = "") -> Text:
@@ -69,85 +62,6 @@ def wrapped(text: str, width: int, most: int) -> list[str]:
     return textwrap.wrap(text, width, max_lines=most, placeholder=" …")
 
 
-def aligned(text: str, whole: int, decimals: int) -> str:
-    """A number with its decimal point at a fixed place; other text to the right."""
-    width = whole + (decimals + 1 if decimals else 0)
-    try:
-        number = Decimal(text)
-    except ArithmeticError:
-        return f"{text:>{width}}"[:width] if len(text) > width else f"{text:>{width}}"
-    if not number.is_finite():
-        return f"{text:>{width}}"
-    left, _, right = text.partition(".")
-    if not decimals:
-        return f"{left:>{whole}}"
-    return f"{left:>{whole}}" + (f".{right:<{decimals}}" if right else " " * (decimals + 1))
-
-
-def bar(
-    value: float | None,
-    low: float,
-    high: float,
-    width: int,
-    mark: float | None = None,
-    style: Style = BAR,
-) -> Text:
-    """A bar from zero (or the low end) to the value, between thin ends, with a mark on it."""
-    text = Text(no_wrap=True)
-    inner = max(1, width - 2)
-    cells = [(" ", BAR_REST)] * inner
-    if value is not None and high > low:
-        start = _place(max(low, min(high, 0.0)), low, high, inner)
-        end = _place(value, low, high, inner)
-        cells = [_cell(i, min(start, end), max(start, end), style) for i in range(inner)]
-    if mark is not None and high > low:
-        at = min(inner - 1, int(_place(mark, low, high, inner)))
-        cells[at] = ("│", MARK)
-    text.append("▕", LINE)
-    for character, one in cells:
-        text.append(character, one)
-    text.append("▏", LINE)
-    return text
-
-
-def _place(value: float, low: float, high: float, width: int) -> float:
-    return (max(low, min(high, value)) - low) / (high - low) * width
-
-
-def _cell(index: int, start: float, end: float, style: Style) -> tuple[str, Style]:
-    filled = max(0.0, min(end, index + 1) - max(start, index))
-    if filled <= 0:
-        return "·", BAR_REST
-    return ("▆" if filled >= 0.5 else "▖"), style  # leaves a gap to the bar above
-
-
-def trend(
-    points: Sequence[float | None], high: float, width: int, height: int, style: Style = BAR
-) -> list[Text]:
-    """Columns of block characters, the newest at the right; a gap where there was no value."""
-    rows: list[Text] = []
-    last = list(points)[-width:]
-    shown: list[float | None] = [*([None] * (width - len(last))), *last]
-    levels = [
-        None if p is None else max(0, min(height * 8, round(abs(p) / high * height * 8)))
-        for p in shown
-    ]
-    for row in range(height - 1, -1, -1):
-        text = Text(no_wrap=True)
-        line = "".join(_column(level, row) for level in levels)
-        text.append(line, style)
-        rows.append(text)
-    return rows
-
-
-def _column(level: int | None, row: int) -> str:
-    if level is None:
-        return " "
-    if row == 0 and level == 0:
-        return "▁"
-    return EIGHTHS_HIGH[max(0, min(8, level - row * 8))]
-
-
 KeyLabel = tuple[str, str, str]
 """An action, its key and its label in the line of keys."""
 
@@ -186,11 +100,3 @@ def armed_text(armed: float | None, *, lost: bool = False) -> Text:
     if armed is None:
         return Text(" NOT ARMED  ", ALARM if lost else STRONG)
     return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
-
-
-def pair(label: str, value: str, style: Style = PLAIN, width: int = 12) -> Text:
-    """A dim label and its value, behind a label of `width`."""
-    text = Text(no_wrap=True)
-    text.append(f"{label:<{width}}", FAINT)
-    text.append(value, style)
-    return text

@@ -239,6 +239,8 @@ class Dispatcher:
                 error = WrongReply(*place, result.detail, result.received)
             case _:
                 self._tally.timeouts += 1
+                if not self._devices[request.device].ever_answered:
+                    self._tally.empty += 1
                 self._devices.silent(request.device, expectation, result.sent, now)
                 error = NoAnswer(*place, self._no_answer(job, result.detail))
         if self._is_repeated(job, result.kind):

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from decimal import Decimal
 from functools import partial
 
-from tui.drive.orders import OrderRefused, chart_in_force, interlock
+from tui.drive.orders import OrderRefused, chart_in_force
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
 
 from .arming import ArmingKeys
-from .control import Control
+from .control import Control, hindrance
 
 SHOWN_DONE = 8.0
 SHOWN_REFUSED = 20.0
@@ -42,7 +42,6 @@ class OrderKeys(ArmingKeys):
     def control(self, now: float) -> Control:
         """Whether and how the drive is commanded from here, for the screen."""
         commander, raws = self.commander, self.session.image.raws
-        chart = chart_in_force(self.session.profile, raws)
         outcome = commander.outcome
         if outcome is not None:
             shown = SHOWN_REFUSED if outcome.kind == "refused" else SHOWN_DONE
@@ -51,7 +50,7 @@ class OrderKeys(ArmingKeys):
             armed_for=commander.armed_for,
             why_disarmed=self.session.arming.why_disarmed,
             outcome=outcome,
-            no_effect=interlock(chart, "forward", raws) if chart else "",
+            hindrance=hindrance(self.session.profile, raws),
             offer=self._offer(),
             lost=commander.given.lost_orders(),
         )

@@ -30,4 +30,4 @@ def works_now(view: View, action: str) -> bool:
         return False
     if action == "reset":
         return view.snapshot.state.kind == "fault"
-    return not view.control.no_effect or action == "run_line('reference')"
+    return view.control.hindrance is None or action == "run_line('reference')"

@@ -1,25 +1,23 @@
-"""The values of the monitoring set as numbers and bars; pure functions of a view."""
+"""The other values of the monitoring set, in columns; pure functions of a view."""
 
 from __future__ import annotations
 
 from rich.text import Text
 
 from tui.drive.profile.profile import Profile, is_verified
-from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
+from tui.drive.profile.schema import MonitoringValue, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
-from tui.session.reading import Quality, Reading
-from tui.widgets.drawing import aligned, bar, cut, rule
+from tui.session.reading import Quality
+from tui.widgets.drawing import short
 from tui.widgets.drive_signs import age_text
-from tui.widgets.palette import FAINT, LINE, STALE, STRONG
+from tui.widgets.gauge import gauge
+from tui.widgets.palette import FAINT, STALE, STRONG
 
-from .view import View, end_of
+from .view import View, end_of, readout_parameter
 
 LABELS: dict[Quantity, str] = {
-    "output_frequency": "Output",
-    "frequency_reference": "Reference",
     "ramp_output": "After ramp",
     "speed": "Speed",
-    "motor_current": "Current",
     "motor_voltage": "Motor voltage",
     "mains_voltage": "Mains",
     "dc_bus": "DC bus",
@@ -34,26 +32,29 @@ LABELS: dict[Quantity, str] = {
     "run_hours": "Run time",
     "power_on_hours": "Power-on time",
 }
-LABEL_WIDTH = 14
-WHOLE, DECIMALS, UNIT_WIDTH = 6, 2, 5
-VALUE_COLUMNS = WHOLE + DECIMALS + 1
+IN_READOUTS: frozenset[Quantity] = frozenset(
+    {"output_frequency", "frequency_reference", "motor_current"}
+)
+UNIT_CELLS, NUMBER_CELLS = 3, 7
+VALUE_CELLS = 24
+"""Cells of a value beside its bar."""
+VALUE_CELLS_MOST = 30
+BAR_CELLS, END_CELLS = 8, 4
+NO_ROOM = "on 3"
+"""Where what there is no room for is read."""
 
 
-def motor_lines(view: View, width: int, height: int) -> list[Text]:
-    """The values of the monitoring set as numbers and bars, in the profile's order."""
-    lines = [rule("Motor", width, "ends of the bars are the drive's" if width > 60 else "")]
-    shown = [v for v in view.values if _is_measurement(view.profile, v)]
-    barred = any(value.high for value in shown)
-    label = LABEL_WIDTH if barred else max(LABEL_WIDTH, width - VALUE_COLUMNS - UNIT_WIDTH - 3)
-    lines += [_measurement(view, value, width, min(label, 40)) for value in shown]
-    if len(lines) > (height := max(1, height)):
-        hidden = len(lines) - height + 1
-        lines[height - 1 :] = [Text(f" {hidden} more values in a taller terminal", FAINT)]
-    return lines
+def other_values(profile: Profile) -> list[MonitoringValue]:
+    """The values beside the readouts, in the profile's order."""
+    return [value for value in profile.data.monitoring.values if _is_other(profile, value)]
 
 
-def _is_measurement(profile: Profile, value: MonitoringValue) -> bool:
+def _is_other(profile: Profile, value: MonitoringValue) -> bool:
     parameter = profile[value.parameter]
+    shown = (readout_parameter(profile, "output_frequency"),
+             readout_parameter(profile, "motor_current"))  # fmt: skip
+    if parameter in shown or parameter.quantity in IN_READOUTS:
+        return False
     if parameter.quantity in LABELS:
         return True
     if parameter.bits or is_enumeration(parameter) or parameter.quantity is not None:
@@ -63,60 +64,53 @@ def _is_measurement(profile: Profile, value: MonitoringValue) -> bool:
     )
 
 
-def _measurement(view: View, value: MonitoringValue, width: int, label_width: int) -> Text:
+def motor_lines(view: View, width: int, rows: int, columns: int) -> list[Text]:
+    """The values column by column; what does not fit is counted, with where it is read."""
+    values = other_values(view.profile)
+    room = rows * columns
+    hidden = len(values) - room + 1 if len(values) > room else 0
+    cells = (width - 2) // columns
+    barred = any(value.high for value in values)
+    places = [_value(view, value, cells, barred) for value in values[: room - bool(hidden)]]
+    if hidden and room:
+        places.append(Text(short(f"{hidden} more values {NO_ROOM}", cells - 1), FAINT))
+    lines = [Text("  ", no_wrap=True) for _ in range(rows)]
+    for at, place in enumerate(places):
+        line = lines[at % rows]
+        line.append_text(place)
+        line.append(" " * (cells - place.cell_len))
+    return lines
+
+
+def value_cells(cells: int, barred: bool) -> int:
+    """How many cells of a column name, number and unit have."""
+    with_bar = VALUE_CELLS + 2 + BAR_CELLS + END_CELLS
+    return VALUE_CELLS if barred and cells >= with_bar else min(cells - 2, VALUE_CELLS_MOST)
+
+
+def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text:
+    """Its name, its number to the right, its unit; behind it a bar where there is room."""
     parameter = view.profile[value.parameter]
-    reading = view.reading(value.parameter)
-    text = Text(no_wrap=True)
+    columns = value_cells(cells, barred)
     mark = "" if is_verified(parameter) else " ?"
-    label = LABELS.get(parameter.quantity) if parameter.quantity else None
-    name = label or f"{parameter.code} {parameter.name}"
-    short = cut(name, min(len(name), label_width - len(mark)))
-    text.append(f" {short + mark:<{label_width}}", FAINT)
-    _append_value(text, parameter, reading, view.now)
-    rest = width - text.cell_len - 1
-    if rest >= 8:
-        text.append(" ")
-        text.append_text(_bar(view, value, parameter, reading, rest))
-    return text
-
-
-def _append_value(text: Text, parameter: Parameter, reading: Reading | None, now: float) -> None:
+    name = LABELS.get(parameter.quantity) if parameter.quantity else None
+    room = columns - NUMBER_CELLS - UNIT_CELLS - 1
+    label = short(name or parameter.name, room - len(mark)) + mark
+    text = Text(f"{label:<{room}}", FAINT, no_wrap=True)
+    reading = view.reading(value.parameter)
     if reading is None or reading.raw is None:
-        text.append(f"{NOT_AVAILABLE:>{VALUE_COLUMNS}}", FAINT)
-        text.append(f" {cut(parameter.unit or 'raw', UNIT_WIDTH)}", FAINT)
-        return
-    shown, unit = reading.text, reading.unit or "raw"
-    if reading.physical is not None:
-        shown, unit = reading.physical.text, reading.physical.unit
-    if reading.quality is Quality.GOOD:
-        text.append(aligned(shown, WHOLE, DECIMALS), STRONG)
-        text.append(f" {cut(unit, UNIT_WIDTH)}", FAINT)
-    else:
-        text.append(aligned(shown, WHOLE, DECIMALS), STALE)
-        text.append(f" {cut(age_text(reading.age(now)), UNIT_WIDTH)}", STALE)
-
-
-def _bar(
-    view: View,
-    value: MonitoringValue,
-    parameter: Parameter,
-    reading: Reading | None,
-    width: int,
-) -> Text:
+        text.append(f"{NOT_AVAILABLE:>{NUMBER_CELLS}}", FAINT)
+        return text.append(f" {short(parameter.unit or 'raw', UNIT_CELLS):<{UNIT_CELLS}}", FAINT)
+    good = reading.quality is Quality.GOOD
+    own = reading.physical or reading.value
+    shown, unit = (own.text, own.unit) if own is not None else (reading.text, reading.unit)
+    text.append(f"{short(shown, NUMBER_CELLS):>{NUMBER_CELLS}}", STRONG if good else FAINT)
+    told = unit or "raw" if good else age_text(reading.age(view.now))
+    text.append(f" {short(told, UNIT_CELLS):<{UNIT_CELLS}}", FAINT if good else STALE)
     high = end_of(view, value.high)
-    low = end_of(view, value.low) or 0.0
-    if high is None or high <= low:
-        return Text("")
-    fresh = reading is not None and reading.quality is Quality.GOOD
-    number = reading.number if reading is not None and fresh else None
-    mark = None
-    if parameter.quantity == "output_frequency":
-        reference = view.profile.quantity("frequency_reference")
-        target = view.reading(reference.code) if reference else None
-        if target and target.quality is Quality.GOOD and target.number is not None:
-            mark = abs(target.number)
-        number = abs(number) if number is not None else None
-    ends = f" {high:g}"
-    drawn = bar(number, low, high, max(4, width - 6), mark)
-    drawn.append(cut(ends, 6), LINE)
-    return drawn
+    if cells >= columns + 2 + BAR_CELLS + END_CELLS and high is not None and good:
+        low = end_of(view, value.low) or 0.0
+        text.append("  ")
+        text.append_text(gauge(reading.number, low, high, BAR_CELLS))
+        text.append(short(f"{high:g}", END_CELLS), FAINT)
+    return text

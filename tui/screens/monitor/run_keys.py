@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from decimal import Decimal
 
+from rich.style import Style
 from rich.text import Text
 from textual.events import Key
 
@@ -13,8 +14,11 @@ from tui.drive.shown import number_of
 from tui.session.command.reference import reference_codes
 from tui.session.reading import Reading
 from tui.terminal.stroke import stroke_of
+from tui.widgets.drawing import key_line, key_styles
+from tui.widgets.palette import FAINT
 
 from ..command.command_keys import OrderKeys
+from ..command.control import hindrance
 from ..keys.monitor_actions import COMMAND_ACTIONS
 from .run_line import GIVEN, STEPS, Purpose, RunLine, limits, proposed, run_lines
 
@@ -78,7 +82,21 @@ class RunKeys(OrderKeys):
         if line.stamp != self.session.work.stops or not self._armed():
             self._line = None  # a stop, or the end of arming, has closed it
             return None
-        return run_lines(line, self.session.profile, self._around or {}, now, width)
+        found = hindrance(self.session.profile, self.session.image.raws)
+        told = f"{found.text} {_after_esc(found.way)}" if found else ""
+        return run_lines(line, self.session.profile, self._around or {}, now, width, told)
+
+    def run_line_keys(self, now: float) -> Text:
+        """The keys that mean something while the line is open."""
+        line = self._line
+        does = "give" if line is not None and line.purpose == "reference" else "run"
+        counts = line is not None and line.counts(now)
+
+        def styles(action: str) -> tuple[Style, Style]:
+            return (FAINT, FAINT) if action == "enter" and not counts else key_styles(action)
+
+        keys = [("stop_by_space", "Space", self.app.stops_whom), ("enter", "Enter", does)]
+        return key_line([*keys, ("close", "Esc", "no")], styles)
 
     def on_key(self, event: Key) -> None:
         """While the line is open every key but a stop's is the line's; an unknown one closes it."""
@@ -146,6 +164,11 @@ class RunKeys(OrderKeys):
         reading = latest.readings.get(frequency.code) if frequency else None
         number = reading.value.number if reading is not None and reading.value else None
         return number == Decimal(0)
+
+
+def _after_esc(way: str) -> str:
+    """The way out by a key, which types into the line as long as that is open."""
+    return f"Esc, then {way}" if way[1:2] == " " else way
 
 
 def _alone(event: Key) -> bool:

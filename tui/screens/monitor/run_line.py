@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from typing import Literal
 
+from rich.style import Style
 from rich.text import Text
 
 from tui.drive.errors import ValueRefused
@@ -15,8 +16,17 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 from tui.session.command.reference import LIMITS, parse_reference
 from tui.session.reading import Reading
-from tui.widgets.drawing import short
-from tui.widgets.palette import ALARM, FAINT, KEY, PLAIN, STOP_KEY, STRONG
+from tui.widgets.drawing import wrapped
+from tui.widgets.palette import (
+    ALARM,
+    ATTENTION,
+    FAINT,
+    KEY,
+    PLAIN,
+    STOP_KEY,
+    STRONG,
+    SURFACE,
+)
 
 Purpose = Literal["forward", "reverse", "reference"]
 
@@ -30,6 +40,8 @@ STEPS: Mapping[str, Decimal] = {
 }
 """By key, the step of a reference in Hz, or in tens of rpm."""
 DIGITS_MOST = 7
+AT_ZERO = "At 0 the motor would not turn: type a reference, then Enter."
+GROUND_OF_LINE = Style(bgcolor=SURFACE)
 GIVEN: tuple[tuple[Quantity, str], ...] = (("command_frequency", "Hz"), ("command_speed", "rpm"))
 """Where a reference is given, and in which unit; the first that a family has."""
 RUN_HEADINGS: Mapping[Purpose, str] = {
@@ -95,10 +107,20 @@ class RunLine:
         """Whether Enter was meant for this line: it stood there long enough to be read."""
         return now - self.opened >= SETTLED
 
+    @property
+    def is_zero(self) -> bool:
+        """Whether what stands in it turns no motor."""
+        try:
+            return bool(self.unit) and Decimal(self.text or "0") == 0
+        except InvalidOperation:
+            return False
+
     def checked(self, profile: Profile, readings: Mapping[str, Reading]) -> RunLine:
         """With what is wrong with the reference, if anything is."""
         if not self.unit:
             return self
+        if self.text and self.is_zero and self.purpose != "reference":
+            return replace(self, fault=AT_ZERO)
         try:
             parse_reference(profile, self.reference or "", readings)
         except ValueRefused as refused:
@@ -145,33 +167,64 @@ def _number(
 
 
 def run_lines(
-    line: RunLine, profile: Profile, readings: Mapping[str, Reading], now: float, width: int
+    line: RunLine,
+    profile: Profile,
+    readings: Mapping[str, Reading],
+    now: float,
+    width: int,
+    hindrance: str = "",
 ) -> list[Text]:
-    """The line and its keys, as long as it is open."""
-    first = Text(" ", no_wrap=True)
-    first.append(RUN_HEADINGS[line.purpose], STRONG)
-    if line.unit:
-        first.append(" at ", STRONG)
-        first.append(f" {line.text:>{DIGITS_MOST}} ", "bold white on #101214")
-        first.append(f" {line.unit}  ", PLAIN)
-        first.append(_around(line, profile, readings), FAINT)
-    else:
-        first.append("  the reference is given at the drive", FAINT)
-    first.truncate(width, overflow="ellipsis")
+    """The line, what must be known before Enter above it, and its keys below.
+
+    `hindrance` says why a run command would have no effect now, and what opens the way.
+    """
+    told = [Text(f" {part}", style) for part, style in _told(line, hindrance, width - 2)]
+    lines = [*(told or [Text("")]), _first(line, profile, readings), _second(line, now)]
+    for one in lines:
+        one.no_wrap = True
+        one.truncate(width, overflow="ellipsis")
+        one.append(" " * (width - one.cell_len))
+        one.stylize_before(GROUND_OF_LINE)
+    return lines
+
+
+def _told(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Style]]:
+    """What is wrong with the reference, why the command has no effect, or that it is 0."""
     if line.fault:
-        return [first, Text(f" {short(line.fault, width - 1)}", ALARM)]
-    does = "gives it" if line.purpose == "reference" else "runs"
-    second = Text(" ", no_wrap=True)
+        said, style = line.fault, ALARM
+    elif hindrance and line.purpose != "reference":
+        said, style = f"No effect: {hindrance}", ALARM
+    elif line.is_zero and line.purpose != "reference":
+        said, style = "The reference is 0: type the one to run at.", ATTENTION
+    else:
+        return []
+    return [(part, style) for part in wrapped(said, width, 2)]
+
+
+def _first(line: RunLine, profile: Profile, readings: Mapping[str, Reading]) -> Text:
+    """What Enter does, the reference as typed, and its limits."""
+    first = Text(" ")
+    first.append(RUN_HEADINGS[line.purpose], STRONG)
+    if not line.unit:
+        return first.append("  the reference is given at the drive", FAINT)
+    first.append(" at ", STRONG)
+    first.append(f" {line.text:>{DIGITS_MOST}} ", "bold white on #101214")
+    first.append(f" {line.unit}  ", PLAIN)
+    return first.append(_around(line, profile, readings), FAINT)
+
+
+def _second(line: RunLine, now: float) -> Text:
+    """The keys of the line."""
+    second = Text(" ")
     second.append("Enter", KEY if line.counts(now) else FAINT)
-    second.append(f" {does}   ", FAINT)
+    second.append(" gives it   " if line.purpose == "reference" else " runs   ", FAINT)
     if line.unit:
         second.append("↑ ↓", KEY)
         second.append(f" {1 if line.unit == 'Hz' else 10} {line.unit}   ", FAINT)
     second.append("Esc", KEY)
     second.append(" no   ", FAINT)
     second.append("Space", STOP_KEY)
-    second.append(" stops", FAINT)
-    return [first, second]
+    return second.append(" stops", FAINT)
 
 
 def _around(line: RunLine, profile: Profile, readings: Mapping[str, Reading]) -> str:
@@ -184,7 +237,8 @@ def _around(line: RunLine, profile: Profile, readings: Mapping[str, Reading]) ->
     if ramp is not None:
         parts.append(f"ramp {ramp:f} s")
         rated = _number(profile, "rated_frequency", readings)
-        if rated and line.unit == "Hz" and line.purpose != "reference":
+        reaches = rated and line.unit == "Hz" and line.purpose != "reference" and not line.fault
+        if rated and reaches and not line.is_zero:
             with suppress(InvalidOperation):
                 parts.append(f"there in {Decimal(line.text or 0) / rated * ramp:.1f} s")
     return " · ".join(parts)

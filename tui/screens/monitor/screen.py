@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from decimal import Decimal, InvalidOperation
 from typing import ClassVar
 
@@ -12,43 +11,27 @@ from textual.containers import Horizontal, Vertical
 from textual.events import Resize
 from textual.timer import Timer
 
-from tui.drive.profile.schema import Parameter
-from tui.screens.monitor.motor import motor_lines
-from tui.screens.monitor.state import (
-    header,
-    history_lines,
-    line_lines,
-    message_lines,
-    panel_lines,
-    state_lines,
-)
-from tui.screens.monitor.trends import stacked_trends, trend_lines
-from tui.screens.monitor.view import SPANS, USUAL_SPAN, View
-from tui.screens.monitor.words import bit_lines, word_pages
-from tui.session.command.stop_report import Phase, StopReport
 from tui.session.console import DriveConsole
 from tui.session.reading import Rating
 from tui.widgets.lines import Lines
+from tui.widgets.palette import STALE
 
+from ..frame import FrameView
 from ..keys.table import MONITOR, bindings, keys_line
+from .arrange import Arrangement, arrange
+from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, words_of
 from .commands import order_keys
+from .motor import other_values
 from .run_keys import RunKeys
+from .source import ViewSource
+from .view import SPANS, USUAL_SPAN, View
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
 LOW_BANDWIDTH_REFRESH = 2.0
 STILL_TOLD = 5.0
 """Seconds under a dialog after which it is told that the values below it stand still."""
-STOP_TOLD = {Phase.STOPPED: 10.0, Phase.FAILED: 60.0}
-"""Seconds for which the end of a stop is shown."""
-WIDE_WORDS = (110, 36)
-"""Columns and rows from which all words stand side by side."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
-SMALL_LEFT = 32
-WIDE_LEFT = 34
-WORD_WIDTH = 30
-WORDS_HEIGHT = 16
-WIDE_MOTOR = 46
 
 
 class MonitorScreen(RunKeys):
@@ -62,34 +45,34 @@ class MonitorScreen(RunKeys):
         super().__init__()
         self.console = console
         self.session = console.session
-        self._word = 0
+        self._source: ViewSource | None = None
+        profile = self.session.profile
+        self._word: int | None = None if profile.quantity("output_frequency") else 0
+        """The word with all its bits in the place of the trend, which is None."""
+        self._words = words_of(profile)
         self._span = SPANS.index(USUAL_SPAN)
         self._timer: Timer | None = None
         self._still: Timer | None = None
-        self._busy: tuple[float, float] | None = None
-        self._load = 0.0
-        self._was = ""
+        self._run_rows = 0
+        self._placed: tuple[Arrangement, int, int] | None = None
 
     def body(self) -> ComposeResult:
         """Fixed places, filled by lines."""
-        yield Lines(id="header")
-        with Horizontal(id="body"):
-            with Vertical(id="left"):
+        with Vertical(id="body"):
+            with Horizontal(id="top"):
+                yield Lines(id="readouts")
                 yield Lines(id="state")
-                yield Lines(id="word")
-                yield Lines(id="history")
-            with Vertical(id="right"):
-                yield Lines(id="motor")
-                yield Lines(id="trend")
-        with Horizontal(id="words"):
-            for index in range(4):
-                yield Lines(id=f"word{index}", classes="word")
+            yield Lines(id="motor")
+            yield Lines(id="trend")
+            with Horizontal(id="words"):
+                for index in range(WORDS_MOST):
+                    yield Lines(id=f"word{index}", classes="word")
         yield Lines(id="message")
-        yield Lines(id="status")
 
     def on_mount(self) -> None:
         """Start watching."""
-        self.console.monitor.start(period=self.app.period, extra=self._extras())
+        beside = codes_beside(self.session.profile)
+        self.console.monitor.start(period=self.app.period, extra=beside)
         self._timer = self.set_interval(
             LOW_BANDWIDTH_REFRESH if self.app.low_bandwidth else REFRESH, self.look
         )
@@ -100,10 +83,8 @@ class MonitorScreen(RunKeys):
         self.console.monitor.stop()
 
     def on_resize(self, event: Resize) -> None:
-        """More room, more words."""
-        self.set_class(
-            event.size.width >= WIDE_WORDS[0] and event.size.height >= WIDE_WORDS[1], "wide"
-        )
+        """More room, more of everything."""
+        self._place(self._room())
 
     def on_screen_suspend(self) -> None:
         """Stand still while another screen is on top.
@@ -118,8 +99,8 @@ class MonitorScreen(RunKeys):
     def _tell_still(self, since: str) -> None:
         """Nobody shall take what shines through under a dialog for the present."""
         if self.app.screen.styles.background.a < 1:
-            view = replace(self._view(), clock=f"as of {since}")
-            self.put("header", header(view, self.size.width))
+            lead = [Text("")] * self._room().lead
+            self.put("state", [*lead, Text(f"as of {since}", STALE)])
 
     def on_screen_resume(self) -> None:
         """Look again after another screen was on top."""
@@ -129,143 +110,62 @@ class MonitorScreen(RunKeys):
             self._timer.resume()
         self.call_after_refresh(self.look)
 
-    @property
-    def wide(self) -> bool:
-        """Whether all words stand side by side."""
-        return self.has_class("wide")
+    def draw_frame(self, view: FrameView) -> None:
+        """A message of several lines moves what stands above it, and hides none of it."""
+        super().draw_frame(view)
+        self._place(self._room())
+
+    def _room(self) -> Arrangement:
+        """How many rows each part has."""
+        return arrange(*self.size, len(other_values(self.session.profile)))
+
+    def _said_rows(self) -> int:
+        """Rows of the message."""
+        height = self.query_one("#said").styles.height
+        return int(height.value) if height is not None else 1
+
+    def _place(self, room: Arrangement) -> None:
+        """Give each part its rows; only where they change is anything laid out anew."""
+        if len(self.query(".word")) < WORDS_MOST:
+            return  # not made yet
+        bottom = max(room.bottom, self._run_rows)
+        placed = (room, bottom, self._said_rows())
+        if placed == self._placed:
+            return
+        self._placed = placed
+        self.set_class(not room.big, "plain")
+        rows = {"top": room.top, "motor": room.values, "trend": room.trend, "words": room.words}
+        for place, height in rows.items():
+            self.query_one(f"#{place}").styles.height = height
+        self.query_one("#state").styles.width = room.state_width if room.big else "1fr"
+        for index in range(WORDS_MOST):
+            shown = room.wide and (index + 1) * 30 <= room.width
+            self.query_one(f"#word{index}").display = shown
+        message = self.query_one("#message")
+        message.styles.height = bottom
+        message.styles.margin = (0, 0, 1 + placed[2], 0)
 
     def draw(self, width: int) -> None:
         """Show the latest snapshot; which keys work now depends on it."""
-        self._put_all(self._parts(self._view(), width))
-        self.ask_unrecorded()
-
-    def _put_all(self, parts: dict[str, list[Text]]) -> None:
+        view, room = self._view(), self._room()
+        parts = monitor_parts(view, room, self._words)
+        if (run := self.run_line_lines(view.now, width)) is not None:
+            parts["message"] = [*[Text("")] * (room.bottom - len(run)), *run]
+            parts["keys"] = [self.run_line_keys(view.now)]
+        else:
+            keys = keys_line(MONITOR, width, self.app.stops_whom)
+            parts["keys"] = [order_keys(view, keys)]
+        self._run_rows = len(run or ())
+        self._place(room)
         for place, lines in parts.items():
             self.put(place, lines)
+        self.ask_unrecorded()
 
     def _view(self) -> View:
-        now = self.app.clock.monotonic()
-        monitor = self.console.monitor
-        counters = self.session.line.counters
-        self._measure_load(now, counters.busy_seconds)
-        snapshot = monitor.latest
-        if snapshot is not None and not snapshot.error and snapshot.state.kind != "unknown":
-            self._was = snapshot.state.headline
-        return View(
-            profile=self.session.profile,
-            identity=self.session.identity,
-            device=self.session.device,
-            line_label=self.app.line_label,
-            snapshot=snapshot,
-            line=self.session.line.state,
-            counters=counters,
-            load=self._load,
-            trend=monitor.trend,
-            period=monitor.period,
-            now=now,
-            clock=self.app.clock.time_of_day(),
-            read_only=self.app.read_only,
-            low_bandwidth=self.app.low_bandwidth,
-            watch=self.app.fleet.line_watch.watch(self.session.device) if self.app.fleet else None,
-            heard=self.session.line.device_state(self.session.device).heard,
-            control=self.control(now),
-            stop=self._stop(now),
-            was=self._was,
-            span=SPANS[self._span],
-            unseen=not self.console.recorder.seen,
-        )
-
-    def _stop(self, now: float) -> StopReport | None:
-        """What a stop of this drive has come to; a good end is told for a while only."""
-        fleet = self.app.fleet
-        report = fleet.stopper.reports.get(self.session.device) if fleet else None
-        if report is None or self._is_overtaken(report):
-            return None
-        return report if now - report.since < STOP_TOLD.get(report.phase, now) else None
-
-    def _is_overtaken(self, report: StopReport) -> bool:
-        """Whether something newer is true: a later command, or a motor that runs again."""
-        outcome, latest = self.session.work.outcome, self.console.latest
-        if outcome is not None and outcome.time > report.since:
-            return True
-        runs = latest is not None and not latest.error and latest.state.kind == "running"
-        return runs and report.phase is Phase.STOPPED
-
-    def _measure_load(self, now: float, busy: float) -> None:
-        """Share of the last seconds in which the line was busy."""
-        if self._busy is None:
-            self._busy = (now, busy)
-            return
-        since, before = self._busy
-        if now - since >= 2.0:
-            self._load = min(1.0, max(0.0, (busy - before) / (now - since)))
-            self._busy = (now, busy)
-
-    def _parts(self, view: View, width: int) -> dict[str, list[Text]]:
-        height = self.size.height
-        left = WIDE_LEFT if self.wide else SMALL_LEFT
-        right = max(20, width - left - 1)
-        parts = {
-            "header": header(view, width),
-            "state": state_lines(view, left),
-            "message": self.run_line_lines(view.now, width) or message_lines(view, width),
-            "status": panel_lines(view, width),
-            "keys": [order_keys(view, keys_line(MONITOR, width, self.app.stops_whom))],
-        }
-        body = height - (WORDS_HEIGHT if self.wide else 0) - 5
-        rest = body - len(parts["state"])
-        if self.wide:
-            parts["motor"] = motor_lines(view, WIDE_MOTOR, body)
-            parts["trend"] = stacked_trends(view, right - WIDE_MOTOR - 1, body)
-            parts["history"] = history_lines(view, left, rest)
-            parts["word"] = []
-            return parts | self._wide_words(view, WORDS_HEIGHT)
-        motor = motor_lines(view, right, body - 4)
-        parts["motor"] = [*motor, Text("")]
-        parts["trend"] = trend_lines(view, right, max(3, body - len(motor) - 1))
-        parts["history"] = []
-        return parts | self._small_word(view, rest)
-
-    def _small_word(self, view: View, height: int) -> dict[str, list[Text]]:
-        """The chosen word; always as many lines, as a change of height lays all out anew."""
-        pages = word_pages(self._words(), height - 1)
-        page = pages[self._word % len(pages)] if pages else None
-        lines = bit_lines(view, page, SMALL_LEFT) if page else []
-        return {"word": lines + [Text("")] * (height - len(lines))}
-
-    def _wide_words(self, view: View, height: int) -> dict[str, list[Text]]:
-        """Three words from the chosen one on, and the counters of the line."""
-        parts: dict[str, list[Text]] = {}
-        pages = word_pages(self._words(), height - 1)
-        for index in range(3):
-            shown = index < len(pages)
-            page = pages[(self._word + index) % len(pages)] if shown else None
-            parts[f"word{index}"] = bit_lines(view, page, WORD_WIDTH - 1) if page else []
-        parts["word3"] = line_lines(view, WORD_WIDTH - 1, height)
-        return parts
-
-    def _words(self) -> list[Parameter]:
-        """Words with named bits: the monitoring set's, then inputs and outputs."""
-        profile = self.session.profile
-        watched = [profile[v.parameter] for v in profile.data.monitoring.values]
-        found = [parameter for parameter in watched if parameter.bits]
-        for quantity in ("digital_inputs", "digital_outputs"):
-            parameter = profile.quantity(quantity)
-            if parameter is not None and parameter.bits and parameter not in found:
-                found.append(parameter)
-        return sorted(found, key=lambda p: p.quantity != "status_word")
-
-    def _extras(self) -> list[str]:
-        """What is read seldom: ends of bars, channels, history, inputs and outputs."""
-        profile = self.session.profile
-        codes = [v.high for v in profile.data.monitoring.values if profile.get(v.high)]
-        for quantity in ("command_channel", "reference_channel"):
-            parameter = profile.quantity(quantity)
-            if parameter is not None:
-                codes.append(parameter.code)
-        codes += profile.data.faults.history
-        codes += [parameter.code for parameter in self._words()]
-        return list(dict.fromkeys(codes))
+        if self._source is None:
+            self._source = ViewSource(self.app, self.console)
+        control = self.control(self.app.clock.monotonic())
+        return self._source.view(control, SPANS[self._span], self._word)
 
     def action_change_rate(self, step: int) -> None:
         """A faster or slower poll, out of a fixed row of rates."""
@@ -280,14 +180,12 @@ class MonitorScreen(RunKeys):
         self.look()
 
     def action_next_word(self) -> None:
-        """The next word of bits."""
-        self._word += 1
-        view = self._view()
-        if self.wide:
-            self._put_all(self._wide_words(view, WORDS_HEIGHT))
-        else:
-            height = self.query_one("#left").size.height
-            self._put_all(self._small_word(view, height - len(state_lines(view, SMALL_LEFT))))
+        """The next word of bits; behind the last one the trend, where they share a place."""
+        room = self._room()
+        after = 0 if self._word is None and not room.wide else (self._word or 0) + 1
+        pages = len(pages_in(room, self._words))
+        self._word = None if not room.wide and after >= pages else after
+        self.look()
 
     def action_rating(self) -> None:
         """Tell the rated current of a drive that gives its current in %."""

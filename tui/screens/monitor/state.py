@@ -1,4 +1,4 @@
-"""What the drive does, in words: state, faults, alarms, the line; pure functions."""
+"""What the drive does, in words, and who tells it to: the block at the right; pure functions."""
 
 from __future__ import annotations
 
@@ -12,279 +12,194 @@ from tui.session.command.stop_report import Phase, StopReport
 from tui.session.drive_state import DriveState, channel_text
 from tui.session.monitor.timeout import TOLD_SHARE
 from tui.session.reading import Quality
-from tui.widgets.drawing import armed_text, cut, pair, rule
-from tui.widgets.drive_signs import STATE_SIGNS, STATE_STYLES, age_text
-from tui.widgets.outcome import outcome_lines
+from tui.widgets.drawing import short, wrapped
+from tui.widgets.drive_signs import age_text
 from tui.widgets.palette import (
     ALARM,
     ATTENTION,
     FAINT,
-    FAULT,
     FAULT_BLOCK,
-    LINE,
     PLAIN,
+    RUNNING,
     STALE,
     STRONG,
 )
 
-from .view import View
+from .view import View, directed
 
-FLASH = 0.5
-"""Seconds for which a trip that nobody has seen is bright, and then dark."""
-HELD = 0.9
-"""Share of the wished rate from which on it counts as held."""
-
-
-def header(view: View, width: int) -> list[Text]:
-    """Which drive, on which line, how busy it is, and the time."""
-    name = view.identity.name if view.identity else ""
-    reference = view.identity.reference if view.identity else ""
-    who = " ".join(part for part in (reference or view.profile.name, name) if part)
-    left = f" {who} · device {view.device} · {view.line_label}"
-    right = f"load {view.load * 100:3.0f} %  {view.clock} "
-    text = Text(no_wrap=True)
-    text.append(cut(left, max(0, width - len(right) - 1)), STRONG)
-    text.append(" " + right, FAINT)
-    return [text]
-
-
-def state_lines(view: View, width: int) -> list[Text]:
-    """What the motor does, in words, and who tells it to."""
-    lines = [rule("State", width)]
-    snapshot = view.snapshot
-    if snapshot is None:
-        lines.append(Text(" waiting for the first values", ALARM))
-        lines += [Text("")] * 3
-        return lines
-    state = snapshot.state
-    if view.lost:
-        lines.append(Text(cut(" ? NOT KNOWN NOW", width), ALARM))
-        lines.append(Text(cut(f"   was: {view.was or state.headline}", width), FAINT))
-    else:
-        style = STATE_STYLES.get(state.kind, STRONG)
-        if view.unseen and state.kind == "fault" and int(view.now / FLASH) % 2:
-            style = FAULT
-        sign = STATE_SIGNS.get(state.kind, "□")
-        lines.append(Text(cut(f" {sign} {_headline(state)} ", width), style))
-        lines.append(Text(cut(f"   {_detail(state)}", width), PLAIN))
-    told = "" if view.lost else state.channel
-    command = _who("Command", told, PLAIN, width) if told else None
-    lines.append(command or _channel(view, "Command", "command_channel", width))
-    lines.append(_channel(view, "Reference", "reference_channel", width))
-    return lines
-
-
-def _headline(state: DriveState) -> str:
-    """The headline in capitals; a fault's code as the drive's keypad writes it."""
-    words = state.headline.upper()
-    return words.replace(state.fault.code.upper(), state.fault.code) if state.fault else words
-
-
-def _detail(state: DriveState) -> str:
-    """What the headline does not say: at reference or not, and the chart's own name."""
-    if state.kind == "fault" and state.fault is not None:
-        return state.fault.name
-    parts = []
-    if state.reached is not None and state.kind == "running":
-        parts.append("at reference" if state.reached else "on the ramp")
-    if not parts and state.name.casefold() not in state.headline.casefold():
-        parts.append(state.name)
-    return ", ".join(parts)
-
-
-def _who(label: str, who: str, style: Style, width: int) -> Text:
-    """Who gives the command or the reference."""
-    room = max(1, width - WHO_AT)
-    return pair(f"   {label}", cut(who, min(len(who), room)), style, WHO_AT)
-
-
-WHO_AT = 13
-
-
-def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
-    parameter = view.profile.quantity(quantity)
-    if parameter is None:
-        return Text("")
-    reading = view.reading(parameter.code)
-    text = channel_text(parameter, reading)
-    if reading is not None and reading.quality is not Quality.GOOD:
-        return _who(label, f"was {text}", FAINT, width)
-    return _who(label, text or NOT_AVAILABLE, PLAIN if text else FAINT, width)
-
-
-def message_lines(view: View, width: int) -> list[Text]:
-    """Two lines: a fault before all, then what a stop or an order has come to, then the rest."""
-    lines, stop, outcome = _messages(view, width - 2), view.stop, view.control.outcome
-    fault = view.snapshot is not None and view.snapshot.state.kind == "fault" and not view.lost
-    said = [_stop_line(stop, width - 2)] if stop is not None else []
-    if outcome is not None and (stop is None or outcome.time > stop.time):
-        said = [*outcome_lines(outcome, width - 2), *said]
-    first = [lines[0]] if fault and (stop is None or stop.phase is not Phase.FAILED) else []
-    lines = [*first, *said, *lines[len(first) :]][:2]
-    return [Text(" ") + line if line.plain else line for line in lines]
-
-
-STOP_STYLES = {
-    Phase.SENDING: ATTENTION,
-    Phase.STOPPING: ATTENTION,
-    Phase.STOPPED: STRONG,
-    Phase.FAILED: FAULT_BLOCK,
+STATE_LABEL_CELLS = 11
+STANDSTILL = 0.05
+"""Hz below which a motor stands."""
+HEADS = {
+    Phase.SENDING: ("STOPPING", ATTENTION),
+    Phase.STOPPING: ("STOPPING", ATTENTION),
+    Phase.STOPPED: ("STOPPED", STRONG),
+    Phase.FAILED: (" NOT STOPPED ", FAULT_BLOCK),
 }
 
 
-def _stop_line(report: StopReport, width: int) -> Text:
-    words = {Phase.FAILED: report.text, Phase.STOPPED: "STOPPED by the stop key"}
-    text = words.get(report.phase, f"STOP: {report.text}")
-    return Text(cut(text, width), STOP_STYLES[report.phase])
+def state_lines(view: View, width: int) -> list[Text]:
+    """Five lines: what it does, who commands, who gives the reference, its watch over the line."""
+    head, more = _head(view, width)
+    rows = [
+        _channel(view, "Command", "command_channel", width),
+        _channel(view, "Reference", "reference_channel", width),
+        _pair("Time-out", *_timeout(view, width), width),
+        _pair("Fed" if _is_fed(view) else "Heard", *_heard(view), width),
+    ]
+    lines = [head, *more[:4], *rows[len(more[:4]) :]]
+    for line in lines:
+        line.no_wrap = True
+        line.truncate(width)
+    return lines
 
 
-def _messages(view: View, width: int) -> list[Text]:
-    if view.line.status is not LineStatus.CONNECTED:
-        return _line_trouble(view, width)
+def _head(view: View, width: int) -> tuple[Text, list[Text]]:
+    """The state in words, and what must be said beside it."""
     snapshot = view.snapshot
+    if view.stop is not None and view.stop.phase is Phase.FAILED:
+        return _stop(view.stop, width)
+    if view.line.status is not LineStatus.CONNECTED and snapshot is not None:
+        lost = "LINE LOST" if view.line.status is LineStatus.LOST else "LINE NOT OPEN"
+        return _lost(view, lost, width)
     if snapshot is None:
-        return [Text("connecting to the drive", FAINT), Text("")]
-    if view.trouble:
-        return [
-            Text(cut("NO VALUES: what is shown is old" + _countdown(view), width), ALARM),
-            Text(cut(view.trouble, width), STALE),
-        ]
-    state = snapshot.state
-    if state.fault is not None:
-        fault = state.fault
-        cause = fault.cause or "The profile gives no cause; see the drive's manual."
-        remedy = f" Do: {fault.remedy}" if fault.remedy else ""
-        more = "   5: what happened before" if view.unseen else ""
-        return [
-            Text(cut(f"FAULT {fault.code} ({fault.raw}) {fault.name}{more}", width), FAULT),
-            Text(cut(cause + remedy, width), PLAIN),
-        ]
-    if _is_hungry(view):
-        return [
-            _alarm_line(view, state, width),
-            Text(cut(f"NOT HEARD{_countdown(view)}", width), ALARM),
-        ]
-    alarm, control = _alarm_line(view, state, width), view.control
-    for said, style in (
-        (control.offer, ATTENTION),
-        (control.lost, ALARM),
-        (control.why_disarmed, ATTENTION),
-        (control.no_effect and f"Orders from here have no effect: {control.no_effect}", FAINT),
-    ):
-        if said:
-            return [alarm, Text(cut(said, width), style)]
-    return [alarm, _last_fault(view, width)]
+        waits = "waiting for values" if view.line.status is LineStatus.CONNECTED else "connecting"
+        return Text(waits, ALARM), []
+    if view.lost:
+        return _lost(view, "NOT HEARD", width)
+    if view.stop is not None and snapshot.state.kind != "fault":
+        return _stop(view.stop, width)
+    return _present(view, snapshot.state, width)
 
 
-def _alarm_line(view: View, state: DriveState, width: int) -> Text:
+def _stop(report: StopReport, width: int) -> tuple[Text, list[Text]]:
+    words, style = HEADS[report.phase]
+    text = report.text.removeprefix("NOT STOPPED: ")
+    if report.phase is Phase.STOPPED:
+        text = "by the stop key"
+    most = 4 if report.phase is Phase.FAILED else 2
+    return Text(words, style), [Text(line, PLAIN) for line in wrapped(text, width, most)]
+
+
+def _lost(view: View, words: str, width: int) -> tuple[Text, list[Text]]:
+    """Nothing here is the present: since when, what it was, and what the drive does about it."""
+    age = age_text(view.age or 0.0)
+    was = view.was or (view.snapshot.state.headline if view.snapshot else "")
+    lines = [Text(short(f"NOT KNOWN NOW for {age}", width), ALARM)]
+    lines.append(Text(short(f"was {was}" if was else "", width), FAINT))
+    lines += [Text(line, ALARM) for line in wrapped(countdown(view), width, 2)]
+    return Text(f" {words} ", FAULT_BLOCK), lines
+
+
+def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]:
     if state.kind == "fault":
-        return Text(cut("FAULT, code not read", width), FAULT)
-    if state.alarms:
-        names = ", ".join(bit.name for bit in state.alarms)
-        return Text(cut(f"ALARM {names}", width), ALARM)
-    if state.alarm:
-        return Text(cut("ALARM shown by the status word", width), ALARM)
-    return Text("no fault · no alarm", FAINT)
+        return _fault(view, state, width)
+    if state.kind == "unknown":
+        return Text("? unknown state", ALARM), []
+    if state.kind == "running":
+        return Text(_running(view, state), RUNNING), []
+    hindrance = view.control.hindrance
+    if view.stands_by and hindrance is None:
+        if view.read_only:
+            return Text("stands by", STRONG), [Text("read-only: runs nothing", FAINT)]
+        armed = view.control.armed_for is not None
+        return Text("r runs it" if armed else "a arms, r runs", STRONG), []
+    if hindrance is None:
+        return Text(state.headline, STRONG), []
+    if hindrance.of_channel:
+        return Text("no command from here", STRONG), []
+    return Text("not ready", STRONG), [
+        Text(line, PLAIN) for line in wrapped(hindrance.text, width, 2)
+    ]
 
 
-def _last_fault(view: View, width: int) -> Text:
-    faults = view.profile.data.faults
-    reading = view.reading(faults.parameter) if faults.parameter else None
-    if reading is None or reading.raw in (None, faults.none):
-        return Text("")
-    known = view.profile.fault(reading.raw or 0)
-    name = f"{known.code} {known.name}" if known else f"code {reading.raw}"
-    return Text(cut(f"last fault: {name}", width), FAINT)
+def _running(view: View, state: DriveState) -> str:
+    """Whether the motor is at its reference, or which way it is going."""
+    output, wanted = (_hertz(view, q) for q in ("output_frequency", "frequency_reference"))
+    if state.reached and wanted is not None and abs(wanted) < STANDSTILL:
+        return "enabled, at 0 Hz"
+    if state.reached:
+        return "at reference"
+    if output is None or wanted is None:
+        return "on the ramp" if state.reached is False else "running"
+    if output * wanted < 0:
+        return "reversing"
+    if abs(abs(wanted) - abs(output)) < STANDSTILL:
+        return "at reference"
+    return "accelerating" if abs(wanted) > abs(output) else "decelerating"
 
 
-def _line_trouble(view: View, width: int) -> list[Text]:
-    line = view.line
-    since = age_text(max(0.0, view.now - line.since))
-    if line.status is LineStatus.CONNECTING:
-        head = Text(cut(f"CONNECTING for {since}", width), ALARM)
-    else:
-        again = ""
-        if line.next_try is not None:
-            again = f", trying again in {max(0.0, line.next_try - view.now):.0f} s"
-        word = "LINE LOST" if line.status is LineStatus.LOST else "LINE CLOSED"
-        head = Text(cut(f"{word} for {since}{again}{_countdown(view)}", width), ALARM)
-    return [head, Text(cut(line.reason, width), STALE)]
+def _hertz(view: View, quantity: Quantity) -> float | None:
+    parameter = view.profile.quantity(quantity)
+    reading = view.reading(parameter.code) if parameter else None
+    fresh = reading is not None and reading.quality is Quality.GOOD
+    return directed(view, parameter, reading) if fresh else None
 
 
-def _is_hungry(view: View) -> bool:
-    """Whether the drive was not asked for a good part of its time-out."""
-    left = view.time_left
+def _fault(view: View, state: DriveState, width: int) -> tuple[Text, list[Text]]:
+    """Its code, its name, when, and where it is told what to do."""
+    fault = state.fault
+    code = fault.code if fault else "code not read"
+    name = wrapped(fault.name if fault else "", width, 2)
+    lines = [Text(line, STRONG) for line in name]
+    lines.append(Text(f"since {view.fault_at}" if view.fault_at else "", FAINT))
+    lines += [Text("")] * (3 - len(lines))
+    lines.append(Text.assemble(("5", "bold #7fb0dc"), (" says what to do", PLAIN)))
+    return Text(f" FAULT {code} ", FAULT_BLOCK), lines
+
+
+def _pair(label: str, text: str, style: Style, width: int) -> Text:
+    line = Text(f"{label:<{STATE_LABEL_CELLS}}", FAINT, no_wrap=True)
+    return line.append(short(text, max(1, width - STATE_LABEL_CELLS)), style)
+
+
+def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
+    """Who gives the command or the reference."""
+    told = view.snapshot.state.channel if view.snapshot and not view.lost else ""
+    if quantity == "command_channel" and told:
+        return _pair(label, told, PLAIN, width)
+    parameter = view.profile.quantity(quantity)
+    if parameter is None:
+        return _pair(label, NOT_AVAILABLE, FAINT, width)
+    reading = view.reading(parameter.code)
+    text = channel_text(parameter, reading)
+    if reading is not None and reading.quality is not Quality.GOOD:
+        return _pair(label, f"was {text}", FAINT, width)
+    return _pair(label, text or NOT_AVAILABLE, PLAIN if text else FAINT, width)
+
+
+def _timeout(view: View, width: int) -> tuple[str, Style]:
+    """After how long without a request the drive acts."""
+    watch = view.watch
+    if watch is None:
+        return "none known", FAINT
+    text = f"{watch.timeout:g} s"
+    if watch.active:
+        return text, PLAIN
+    begins = ", once commanded"
     return (
-        left is not None and view.watch is not None and left < (1 - TOLD_SHARE) * view.watch.timeout
-    )
+        text + begins if width >= STATE_LABEL_CELLS + len(text + begins) else f"{text}, idle"
+    ), FAINT
 
 
-def _countdown(view: View) -> str:
+def _is_fed(view: View) -> bool:
+    return view.watch is not None and view.watch.active
+
+
+def _heard(view: View) -> tuple[str, Style]:
+    """How long ago the drive was heard, which feeds its watch."""
+    if view.heard is None:
+        return NOT_AVAILABLE, FAINT
+    age = max(0.0, view.now - view.heard)
+    text = f"{age:.1f} s ago" if age < 10 else f"{age_text(age)} ago"
+    hungry = _is_fed(view) and view.watch is not None and age > TOLD_SHARE * view.watch.timeout
+    return text, STALE if hungry or view.lost else PLAIN
+
+
+def countdown(view: View) -> str:
     """What a drive that is not asked does, and when; nothing where it does nothing."""
     left = view.time_left
     if left is None or view.watch is None:
         return ""
     does = view.watch.reaction.name.lower() if view.watch.reaction else "its own reaction"
-    when = f"drive acts in {left:.0f} s" if left > 0 else "drive has acted by now"
-    return f" · {when}: {does}"
-
-
-def panel_lines(view: View, width: int) -> list[Text]:
-    """What the panel itself does: monitoring, how fast, how well the line answers."""
-    text = Text(no_wrap=True)
-    text.append_text(armed_text(view.control.armed_for, lost=view.lost))
-    rate = view.snapshot.rate if view.snapshot and not view.lost else 0.0
-    wished = 1 / view.period
-    counts = view.counters
-    bad = counts.timeouts + counts.checksum + counts.wrong
-    held = rate > HELD * wished or not rate
-    text.append(f"  {rate:4.1f} of {wished:.1f} cycles/s", FAINT if held else ALARM)
-    if view.snapshot is not None and view.snapshot.block:
-        text.append(f" by {view.snapshot.block.lower()}", FAINT)
-    if view.watch is not None and view.watch.active:
-        text.append(f"  watch {view.watch.timeout:g} s", FAINT)
-        if _is_hungry(view):
-            text.append(f", {max(0.0, view.time_left or 0.0):.0f} s left", ALARM)
-    if view.read_only:
-        text.append("  read-only", FAINT)
-    said = (f"  {counts.requests} requests, {bad} failed", f"  {bad} failed", "")
-    text.append(next(one for one in said if not one or text.cell_len + len(one) <= width), FAINT)
-    text.truncate(width)
-    return [text]
-
-
-def history_lines(view: View, width: int, height: int) -> list[Text]:
-    """The drive's fault history, the newest first."""
-    lines = [rule("Fault history", width)]
-    for number, code in enumerate(view.profile.data.faults.history, start=1):
-        reading = view.reading(code)
-        text = Text(no_wrap=True)
-        text.append(f" {number} ", LINE)
-        text.append(cut(code, 6), FAINT)
-        if reading is None or reading.raw is None:
-            text.append(NOT_AVAILABLE, FAINT)
-        else:
-            fault = view.profile.fault(reading.raw)
-            name = f"{fault.code} {fault.name}" if fault else f"code {reading.raw}"
-            text.append(cut(name, max(0, width - 9)), PLAIN)
-        lines.append(text)
-    if len(lines) == 1:
-        lines.append(Text(" not known on this drive", FAINT))
-    return lines[:height]
-
-
-def line_lines(view: View, width: int, height: int) -> list[Text]:
-    """The counters of the line."""
-    c = view.counters
-    rows = (
-        ("Requests", str(c.requests)),
-        ("Replies", str(c.replies)),
-        ("No answer", str(c.timeouts)),
-        ("Damaged", str(c.checksum)),
-        ("Wrong", str(c.wrong)),
-        ("Refused", str(c.exceptions)),
-        ("Thrown away", str(c.stale)),
-        ("Bytes out, in", f"{c.bytes_out} {c.bytes_in}"),
-    )
-    lines = [rule("Line", width)]
-    return (lines + [pair(f" {label}", value, PLAIN, 16) for label, value in rows])[:height]
+    return f"acts in {left:.0f} s: {does}" if left > 0 else f"has acted by now: {does}"

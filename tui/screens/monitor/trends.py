@@ -1,4 +1,4 @@
-"""The last minute of frequency and current; pure functions of a view."""
+"""The trends of frequency and current with their axes; pure functions of a view."""
 
 from __future__ import annotations
 
@@ -8,61 +8,104 @@ from rich.text import Text
 
 from tui.drive.profile.schema import Parameter, Quantity
 from tui.session.monitor.snapshot import STALE_CYCLES
-from tui.widgets.drawing import cut, rule, trend
-from tui.widgets.palette import FAINT, LINE
+from tui.widgets.drawing import cut, short
+from tui.widgets.palette import BAR, BAR_REST, FAINT, KEY, LINE
+from tui.widgets.trend import WANTED, trend_rows
 
-from .view import USUAL_SPAN, View, end_of
+from .view import View, end_of
 
-
-def stacked_trends(view: View, width: int, height: int) -> list[Text]:
-    """Frequency above current, the last minute of each; newest at the right."""
-    upper = height // 2
-    return [
-        *_trend(view, 0, "output_frequency", "Frequency", width, upper),
-        *_trend(view, 1, "motor_current", "Current", width, height - upper),
-    ]
+LABEL_CELLS = 5
+LEGEND_CELLS = 14
+TREND_PLACES: dict[Quantity, int] = {"output_frequency": 0, "motor_current": 1}
+WANTED_PLACE = 2
+"""Where a point of the trend has the reference."""
+TREND_NAMES: dict[Quantity, str] = {"output_frequency": "output", "motor_current": "current"}
+ROUND_TOPS: Sequence[float] = (1, 2, 5, 10, 20, 50, 60, 100, 200, 500, 1000, 2000, 5000, 10000)
 
 
 def trend_lines(view: View, width: int, height: int) -> list[Text]:
-    """Frequency and current of the last minute, side by side; newest at the right."""
-    half = (width - 2) // 2
-    left = _trend(view, 0, "output_frequency", "Frequency", half, height)
-    right = _trend(view, 1, "motor_current", "Current", width - 2 - half, height)
-    joined: list[Text] = []
-    for one, other in zip(left, right, strict=True):
-        line = one.copy()
-        line.append("  ")
-        line.append_text(other)
-        joined.append(line)
-    return joined
+    """The frequency; where the terminal is wide, the current beside it."""
+    if height <= 1:
+        return [Text("")] * height
+    if view.low_bandwidth:
+        off = Text("  The trend is left out: low bandwidth.", FAINT)
+        return [off, *[Text("")] * (height - 1)]
+    if width < 110:
+        return one_trend(view, "output_frequency", width, height)
+    half = width // 2
+    pairs = zip(
+        one_trend(view, "output_frequency", half, height),
+        one_trend(view, "motor_current", width - half, height),
+        strict=True,
+    )
+    return [left.append_text(right) for left, right in pairs]
 
 
-def _trend(
-    view: View, index: int, quantity: Quantity, title: str, width: int, height: int
-) -> list[Text]:
+def one_trend(view: View, quantity: Quantity, width: int, height: int) -> list[Text]:
+    """Rows and the axis of time, each of exactly so many cells."""
     parameter = view.profile.quantity(quantity)
     if parameter is None:
-        nothing = Text(cut(" not known", width), FAINT)
-        return [rule(title, width), nothing, *[Text(" " * width)] * (height - 2)]
-    if view.low_bandwidth:
-        off = Text(cut(" off: low bandwidth", width), FAINT)
-        return [rule(title, width), off, *[Text(" " * width)] * (height - 2)]
-    high = _trend_high(view, parameter, index)
-    columns = width - 1
+        said = f"  No trend: no manual confirms where the {TREND_NAMES[quantity]} is."
+        nothing = Text(cut(said, width), FAINT)
+        return [nothing, *[Text(" " * width, no_wrap=True) for _ in range(height - 1)]]
+    columns = width - LABEL_CELLS - 1 - LEGEND_CELLS - 1
     step = view.span / columns
-    rows = trend(_columns(view, index, columns, step), high or 1.0, columns, height - 1)
-    span = f"0..{high:g} {parameter.unit}" if high else "no values yet"
-    lines = [
-        rule(
-            title,
-            width,
-            span + (f", {span_text(view.span)}" if width > 30 or view.span != USUAL_SPAN else ""),
-        )
-    ]
-    return lines + [Text.assemble(("│", LINE), row) for row in rows]
+    points = trend_columns(view, TREND_PLACES[quantity], columns, step)
+    wanted: list[float | None] = [None] * columns
+    if quantity == "output_frequency":
+        wanted = trend_columns(view, WANTED_PLACE, columns, step)
+    signed = any(value is not None and value < 0 for value in (*points, *wanted))
+    high = _top(view, parameter, TREND_PLACES[quantity])
+    style = BAR_REST if view.lost else BAR
+    rows = trend_rows(points, wanted, high or 1.0, height - 1, signed=signed, style=style)
+    legend = _legend(view, quantity, parameter)
+    lines = []
+    for at, row in enumerate(rows):
+        line = Text(_label(at, height - 1, high, signed=signed), FAINT, no_wrap=True)
+        line.append("┤" if line.plain.strip() else "│", LINE)
+        line.append_text(row)
+        line.append(" ")
+        line.append_text(legend[at] if at < len(legend) else Text(" " * LEGEND_CELLS))
+        lines.append(line)
+    return [*lines, _axis(view, columns)]
 
 
-def _trend_high(view: View, parameter: Parameter, index: int) -> float | None:
+def _label(row: int, rows: int, high: float | None, *, signed: bool) -> str:
+    """The number of a row at the axis: the upper end, zero, the lower end."""
+    half = rows // 2
+    number = {0: high, rows - 1: 0.0}
+    if signed:
+        number = {0: high, half - 1: 0.0 if half > 1 else high, 2 * half - 1: -(high or 0)}
+    shown = number.get(row)
+    if shown is None:
+        return " " * LABEL_CELLS
+    text = f"{shown:.0f}" if abs(shown) >= 1000 else f"{shown:g}"
+    return f"{short(text, LABEL_CELLS):>{LABEL_CELLS}}"
+
+
+def _legend(view: View, quantity: Quantity, parameter: Parameter) -> list[Text]:
+    """What is drawn, and which keys change the window."""
+    lines = []
+    if quantity == "output_frequency":
+        lines.append(Text.assemble(("━", WANTED), (" reference", FAINT)))
+    lines.append(Text.assemble(("█", BAR), (f" {TREND_NAMES[quantity]} {parameter.unit}", FAINT)))
+    keys = Text.assemble(("< >", KEY), (f" {span_text(view.span)}", FAINT))
+    lines.append(keys if quantity == "output_frequency" else Text(""))
+    for line in lines:
+        line.truncate(LEGEND_CELLS)
+        line.append(" " * (LEGEND_CELLS - line.cell_len))
+    return lines
+
+
+def _axis(view: View, columns: int) -> Text:
+    """The axis of time."""
+    text = Text(" " * (LABEL_CELLS + 1), no_wrap=True)
+    first = f"-{span_text(view.span)}"
+    text.append(f"{first}{'now':>{columns - len(first)}}", FAINT)
+    return text.append(" " * (LEGEND_CELLS + 1))
+
+
+def _top(view: View, parameter: Parameter, index: int) -> float | None:
     """The top of a trend: the end of the value's bar, else a round number above the highest.
 
     None while neither is known.
@@ -81,16 +124,13 @@ def span_text(seconds: float) -> str:
     return f"{seconds:g} s" if seconds < 120 else f"{seconds / 60:g} min"
 
 
-ROUND_TOPS: Sequence[float] = (1, 2, 5, 10, 20, 50, 60, 100, 200, 500, 1000, 2000, 5000, 10000)
-
-
-def _columns(view: View, index: int, count: int, step: float) -> list[float | None]:
+def trend_columns(view: View, index: int, count: int, step: float) -> list[float | None]:
     """The last value of each column; columns stand on whole steps, so they shift as one."""
     last = int(view.now / step)
     columns: list[float | None] = [None] * count
     for point in view.trend:
         at = count - 1 - (last - int(point.time / step))
-        if 0 <= at < count and point.values[index] is not None:
+        if 0 <= at < count and index < len(point.values) and point.values[index] is not None:
             columns[at] = point.values[index]
     return _bridged(columns, step, view)
 

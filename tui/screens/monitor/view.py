@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 from tui.bus.api import LineCounters, LineState, LineStatus
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import MonitoringValue
+from tui.drive.profile.schema import MonitoringValue, Parameter, Quantity
 from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
-from tui.session.connect.identify import DriveIdentity
+from tui.session.drive_state import with_direction
 from tui.session.monitor.snapshot import Snapshot, stale_after
 from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import TrendPoint
@@ -26,17 +26,12 @@ class View:
     """All that the Monitor screen shows at one moment; times are monotonic, in seconds."""
 
     profile: Profile
-    identity: DriveIdentity | None
-    device: int
-    line_label: str
     snapshot: Snapshot | None
     line: LineState
     counters: LineCounters
-    load: float
     trend: tuple[TrendPoint, ...]
     period: float
     now: float
-    clock: str
     read_only: bool = False
     low_bandwidth: bool = False
     """Whether the trend is left out and the screen looked at less often."""
@@ -51,8 +46,12 @@ class View:
     """What the drive did when it was last known."""
     span: float = USUAL_SPAN
     """Seconds that the trend shows."""
-    unseen: bool = False
-    """Whether the drive has tripped and nobody has said that he saw it."""
+    stands_by: bool = False
+    """Whether the motor stands and the next command from here runs it."""
+    fault_at: str = ""
+    """Time of day at which the fault was seen first; empty where that is not known."""
+    word: int | None = None
+    """Which word is shown with all its bits in place of the trend; None for the trend."""
 
     def reading(self, code: str) -> Reading | None:
         """A reading as good as it is now, not as it was when it came."""
@@ -91,6 +90,14 @@ class View:
         return self.snapshot is not None and bool(self.trouble)
 
     @property
+    def age(self) -> float | None:
+        """Seconds since what is shown was the present; None while it is, or where nothing came."""
+        if self.snapshot is None or not self.lost:
+            return None
+        times = [reading.time for reading in self.snapshot.readings.values()]
+        return max(0.0, self.now - max(times, default=self.snapshot.time))
+
+    @property
     def trouble(self) -> str:
         """Why what is shown is not the present; empty while it is."""
         if self.snapshot is None or self.snapshot.error:
@@ -98,6 +105,31 @@ class View:
         if self.snapshot.is_stale(self.now):
             return f"Nothing was read for {age_text(self.now - self.snapshot.time)}."
         return ""
+
+
+def readout_parameter(profile: Profile, quantity: Quantity) -> Parameter | None:
+    """The parameter of a large readout.
+
+    A family whose manual confirms none may have one of that name, whose value is shown raw.
+    """
+    if (parameter := profile.quantity(quantity)) is not None:
+        return parameter
+    watched = (profile[value.parameter] for value in profile.data.monitoring.values)
+    names = READOUT_NAMES.get(quantity, ())
+    return next((p for p in watched if p.name.casefold() in names), None)
+
+
+READOUT_NAMES: dict[Quantity, tuple[str, ...]] = {
+    "output_frequency": ("output frequency",),
+    "motor_current": ("motor current", "output current"),
+}
+
+
+def directed(view: View, parameter: Parameter | None, reading: Reading | None) -> float | None:
+    """A value with the sign of its direction, which the drive may tell beside it."""
+    if reading is None or reading.number is None or parameter is None or view.snapshot is None:
+        return None
+    return with_direction(parameter, reading.number, view.snapshot.state)
 
 
 def end_of(view: View, end: str) -> float | None:

@@ -1,10 +1,11 @@
-"""Words with named bits; pure functions of a view."""
+"""Words with named bits: in a line what is 1, and whole; pure functions of a view."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from rich.style import Style
 from rich.text import Text
 
 from tui.drive.profile.profile import is_verified
@@ -12,9 +13,32 @@ from tui.drive.profile.schema import Bit, Parameter
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.reading import Quality
 from tui.widgets.drawing import cut, rule
-from tui.widgets.palette import ALARM, FAINT, LINE, PLAIN, STRONG
+from tui.widgets.palette import ALARM, FAINT, KEY, LINE, PLAIN, STRONG
 
 from .view import View
+
+SHORT_NAMES: Mapping[str, str] = {
+    "ready to switch on": "ready",
+    "operation enabled": "enabled",
+    "power section supplied": "power",
+    "target reached": "at reference",
+    "switch on disabled": "switch on disabled",
+    "no quick stop": "",
+    "remote": "",
+    "direction of the output": "reverse",
+    "limit of the reference": "outside LSP..HSP",
+}
+"""What is short for the words of a bit that is 1; nothing for what is so while all is well."""
+CODE_CELLS, RAW_CELLS = 6, 9
+BIT_CELLS = 26
+"""Least cells of a bit where bits stand in columns."""
+SHORTEST_NAME = 6
+"""Characters of a bit's name that still tell which one it is."""
+PLAIN_ANSWERS = frozenset({"", "yes", "no", "on", "off", "none", "normal", "0", "1"})
+GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
+"""What a bit that is 1 says without more than its name does."""
+ALL_BITS = (("Tab", KEY), (" all bits ", FAINT))
+ALL_BITS_CELLS = 13
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,46 +51,128 @@ class WordPage:
     of: int
 
 
+def shown_words(view_words: Sequence[Parameter]) -> list[Parameter]:
+    """The words that have a line of their own: those that hold more than alarms, two at most."""
+    return [word for word in view_words if not all(bit.alarm for bit in word.bits)][:2]
+
+
+def word_line(view: View, parameter: Parameter, width: int) -> Text:
+    """A word and the names of its bits that are 1, as many as there is room for."""
+    raw, shown = _raw(view, parameter)
+    mark = "" if is_verified(parameter) else " ?"
+    text = Text(f"  {cut(parameter.code + mark, CODE_CELLS)}", FAINT, no_wrap=True)
+    text.append(f"{shown:<{RAW_CELLS}}", FAINT)
+    ones = [bit for bit in parameter.bits if raw is not None and raw >> bit.bit & 1]
+    told = [(name, bit) for bit in ones if (name := short_bit(bit))]
+    for at, (name, bit) in enumerate(told):
+        link = " · " if at else " "
+        more = len(told) - at
+        if text.cell_len + len(link) + len(name) + (5 if more > 1 else 0) > width:
+            text.append(f" … {more}", FAINT)
+            break
+        text.append(link, FAINT)
+        text.append(name, ALARM if bit.alarm else PLAIN)
+    return text
+
+
+def alarm_line(view: View, width: int, *, tab: bool) -> Text:
+    """The alarms of now; at the right the key that shows all bits."""
+    text = Text(f"  {'Alarms':<{CODE_CELLS + RAW_CELLS}} ", FAINT, no_wrap=True)
+    said, style = _alarms(view)
+    room = width - text.cell_len - (ALL_BITS_CELLS if tab else 1)
+    text.append(cut(said, max(1, room)), style)
+    if tab:
+        text.append_text(Text.assemble(*ALL_BITS))
+    return text
+
+
+def _alarms(view: View) -> tuple[str, Style]:
+    if view.snapshot is None or view.lost:
+        return NOT_AVAILABLE, FAINT
+    state = view.snapshot.state
+    if state.alarms:
+        return ", ".join(bit.name for bit in state.alarms), ALARM
+    if state.alarm:
+        return "shown by the status word", ALARM
+    watched = [view.profile[value.parameter] for value in view.values]
+    tells = state.alarm is not None or any(bit.alarm for word in watched for bit in word.bits)
+    return ("none" if tells else "not told by this drive"), FAINT
+
+
+def short_bit(bit: Bit) -> str:
+    """What a bit that is 1 says, in a word or two; empty where that is so while all is well."""
+    said = bit.name if bit.on.casefold() in GENERIC else _bit_words(bit, True, 60)
+    for words in (said.casefold(), bit.name.casefold()):
+        if words in SHORT_NAMES:
+            return SHORT_NAMES[words]
+    first, rest = said[:1], said[1:]
+    return said if rest[:1].isupper() or not rest else first.lower() + rest
+
+
 def word_pages(words: Sequence[Parameter], room: int) -> list[WordPage]:
     """The words in pages of at most so many bits."""
     pages: list[WordPage] = []
+    room = max(1, room)
     for parameter in words:
         bits = parameter.bits
-        chunks = [tuple(bits[at : at + room]) for at in range(0, len(bits), max(1, room))]
+        chunks = [tuple(bits[at : at + room]) for at in range(0, len(bits), room)]
         pages += [WordPage(parameter, c, n, len(chunks)) for n, c in enumerate(chunks, start=1)]
     return pages
 
 
+def bit_columns(width: int) -> int:
+    """How many bits stand side by side."""
+    return max(1, (width - 1) // BIT_CELLS)
+
+
+def bit_grid(view: View, page: WordPage, width: int, height: int) -> list[Text]:
+    """A word with its bits in columns: a heading, then as many rows as there are."""
+    raw, _ = _raw(view, page.parameter)
+    columns = bit_columns(width)
+    cells, rows = (width - 1) // columns, height - 1
+    lines = [Text(" ", no_wrap=True) for _ in range(rows)]
+    for at, bit in enumerate(page.bits):
+        lines[at % rows].append_text(_bit_line(bit, raw, cells))
+    heading = Text(" ", no_wrap=True).append_text(_heading(view, page, width - 14))
+    heading.append("  ")
+    heading.append_text(Text.assemble(("Tab", KEY), (" next", FAINT)))
+    return [heading, *lines]
+
+
 def bit_lines(view: View, page: WordPage, width: int) -> list[Text]:
-    """Named bits of a word, each at its place, with the word itself."""
-    parameter = page.parameter
+    """Named bits of a word below each other, with the word itself."""
+    raw, _ = _raw(view, page.parameter)
+    return [_heading(view, page, width), *(_bit_line(bit, raw, width) for bit in page.bits)]
+
+
+def _raw(view: View, parameter: Parameter) -> tuple[int | None, str]:
+    """A word as it is now, and as a person reads it; dashes where it is not known."""
     reading = view.reading(parameter.code)
-    good = reading is not None and reading.raw is not None and reading.quality is Quality.GOOD
-    raw = reading.raw if good and reading is not None else None
+    if reading is None or reading.raw is None or reading.quality is not Quality.GOOD:
+        return None, NOT_AVAILABLE
+    return reading.raw, reading.text
+
+
+def _heading(view: View, page: WordPage, width: int) -> Text:
+    parameter = page.parameter
     heading = parameter.code + ("" if is_verified(parameter) else " ?")
     if page.of > 1:
         heading += f" {page.number}/{page.of}"
-    shown = reading.text if reading is not None and raw is not None else NOT_AVAILABLE
-    lines = [rule(heading, width, shown)]
-    return lines + [_bit_line(bit, raw, width) for bit in page.bits]
+    if width > len(heading) + len(parameter.name) + 20:
+        heading += f" {parameter.name}"
+    return rule(heading, width, _raw(view, parameter)[1])
 
 
 def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
+    """A bit in exactly so many cells."""
     text = Text(no_wrap=True)
     text.append(f" {bit.bit:>2} ", LINE)
     room = width - 7
     if raw is None:
-        text.append(f"  {cut(bit.name, room)}", FAINT)
-        return text
+        return text.append(f"  {cut(bit.name, room)} ", FAINT)
     on = bool(raw >> bit.bit & 1)
     text.append("●" if on else "·", ALARM if on and bit.alarm else STRONG if on else FAINT)
-    text.append(f" {cut(_bit_words(bit, on, room), room)}", PLAIN if on else FAINT)
-    return text
-
-
-SHORTEST_NAME = 6
-"""Characters of a bit's name that still tell which one it is."""
-PLAIN_ANSWERS = frozenset({"", "yes", "no", "on", "off", "none", "normal", "0", "1"})
+    return text.append(f" {cut(_bit_words(bit, on, room), room)} ", PLAIN if on else FAINT)
 
 
 def _bit_words(bit: Bit, on: bool, room: int) -> str:

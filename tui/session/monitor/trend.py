@@ -9,10 +9,18 @@ from dataclasses import dataclass
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Quantity
 
+from ..drive_state import DriveState, with_direction
+from ..reading import Reading
 from .snapshot import Snapshot
 
 TREND_SECONDS = 600.0
-TREND_QUANTITIES: tuple[Quantity, ...] = ("output_frequency", "motor_current")
+TREND_QUANTITIES: tuple[Quantity, ...] = (
+    "output_frequency",
+    "motor_current",
+    "frequency_reference",
+)
+DIRECTED = frozenset({"output_frequency", "frequency_reference"})
+"""Quantities whose sign is the direction of the motor."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,9 +48,19 @@ class Trend:
         """A failed cycle leaves a gap in the trend, never a repeated value."""
         readings = snapshot.readings
         values = tuple(
-            readings[code].number if code and code in readings and not snapshot.error else None
+            trend_value(readings[code], snapshot.state)
+            if code and code in readings and not snapshot.error
+            else None
             for code in self._codes
         )
         self._points.append(TrendPoint(snapshot.time, values))
         while self._points[0].time < snapshot.time - TREND_SECONDS:
             self._points.popleft()
+
+
+def trend_value(reading: Reading, state: DriveState) -> float | None:
+    """A value of the trend, with the sign of its direction where it has one."""
+    number, parameter = reading.number, reading.parameter
+    if number is None or parameter.quantity not in DIRECTED:
+        return number
+    return with_direction(parameter, number, state)

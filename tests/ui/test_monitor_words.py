@@ -1,0 +1,115 @@
+"""What Monitor says in words: the state, why a command has no effect, the bits that are 1."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tui.drive.profile import library
+from tui.screens.command.control import Control, hindrance
+from tui.screens.monitor.notices import NOTICE_ROWS, line_figures, notice_lines
+from tui.screens.monitor.run_keys import _after_esc
+from tui.screens.monitor.run_line import RunLine, run_lines
+from tui.screens.monitor.state import state_lines
+from tui.screens.monitor.words import word_line
+from tui.session.monitor.timeout import TimeoutWatch
+
+from . import fakes
+from .test_monitor_pictures import AT_TERMINALS, AT_ZERO, NO_SUPPLY, SPEEDING_UP
+from .test_places import PROFILES, view_of
+
+ATV71 = library.load("atv71")
+SLOWING = {**fakes.RUNNING, "FRH": 200, "ETA": 0x0237}
+TURNING_ROUND = {**fakes.RUNNING, "FRH": -500, "ETA": 0x0237}
+
+
+@pytest.mark.parametrize(
+    ("raws", "armed", "says"),
+    [
+        (fakes.RUNNING, None, "at reference"),
+        (SPEEDING_UP, None, "accelerating"),
+        (SLOWING, None, "decelerating"),
+        (TURNING_ROUND, None, "reversing"),
+        (AT_ZERO, None, "enabled, at 0 Hz"),
+        (fakes.READY, None, "a arms, r runs"),
+        (fakes.READY, 50.0, "r runs it"),
+        (AT_TERMINALS, 50.0, "no command from here"),
+        (NO_SUPPLY, 50.0, "not ready"),
+        (fakes.FAULT, None, " FAULT ObF "),
+    ],
+)
+def test_the_state_in_words(raws: dict[str, int], armed: float | None, says: str) -> None:
+    control = Control(armed_for=armed, hindrance=hindrance(ATV71, raws))
+    view = replace(view_of(ATV71, raws), control=control, stands_by=True)
+    assert state_lines(view, 22)[0].plain == says
+
+
+def test_a_fault_says_when_and_where_it_is_told_what_to_do() -> None:
+    view = replace(view_of(ATV71, fakes.FAULT), fault_at="16:28:05")
+    text = "\n".join(line.plain for line in state_lines(view, 22))
+    assert "since 16:28:05" in text
+    assert "5 says what to do" in text
+
+
+def test_the_block_has_five_lines_whatever_happens() -> None:
+    for raws in (fakes.RUNNING, fakes.FAULT, NO_SUPPLY):
+        for age in (0.1, 20.0):
+            view = replace(view_of(ATV71, raws, age=age), watch=TimeoutWatch(10.0, None), heard=1.0)
+            assert len(state_lines(view, 22)) == 5
+
+
+@pytest.mark.parametrize(
+    ("family", "raws", "way"),
+    [
+        ("atv71", AT_TERMINALS, "6 opens Control."),
+        ("atv71", NO_SUPPLY, "Switch the mains on."),
+        ("powerdrive", {"10.40": 3, "6.43": 0}, "t takes the control."),
+        ("atv31", {"LAC": 0}, "6 opens Control."),
+    ],
+)
+def test_what_has_no_effect_names_the_way_out(family: str, raws: dict[str, int], way: str) -> None:
+    found = hindrance(library.load(family), raws)
+    assert found is not None
+    assert found.way == way
+
+
+def test_nothing_hinders_a_drive_that_stands_by() -> None:
+    assert hindrance(ATV71, fakes.READY) is None
+    assert hindrance(library.load("powerdrive"), {"10.40": 3, "6.43": 1}) is None
+
+
+@pytest.mark.parametrize("family", PROFILES)
+def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
+    profile = library.load(family)
+    for chart in profile.data.charts:
+        for lock in chart.interlocks:
+            wrong = next(raw for raw in range(0x10000) if raw & lock.mask not in lock.values)
+            raws = {one.parameter: one.values[0] for one in chart.interlocks}
+            raws |= {when.parameter: when.values[0] for when in lock.when}
+            raws |= {chart.when.parameter: chart.when.values[0]} if chart.when else {}
+            found = hindrance(profile, raws | {lock.parameter: wrong})
+            assert found is not None
+            control = Control(hindrance=found)
+            view = replace(view_of(profile, {}), control=control)
+            shown = " ".join(line.plain.strip() for line in notice_lines(view, 80))
+            assert shown == f"No effect from here: {found.sentence}"
+            assert len(notice_lines(view, 80)) <= NOTICE_ROWS
+            line = RunLine("forward", "30", "Hz", 0.0, 0)
+            told = f"{found.text} {_after_esc(found.way)}".strip()
+            lines = [row.plain for row in run_lines(line, profile, {}, 9.0, 80, told)]
+            assert told in " ".join(" ".join(lines).split())
+
+
+def test_a_word_says_what_is_1_and_nothing_of_what_is_so_while_all_is_well() -> None:
+    view = view_of(ATV71, {**fakes.RUNNING, "ETA": 0x0437})
+    line = word_line(view, ATV71["ETA"], 79).plain
+    assert line.split("16#0437")[1].strip() == (
+        "ready · switched on · enabled · power · at reference"
+    )
+
+
+def test_addresses_that_are_empty_are_no_failures() -> None:
+    view = view_of(ATV71, fakes.RUNNING)
+    counters = replace(view.counters, timeouts=18, empty=17)
+    assert "1 failed" in line_figures(replace(view, counters=counters)).plain
