@@ -40,10 +40,10 @@ SIMULATED = ("--format", "8N1", "--real-time", "--run", "50")
 HELLO = (sys.executable, "-m", "benchmarks.hello")
 HTOP = ("htop", "-d", "1")
 FIRST_WORDS = (
-    "Drive Panel · Connection",
+    "Drive Panel",
     "Lines ─",
     "Simulated",
-    "Drives ─",
+    "No line ─",
     "Choose a line",
     "? help",
 )

@@ -277,21 +277,26 @@ async def test_damaged_reply_is_known_as_soon_as_the_line_is_silent(
         assert line.counters.timeouts == 0
 
 
-async def test_silence_counts_as_empty_only_where_nothing_ever_answered(
-    open_line: OpenLine,
+@pytest.mark.parametrize("priority", [Priority.BACKGROUND, Priority.PATIENT])
+async def test_an_empty_address_that_was_searched_is_no_failure(
+    priority: Priority, open_line: OpenLine
 ) -> None:
-    timing = Timing(first_timeout=0.2, scan_timeout=0.2, min_timeout=0.1, retries=0)
+    def only_three(request: bytes, _: int) -> Sequence[Step]:
+        return [reply(request)] if request[0] == 3 and request[3] != 6 else []
 
-    def once(request: bytes, count: int) -> Sequence[Step]:
-        return [reply(request)] if request[0] == 1 and count == 0 else []
-
-    with PtyPeer(once) as peer:
+    timing = Timing(first_timeout=0.1, min_timeout=0.1, late_reply=0.2, retries=0)
+    with PtyPeer(only_three) as peer:
         line = open_line(peer.path, timing)
-        await line.read(1, 5, priority=OPERATOR)
-        for device in (1, 2):
-            with pytest.raises(NoAnswer):
-                await line.read(device, 5, priority=OPERATOR)
-        assert (line.counters.timeouts, line.counters.empty) == (2, 1)
+        with pytest.raises(NoAnswer):
+            await line.read(2, 5, priority=priority)
+        assert (line.counters.searched, line.counters.timeouts) == (1, 0)
+        # a device that is there, or that somebody asked for, failed
+        await line.read(3, 5, priority=priority)
+        with pytest.raises(NoAnswer):
+            await line.read(3, 6, priority=priority)
+        with pytest.raises(NoAnswer):
+            await line.read(4, 5, priority=OPERATOR)
+        assert (line.counters.searched, line.counters.timeouts) == (1, 2)
 
 
 async def test_read_is_repeated_after_a_damaged_reply(open_line: OpenLine) -> None:

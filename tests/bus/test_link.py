@@ -94,6 +94,7 @@ def test_a_time_out_that_was_set_is_kept() -> None:
     usual, patient = Line(TcpLink("::1")).timing, Line(TcpLink("::1", timeout=5.0)).timing
     assert (patient.first_timeout, patient.late_reply) == (5.0, 10.0)
     assert patient.min_timeout == usual.min_timeout
+    assert (usual.patient_timeout, patient.patient_timeout) == (0.8, 5.0)
     hurried = Line(TcpLink("::1", timeout=0.05)).timing
     assert (hurried.first_timeout, hurried.min_timeout, hurried.scan_timeout) == (0.05,) * 3
 

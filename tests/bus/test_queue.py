@@ -135,6 +135,16 @@ def test_scan_waits_shortly_for_unknown_devices_only(devices: Devices) -> None:
     assert devices.time_out(1, 6, background) == 1.0
 
 
+def test_who_asks_once_more_waits_longer(devices: Devices) -> None:
+    waits = [devices.time_out(1, 3, p) for p in (Priority.BACKGROUND, Priority.PATIENT)]
+    assert waits == [0.3, 0.8]
+    hurried = Devices(Timing(first_timeout=0.2), mistakable=True)
+    assert hurried.time_out(1, 3, Priority.PATIENT) == 0.2
+    # nor is it held off by the silence of the first time
+    devices.silent(1, EXPECTED, 9.0, 10.0)
+    assert devices.backed_off(1, Priority.PATIENT, 10.0) is None
+
+
 def test_silent_device_is_left_alone_by_polls(devices: Devices) -> None:
     devices.silent(1, EXPECTED, 9.0, 10.0)
     assert devices.backed_off(1, Priority.POLL, 10.0) == 1.0

@@ -12,22 +12,16 @@ import pytest
 
 from tui.bus.api import Priority
 from tui.bus.errors import (
-    ChecksumFault,
     LineBusy,
-    LineClosed,
-    LineError,
     LineLost,
     LinkSyntaxError,
     NoAnswer,
     RequestRefused,
-    Superseded,
-    WrongReply,
 )
-from tui.bus.fake import FakeLine
 from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.session.connect.addresses import parse_addresses
-from tui.session.connect.identify import ScanResult, identify_drive, scan
+from tui.session.connect.identify import identify_drive
 from tui.session.connect.open_line import OpenLine, check_line, demo_line, open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
@@ -85,75 +79,6 @@ async def test_a_drive_without_function_43_is_found_by_its_status_word(five: Ope
     found = await identify_drive(five.line, ADDRESSES["powerdrive"])
     assert found.profile is None
     assert set(found.candidates) == {"powerdrive", "proxidrive", "varmeca"}
-
-
-async def test_a_scan_finds_every_drive_and_no_other(five: OpenLine) -> None:
-    results: list[ScanResult] = []
-    await scan(five.line, range(1, 8), results.append)
-    assert [result.device for result in results] == [1, 2, 3, 4, 5]
-
-
-async def test_a_second_scan_finds_drives_without_function_43_and_those_behind_them() -> None:
-    opened = open_line("sim:powerdrive@1,varmeca@2,atv71@3")
-    try:
-        first: list[ScanResult] = []
-        await scan(opened.line, range(1, 5), first.append)
-        for device, profile in enumerate(("powerdrive", "varmeca", "atv71"), start=1):
-            DriveSession(opened.line, device, library.load(profile))  # describes it to the line
-        again: list[ScanResult] = []
-        await scan(opened.line, range(1, 5), again.append)
-        assert again == first
-        assert [result.device for result in again] == [1, 2, 3]
-        assert not any(result.error for result in again)
-        nobody = library.load("powerdrive")
-        DriveSession(opened.line, 4, nobody)
-        with pytest.raises(NoAnswer):  # what is known of it does not make it present
-            await identify_drive(opened.line, 4)
-    finally:
-        opened.close()
-
-
-def trouble(error: LineError) -> FakeLine:
-    """A line on which one address has an error of its own."""
-    line = FakeLine({1: {}, 2: {}, 3: {}})
-    for device in line.devices.values():
-        device.identity = {1: b"ATV71HU15M3"}
-    line.fail_identify(2, error)
-    return line
-
-
-@pytest.mark.parametrize(
-    "error",
-    [
-        LineBusy("Too many requests wait."),
-        WrongReply(2, 43, 0),
-        ChecksumFault(2, 43, 0),
-        Superseded(2, 0),
-    ],
-    ids=lambda error: type(error).__name__,
-)
-async def test_what_is_wrong_with_one_address_ends_no_scan(error: LineError) -> None:
-    results: list[ScanResult] = []
-    await scan(trouble(error), range(1, 4), results.append)
-    assert [result.device for result in results] == [1, 2, 3]
-    assert [result.error for result in results] == ["", str(error), ""]
-
-
-@pytest.mark.parametrize("error", [LineLost("gone"), LineClosed()])
-async def test_a_scan_ends_with_its_line(error: LineError) -> None:
-    results: list[ScanResult] = []
-    with pytest.raises(type(error)):
-        await scan(trouble(error), range(1, 4), results.append)
-    assert [result.device for result in results] == [1]
-
-
-async def test_a_broken_profile_of_the_user_ends_no_scan(five: OpenLine) -> None:
-    folder = library.user_folder()
-    folder.mkdir(parents=True)
-    (folder / "mine.toml").write_text('[profile]\nid = "mine"\n', encoding="utf-8")
-    results: list[ScanResult] = []
-    await scan(five.line, [ADDRESSES["powerdrive"], ADDRESSES["atv71"]], results.append)
-    assert [r.identity.candidates[0] for r in results if r.identity] == ["powerdrive", "atv71"]
 
 
 async def test_nobody_there(five: OpenLine) -> None:

@@ -32,7 +32,7 @@ ROOT = Path(__file__).resolve().parents[2]
 STALL = 10.0
 """Seconds for which the terminal stands still."""
 DRIVE_ROW = re.compile(r" +\d+ (\S+)")
-"""A drive on Connection: its address and its reference."""
+"""A drive on Line: its address and its reference."""
 MORE_REQUESTS = 20
 """Requests that must still come while it stands still."""
 
@@ -196,10 +196,10 @@ class Counter:
 
 
 def choose(terminal: Terminal, name: str) -> None:
-    """Put the mark of Connection on the drive whose reference begins with this name."""
+    """Put the mark of Line on the drive whose reference begins with this name."""
     lines = terminal.text().splitlines()
-    title = next(i for i, line in enumerate(lines) if "Drives ─" in line)
-    column = lines[title].index("Drives")
+    title = next(i for i, line in enumerate(lines) if "Dev " in line)
+    column = lines[title].index("Dev ")
     rows = [match[1] for line in lines[title + 1 :] if (match := DRIVE_ROW.match(line[column:]))]
     place = next(i for i, reference in enumerate(rows) if reference.startswith(name))
     terminal.press("Home", *["Down"] * place)

@@ -200,6 +200,7 @@ class FakeLineWatch:
     commanded: list[DriveSession] = field(default_factory=list)
     looks: dict[int, Look] = field(default_factory=dict)
     seen: dict[int, DriveState] = field(default_factory=dict)
+    glance_period: float = 3.0
 
     @property
     def states(self) -> dict[int, DriveState]:
@@ -270,10 +271,12 @@ def console_of(
     return console
 
 
-def look_of(raws: Mapping[str, int]) -> Look:
-    """What a look at an Altivar 71 that holds this has brought."""
+def look_of(raws: Mapping[str, int], *, age: float = 0.0) -> Look:
+    """What a look at an Altivar 71 that holds this has brought, so many seconds ago."""
     profile = library.load("atv71")
-    return Look(drive_state(profile, readings_of(profile, raws, NOW)), "", NOW, None)
+    readings = readings_of(profile, raws, NOW - age)
+    told = {code: readings[code] for code in ("RFR", "FRH", "LCR")}
+    return Look(drive_state(profile, readings), "", NOW - age, None, told)
 
 
 class StillFleet(Fleet):

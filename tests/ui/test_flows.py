@@ -118,7 +118,7 @@ async def test_a_drive_that_watches_the_line_is_asked_on() -> None:
         await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
         await pilot.pause(1.0)
         state = app.connection.drives.get_option_at_index(0).prompt
-        assert str(state).endswith("running forward")
+        assert "▶ forward" in str(state)
 
 
 async def test_frames_help_and_palette_open_and_close() -> None:

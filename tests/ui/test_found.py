@@ -1,4 +1,4 @@
-"""What the Connection screen says of a drive that answered."""
+"""What Line says of a drive that answered."""
 
 from __future__ import annotations
 
@@ -7,19 +7,28 @@ from dataclasses import replace
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from textual.visual import VisualType
 
 from tui.screens.connection.drive_list import DriveList
-from tui.screens.connection.found import about_drive, drive_line, next_step
+from tui.screens.connection.found import about_drive, next_step
+from tui.screens.connection.state import QUIET
+from tui.screens.connection.wall import (
+    WALL_SIGNS,
+    WallRow,
+    column_heads,
+    columns_for,
+    heading,
+    in_order,
+    load_bar,
+    wall_line,
+)
 from tui.session.connect.identify import DriveIdentity
 from tui.session.fleet import FoundDrive
+from tui.widgets.palette import ALARM
 
 from . import fakes
-from .test_flows import shown
 
 NAMELESS = DriveIdentity(7, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
-
-
-READY = ("ready", "ready")
 
 
 def found(identity: DriveIdentity, profile: str | None = "atv71", *, guessed: bool) -> FoundDrive:
@@ -27,37 +36,79 @@ def found(identity: DriveIdentity, profile: str | None = "atv71", *, guessed: bo
     return FoundDrive(identity, console, guessed)
 
 
-@given(st.integers(44, 120), st.text("abcABC123 ", max_size=40), st.text("abc ", max_size=16))
-def test_a_drive_fills_its_line_and_its_state_stands_at_the_end(
-    width: int, name: str, state: str
-) -> None:
-    drive = FoundDrive(replace(fakes.ATV71, name=name))
-    state = state or "ready"
-    line = drive_line(drive, (state, "ready"), width)
-    assert line.cell_len == width
-    assert line.plain.endswith(f" {state}")
-    assert "ATV71HU15M3" in line.plain
+rows = st.builds(
+    WallRow,
+    st.integers(1, 247),
+    *[st.text("abcABC123 é漢", max_size=40)] * 2,
+    st.sampled_from([*WALL_SIGNS, "ready", "stopped"]),
+    *[st.text("abcABC123 .", max_size=30)] * 4,
+    st.none() | st.floats(0, 3),
+    st.none() | st.floats(0, 1e7),
+    st.booleans(),
+)
+
+
+@given(st.integers(36, 180), rows, rows)
+def test_nothing_in_a_row_moves_whatever_it_says(width: int, one: WallRow, other: WallRow) -> None:
+    columns = columns_for(width)
+    lines = [wall_line(row, columns) for row in (one, other)]
+    assert {len(line.plain) for line in lines} == {columns.taken}
+    assert columns.taken <= width
+    assert len(column_heads(columns).plain) == columns.taken
+
+
+def test_where_there_is_little_room_the_load_goes_first_and_then_the_name() -> None:
+    kept = [columns_for(width) for width in (180, 86, 70, 53)]
+    assert [(bool(one.load), bool(one.name), bool(one.drive)) for one in kept] == [
+        (True, True, True),
+        (True, True, True),
+        (False, True, True),
+        (False, False, True),
+    ]
+
+
+def test_faults_come_first_in_the_order_in_which_they_came() -> None:
+    assert in_order([1, 3, 9, 17, 20], [17, 3]) == [17, 3, 1, 9, 20]
+
+
+def test_the_heading_tells_how_many_are_in_fault_lost_and_found() -> None:
+    drives = [
+        WallRow(1, "", kind="fault"),
+        WallRow(2, "", kind="unknown", words="lost"),
+        WallRow(3, ""),
+    ]
+    assert "1 in fault · 1 lost · 3 of 10" in heading("a line", drives, 10, 60).plain
+    assert heading("a line", drives, 10, 60).cell_len == 60
+
+
+@pytest.mark.parametrize(("share", "filled"), [(None, 0), (0.0, 0), (0.5, 5), (1.0, 10), (1.5, 10)])
+def test_the_load_is_a_bar_up_to_the_rated_current(share: float | None, filled: int) -> None:
+    bar = load_bar(share, 10)
+    assert bar.cell_len == 10
+    assert abs(bar.plain.count("━") - filled) <= 1
+    over = [span for span in bar.spans if span.style == ALARM]
+    assert bool(over) is (share is not None and share > 1)
 
 
 def test_a_profile_that_is_a_guess_says_so_and_names_the_others() -> None:
     drive = found(NAMELESS, "powerdrive", guessed=True)
-    assert "Powerdrive ?" in drive_line(drive, READY, 48).plain
     assert "profile Powerdrive ?" in about_drive(drive)
     assert "proxidrive or varmeca" in next_step(drive)
 
 
-@pytest.mark.parametrize("width", [48, 80])
-def test_a_drive_that_named_itself_has_no_sign(width: int) -> None:
+def test_a_drive_that_named_itself_has_no_sign() -> None:
     drive = found(fakes.ATV71, guessed=False)
-    assert "?" not in drive_line(drive, READY, width).plain + about_drive(drive)
-    assert next_step(drive) == "Enter watches it."
+    assert "?" not in about_drive(drive)
+    assert not next_step(drive)
 
 
 def test_a_drive_without_profile_says_so() -> None:
     assert "no profile" in about_drive(found(NAMELESS, None, guessed=False))
 
 
-async def test_a_new_state_moves_nothing_in_a_long_list_of_drives() -> None:
+async def test_a_new_state_moves_nothing_in_a_long_list_of_drives(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     app = fakes.app_of()
     async with app.run_test(size=(80, 24)) as pilot:
         await pilot.pause()
@@ -70,17 +121,31 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives() -> None:
             app.fleet.hold(FoundDrive(identity, fakes.console_of(None, device=device)))
             line_watch.looks[device] = fakes.look_of(fakes.READY)
         screen.show_drives()
+        screen._key_at = fakes.NOW
         drives.focus()
         drives.highlighted = 31
         await pilot.pause()
         drives.highlighted = 25
         await pilot.pause()
-        screen.say("What was said last.", "")
         before = drives.scroll_offset
         assert before.y > 0
         line_watch.looks[5] = line_watch.looks[26] = overheated
+        drawn: list[str] = []
+        replace_prompt = drives.replace_option_prompt
+
+        def noted(id: str, prompt: VisualType) -> DriveList:
+            drawn.append(id)
+            return replace_prompt(id, prompt)
+
+        monkeypatch.setattr(drives, "replace_option_prompt", noted)
         screen.show_drives()
+        assert drawn == ["5", "26"], "only what changed is drawn"
         await pilot.pause()
         assert (drives.scroll_offset, drives.highlighted) == (before, 25)
-        assert "What was said last." in shown(app, "message")
-        assert str(drives.get_option("26").prompt).endswith("fault OHF")
+        assert "■ OHF" in str(drives.get_option("26").prompt)
+        # nobody touches a key for a while: faults go first, the cursor stays on its drive
+        app.clock.monotonic = lambda: fakes.NOW + QUIET  # type: ignore[method-assign]
+        screen._key_at = fakes.NOW
+        screen.show_drives()
+        assert [option.id for option in drives.options][:3] == ["5", "26", "1"]
+        assert drives.chosen == 26

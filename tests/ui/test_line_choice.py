@@ -1,4 +1,4 @@
-"""Connection: Enter leaves no good line unasked, and the cursor stays where it is meant to be."""
+"""Line: Enter leaves no good line unasked, and the cursor stays where it is meant to be."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from contextlib import asynccontextmanager
 from dataclasses import dataclass, field, replace
 
 import pytest
+from rich.text import Text
 from textual.app import ComposeResult
 from textual.pilot import Pilot
 from textual.screen import Screen
@@ -15,7 +16,6 @@ from textual.widgets import Input
 from tui.app import DrivePanelApp
 from tui.screens.connection.choices import same_line
 from tui.screens.connection.drive_list import DriveList
-from tui.screens.connection.found import FoundState
 from tui.screens.connection.state import QUIET
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.monitor.screen import MonitorScreen
@@ -46,7 +46,7 @@ class Line:
 
     async def searched(self) -> None:
         """Wait until the search goes on."""
-        await until(self.pilot, lambda: "Asking address" in shown(self.app, "message"))
+        await until(self.pilot, lambda: " Search 1 of " in shown(self.app, "search"))
 
     @property
     def kept(self) -> bool:
@@ -86,7 +86,7 @@ async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips()
         assert chosen.text == NAMED
         for _ in range(3):
             await pilot.press("enter")
-        await until(pilot, lambda: "drives are looked for" in shown(app, "message"))
+        await until(pilot, lambda: "drives are searched for" in shown(app, "said"))
         assert app.screen is app.connection
         await until(pilot, lambda: app.connection.drives.option_count == 1)
         # the cursor went to the drive: Enter watches it
@@ -180,8 +180,8 @@ def drives(*devices: int) -> dict[int, FoundDrive]:
     return {d: FoundDrive(replace(fakes.ATV71, device=d)) for d in sorted(devices)}
 
 
-def states(*devices: int) -> dict[int, FoundState]:
-    return dict.fromkeys(devices, ("ready", "ready"))
+def lines(*devices: int) -> tuple[dict[int, Text], list[int]]:
+    return {device: Text(f"drive {device}") for device in devices}, list(devices)
 
 
 async def test_the_cursor_stays_on_its_drive_not_on_its_row() -> None:
@@ -189,21 +189,21 @@ async def test_the_cursor_stays_on_its_drive_not_on_its_row() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         await app.push_screen(Listed())
         listed = app.screen.query_one(DriveList)
-        listed.fill(drives(4, 7), states(4, 7))
+        listed.fill(*lines(4, 7))
         listed.highlighted = 1
-        listed.fill(drives(2, 4, 5, 7), states(2, 4, 5, 7))
-        assert listed.chosen == "7"
+        listed.fill(*lines(2, 4, 5, 7))
+        assert listed.chosen == 7
         assert [option.id for option in listed.options] == ["2", "4", "5", "7"]
         # while keys come nothing changes its place, new drives come last
-        listed.fill(drives(1, 2, 4, 5, 7), states(1, 2, 4, 5, 7), sort=False)
+        listed.fill(*lines(1, 2, 4, 5, 7), sort=False)
         assert [option.id for option in listed.options] == ["2", "4", "5", "7", "1"]
-        assert listed.chosen == "7"
-        listed.fill(drives(1, 2, 4, 5, 7), states(1, 2, 4, 5, 7))
+        assert listed.chosen == 7
+        listed.fill(*lines(1, 2, 4, 5, 7))
         assert [option.id for option in listed.options] == ["1", "2", "4", "5", "7"]
-        assert listed.chosen == "7"
+        assert listed.chosen == 7
         # a drive that is gone leaves the first one
-        listed.fill(drives(1, 2), states(1, 2))
-        assert listed.chosen == "1"
+        listed.fill(*lines(1, 2))
+        assert listed.chosen == 1
         await pilot.pause()
 
 
@@ -232,7 +232,7 @@ async def test_sorting_waits_while_keys_come() -> None:
         fleet.hold(drives(2)[2])
         app.connection.look()
         assert [option.id for option in listed.options] == ["4", "7", "2"]
-        assert listed.chosen == "7"
+        assert listed.chosen == 7
         clock.now += QUIET / 2
         await pilot.press("up")
         clock.now += QUIET / 2
@@ -241,4 +241,4 @@ async def test_sorting_waits_while_keys_come() -> None:
         clock.now += QUIET
         app.connection.look()
         assert [option.id for option in listed.options] == ["2", "4", "7"]
-        assert listed.chosen == "4"
+        assert listed.chosen == 4

@@ -272,7 +272,7 @@ def test_a_drives_name_reaches_the_terminal_as_signs_only() -> None:
         os.chdir(ROOT)
         os.execve(sys.executable, [sys.executable, "-c", code], environment)
     try:
-        seen = read_until(terminal, SHOWN.encode(), b"Enter watches")
+        seen = read_until(terminal, SHOWN.encode(), b"profile Altivar")
         os.write(terminal, b"\r")
         seen += read_until(terminal, SHOWN.encode(), b"ARMED")
     finally:

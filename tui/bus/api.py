@@ -18,6 +18,7 @@ from .model import (
     LineStatus,
     Priority,
     Reply,
+    Timing,
 )
 from .trace import Frame
 
@@ -67,6 +68,10 @@ class ModbusLine(Protocol):
     @property
     def read_only(self) -> bool:
         """Whether everything that changes a device is refused with RequestRefused."""
+
+    @property
+    def timing(self) -> Timing:
+        """How long is waited for a reply."""
 
     @property
     def pace(self) -> Pace:

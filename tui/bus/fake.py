@@ -35,6 +35,7 @@ from .model import (
     LineStatus,
     Priority,
     Reply,
+    Timing,
 )
 from .requests import BROADCAST, Diagnose, Identify, Read, ReadWrite, Request, write_request
 from .schedule.pace import Pace
@@ -60,6 +61,7 @@ class FakeLine:
     ) -> None:
         self.link: Link = link or SerialLink("/dev/null")
         self.read_only = read_only
+        self.timing = Timing()
         self.pace = Pace()
         self.devices = {n: FakeDevice(n, words) for n, words in (registers or {}).items()}
         """Those that are there; may be added to, and replaced by some of another kind."""

@@ -253,5 +253,6 @@ def timing_of(link: Link) -> Timing:
         first_timeout=link.timeout,
         min_timeout=min(usual.min_timeout, link.timeout),
         scan_timeout=min(usual.scan_timeout, link.timeout),
+        patient_timeout=max(usual.patient_timeout, link.timeout),
         late_reply=max(usual.late_reply, LATE_REPLY * link.timeout),
     )

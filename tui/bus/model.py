@@ -17,6 +17,8 @@ class Priority(IntEnum):
     OPERATOR_READ = 3
     POLL = 4
     BACKGROUND = 5
+    PATIENT = 6
+    """Background work that waits longer for an answer, for a slow or a disturbed device."""
 
 
 class LineStatus(Enum):
@@ -85,8 +87,9 @@ class LineCounters:
     requests: int = 0
     replies: int = 0
     timeouts: int = 0
-    empty: int = 0
-    """Those of the time-outs that were at addresses where nothing ever answered."""
+    """Requests without an answer, to devices that have answered or that were asked on purpose."""
+    searched: int = 0
+    """Requests of a search without an answer: nobody was known to be there."""
     checksum: int = 0
     wrong: int = 0
     exceptions: int = 0
@@ -109,6 +112,8 @@ class Timing:
     """The shortest time-out that measured turnarounds may lead to."""
     scan_timeout: float = 0.4
     """Time-out of background requests to a device that never answered yet."""
+    patient_timeout: float = 0.8
+    """The same where it is asked once more."""
     late_reply: float = 2.0
     """How long after a request its reply may still come; a request whose reply could be
     mistaken for it is held back until then."""

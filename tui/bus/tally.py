@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from .model import LineCounters
+from .model import LineCounters, Priority
 
 
 @dataclass(slots=True)
@@ -14,7 +14,7 @@ class Tally:
     requests: int = 0
     replies: int = 0
     timeouts: int = 0
-    empty: int = 0
+    searched: int = 0
     checksum: int = 0
     wrong: int = 0
     exceptions: int = 0
@@ -23,6 +23,13 @@ class Tally:
     bytes_out: int = 0
     bytes_in: int = 0
     busy_seconds: float = 0.0
+
+    def count_silence(self, priority: Priority, *, known: bool) -> None:
+        """No answer came; an empty address that a search has asked is no failure of the line."""
+        if priority >= Priority.BACKGROUND and not known:
+            self.searched += 1
+        else:
+            self.timeouts += 1
 
     def frozen(self) -> LineCounters:
         """The counts of this moment."""

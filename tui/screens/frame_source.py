@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import time
+from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from rich.style import Style
 
-from tui.widgets.palette import ALARM, ATTENTION, FAULT
+from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT
 from tui.widgets.strip import DriveNow, StripView
 
 from .frame import FrameView, Said, at
@@ -62,8 +63,12 @@ class FrameSource:
         if not self._app.line_label:
             return ""
         count = len(fleet.found) if fleet else 0
-        drives = f"{count} drive{'' if count == 1 else 's'}"
-        return f"{self._app.line_label} · {drives}" if count else self._app.line_label
+        parts = [self._app.line_label]
+        if count:
+            parts.append(f"{count} drive{'' if count == 1 else 's'}")
+        if fleet is not None and fleet.search is not None and fleet.search.goes_on:
+            parts.append(f"search {fleet.search.text}")
+        return " · ".join(parts)
 
     def _measured(self, now: float) -> float | None:
         """Share of the last seconds in which the line was busy."""
@@ -135,9 +140,9 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
     report = fleet.stopper.reports.get(session.device)
     by_look = snapshot is None or (look is not None and look.time > snapshot.time)
     state, age, readings = _seen(console, look if by_look else None, now)
-    kind, words = _words(console, state, report, now)
+    kind, words = said_state(console, state, report, now)
     values = {
-        quantity: _value(console, readings, quantity)
+        quantity: said_value(console, readings, quantity)
         for quantity in ("output_frequency", "frequency_reference", "motor_current")
     }
     armed = console.commander.armed_for
@@ -174,7 +179,7 @@ def _seen(
     return snapshot.state, age if lost else None, dict(snapshot.readings)
 
 
-def _words(
+def said_state(
     console: DriveConsole, state: DriveState | None, report: StopReport | None, now: float
 ) -> tuple[str, str]:
     """The kind of the state and its words, a stop on its way before it."""
@@ -206,7 +211,9 @@ def stands_by(console: DriveConsole, state: DriveState) -> bool:
     return chart_in_force(profile, raws) is not None and hindrance(profile, raws) is None
 
 
-def _value(console: DriveConsole, readings: dict[str, Reading], quantity: str) -> tuple[str, str]:
+def said_value(
+    console: DriveConsole, readings: Mapping[str, Reading], quantity: str
+) -> tuple[str, str]:
     """Text and unit of a quantity that was read; empty where it was not."""
     parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
     reading = readings.get(parameter.code) if parameter else None
@@ -229,6 +236,8 @@ def _marks(console: DriveConsole | None, fleet: Fleet | None) -> dict[str, tuple
         return {}
     marks: dict[str, tuple[str, Style]] = {}
     device = console.device if console is not None else None
+    if fleet.search is not None and fleet.search.goes_on:
+        marks[CONNECTION] = ("…", FAINT)
     for fault in fleet.alarms.active:
         marks[FAULTS if fault.device == device else CONNECTION] = ("■", FAULT)
     if console is None:

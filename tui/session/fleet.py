@@ -17,6 +17,7 @@ from tui.drive.profile.schema import OrderId
 from .clock import REAL_CLOCK, Clock
 from .command.stop import Stopper
 from .connect.identify import DriveIdentity
+from .connect.search import Search
 from .console import DriveConsole
 from .drive import DriveSession
 from .events import EventLog
@@ -68,6 +69,8 @@ class Fleet:
         self.stopper = Stopper(line, journal, self.events)
         self.alarms = LineAlarms(self.events, self._record_fault, clock.wall)
         """The faults of all of them."""
+        self.search: Search | None = None
+        """The search for drives that goes on, or the last one."""
         self._lock = threading.Lock()
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})
 

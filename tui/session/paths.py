@@ -1,4 +1,4 @@
-"""What the panel keeps between runs: its folder, and the lines used lately."""
+"""What the panel keeps between runs: its folder, the lines used lately, whom they were asked."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import os
 from pathlib import Path
 
 RECENT_LENGTH = 8
+ADDRESSES_LENGTH = 50
+"""Lines whose addresses are remembered."""
 
 
 def state_folder() -> Path:
@@ -30,14 +32,42 @@ def recent_lines() -> list[str]:
 def remember_line(text: str) -> None:
     """Put a line first among the recent ones; a folder that cannot be written is no error."""
     lines = [text, *(line for line in recent_lines() if line != text)][:RECENT_LENGTH]
-    file = _recent_file()
+    _keep(_recent_file(), lines)
+
+
+def addresses_asked(key: str) -> str:
+    """The addresses that were asked last on a line, as they were typed; empty where none were."""
+    asked = _all_addresses().get(key, "")
+    return asked if isinstance(asked, str) else ""
+
+
+def remember_addresses(key: str, text: str) -> None:
+    """Keep the addresses to ask on a line; a folder that cannot be written is no error."""
+    known = {line: asked for line, asked in _all_addresses().items() if line != key}
+    latest = {key: text, **known}
+    _keep(_addresses_file(), dict(list(latest.items())[:ADDRESSES_LENGTH]))
+
+
+def _all_addresses() -> dict[str, object]:
+    try:
+        stored = json.loads(_addresses_file().read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return {}
+    return stored if isinstance(stored, dict) else {}
+
+
+def _keep(file: Path, what: object) -> None:
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
         part = file.with_suffix(".part")
-        part.write_text(json.dumps(lines, indent=1), encoding="utf-8")
+        part.write_text(json.dumps(what, indent=1), encoding="utf-8")
         part.replace(file)
     except OSError:
         return
+
+
+def _addresses_file() -> Path:
+    return state_folder() / "addresses.json"
 
 
 def _recent_file() -> Path:

@@ -16,6 +16,7 @@ from .palette import (
     FAINT,
     KEY,
     LINE,
+    PLAIN,
     STOP_KEY,
     STRONG,
     TITLE,
@@ -100,3 +101,11 @@ def armed_text(armed: float | None, *, lost: bool = False) -> Text:
     if armed is None:
         return Text(" NOT ARMED  ", ALARM if lost else STRONG)
     return Text(f" ARMED {armed:2.0f} s ", ATTENTION_BLOCK)
+
+
+def pair(label: str, value: str, style: Style = PLAIN, width: int = 12) -> Text:
+    """A dim label and its value, behind a label of `width`."""
+    text = Text(no_wrap=True)
+    text.append(f"{label:<{width}}", FAINT)
+    text.append(value, style)
+    return text

@@ -238,9 +238,8 @@ class Dispatcher:
                 self._devices.may_come(request.device, expectation, result.sent, now)
                 error = WrongReply(*place, result.detail, result.received)
             case _:
-                self._tally.timeouts += 1
-                if not self._devices[request.device].ever_answered:
-                    self._tally.empty += 1
+                known = self._devices[request.device].ever_answered
+                self._tally.count_silence(job.priority, known=known)
                 self._devices.silent(request.device, expectation, result.sent, now)
                 error = NoAnswer(*place, self._no_answer(job, result.detail))
         if self._is_repeated(job, result.kind):
@@ -255,7 +254,7 @@ class Dispatcher:
         if job.request.changes or job.repeats >= self._timing.retries:
             return False
         if kind is ResultKind.DAMAGED:
-            return job.priority is not Priority.BACKGROUND
+            return job.priority < Priority.BACKGROUND
         known = self._devices[job.request.device].ever_answered
         return kind is ResultKind.NOTHING and known and job.priority in REPEATED_WHEN_SILENT
 

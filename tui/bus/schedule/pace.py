@@ -25,6 +25,11 @@ class Pace:
             self._wishes[who] = seconds / period
             return period * max(1.0, sum(self._wishes.values()) / SHARE)
 
+    @property
+    def busy(self) -> bool:
+        """Whether anybody asks again and again."""
+        return bool(self._wishes)
+
     def release(self, who: Hashable) -> None:
         """Wish for nothing any more."""
         with self._lock:

@@ -113,8 +113,10 @@ class Devices:
     def time_out(self, device: int, function: int, priority: Priority) -> float:
         """Seconds to wait for a reply, from the end of the request to the reply's start."""
         timing, record = self._timing, self[device]
-        if priority is Priority.BACKGROUND and not record.ever_answered:
-            return min(timing.scan_timeout, timing.first_timeout)
+        if priority >= Priority.BACKGROUND and not record.ever_answered:
+            patient = priority is Priority.PATIENT
+            wait = timing.patient_timeout if patient else timing.scan_timeout
+            return min(wait, timing.first_timeout)
         recent = record.recent.get(function)
         if not recent:
             return timing.first_timeout
@@ -126,7 +128,7 @@ class Devices:
         record = self[device]
         if priority < Priority.POLL or record.next_try is None or now >= record.next_try:
             return None
-        if priority is Priority.BACKGROUND and not record.ever_answered:
+        if priority >= Priority.BACKGROUND and not record.ever_answered:
             return None
         return record.next_try - now
 

@@ -1,4 +1,4 @@
-"""What the Connection screen offers: the lines of this machine and those used lately."""
+"""What Line offers: the lines of this machine and those used lately."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from rich.text import Text
 
 from tui.bus.errors import LinkSyntaxError
 from tui.session.connect.open_line import check_line
-from tui.widgets.drawing import cut
-from tui.widgets.palette import FAINT, PLAIN
+from tui.widgets.drawing import short
+from tui.widgets.palette import FAINT, PLAIN, RUNNING, STRONG
 
 LINE_FORMS = (
     "serial:/dev/ttyUSB0,19200,8E1 (and ,timeout=2 for slow drives)",
@@ -19,8 +19,8 @@ LINE_FORMS = (
 )
 
 SIMULATED_LINES = (
-    ("sim:atv21,atv31,atv312,atv71,powerdrive", "five drives on one line"),
-    ("sim:atv71@2", "an Altivar 71 at address 2"),
+    ("sim:atv21,atv31,atv312,atv71,powerdrive", "five drives"),
+    ("sim:atv71@2", "an Altivar 71"),
 )
 
 
@@ -47,8 +47,8 @@ def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
     serial = tuple(LineChoice(path, description, path) for path, description in ports)
     lately = tuple(LineChoice(text, "") for text in recent)
     return [
-        Group("Serial ports", serial, "none found: ^p, look again"),
-        Group("Recent", lately, "none yet: n types a line"),
+        Group("Serial ports", serial, "none found"),
+        Group("Recent", lately, "none yet: n types one"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in SIMULATED_LINES)),
     ]
 
@@ -82,10 +82,11 @@ def same_line(one: str, other: str) -> bool:
     return settings[0] == settings[1]
 
 
-def choice_line(choice: LineChoice, width: int) -> Text:
+def choice_line(choice: LineChoice, width: int, *, here: bool = False) -> Text:
     """A line that can be opened, with as much of its description as there is room for."""
-    text = Text(" " + cut(choice.text, min(len(choice.text), width - 1)), PLAIN)
+    text = Text("● " if here else "  ", RUNNING if here else PLAIN)
+    text.append(short(choice.text, width - 2), STRONG if here else PLAIN)
     room = width - text.cell_len - 2
     if choice.description and room >= 6:
-        text.append("  " + cut(choice.description, min(len(choice.description), room)), FAINT)
+        text.append("  " + short(choice.description, room), FAINT)
     return text

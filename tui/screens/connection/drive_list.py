@@ -1,63 +1,50 @@
-"""The list of drives on the Connection screen."""
+"""The list of drives on Line: a row for each, the cursor on a drive and not on a place."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping
 
 from rich.text import Text
 from textual.widgets import OptionList
 
 from tui.widgets.plain import entry
 
-from .found import FoundState, drive_line
-
-if TYPE_CHECKING:
-    from tui.session.fleet import FoundDrive
-
 
 class DriveList(OptionList):
-    """The drives that answered, one a line, by address; a new state moves nothing.
+    """The drives that answered, one a line; a new state draws its line and moves nothing.
 
     The cursor stays on its drive, whatever comes above it.
     """
 
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True)
-        self._drawn: dict[str, Text] = {}
+        self._drawn: dict[int, Text] = {}
 
     @property
-    def chosen(self) -> str | None:
-        """The address under the cursor."""
+    def chosen(self) -> int | None:
+        """The device under the cursor."""
         at = self.highlighted
-        return None if at is None else self.get_option_at_index(at).id
+        return None if at is None else int(self.get_option_at_index(at).id or 0)
 
-    def fill(
-        self,
-        found: Mapping[int, FoundDrive],
-        states: Mapping[int, FoundState],
-        *,
-        sort: bool = True,
-    ) -> None:
-        """Show these drives; without `sort` new ones come last, and no other changes its place."""
-        width = max(20, self.size.width - 1)
-        lines = {
-            str(device): drive_line(drive, states[device], width) for device, drive in found.items()
-        }
+    def fill(self, lines: Mapping[int, Text], order: Iterable[int], *, sort: bool = True) -> None:
+        """Show these lines in order; without `sort` none changes its place, new ones are last."""
+        wanted = list(order)
         if not sort:
-            stay = [id for id in self._drawn if id in lines]
-            new = [id for id in lines if id not in self._drawn]
-            lines = {id: lines[id] for id in (*stay, *new)}
-        before, self._drawn = self._drawn, lines
-        if list(lines) == list(before):
-            for id in [id for id in lines if lines[id] != before[id]]:
-                self.replace_option_prompt(id, lines[id])
+            stay = [device for device in self._drawn if device in lines]
+            wanted = [*stay, *(device for device in wanted if device not in self._drawn)]
+        before, self._drawn = self._drawn, {device: lines[device] for device in wanted}
+        if wanted == list(before):
+            for device in wanted:
+                if lines[device] != before[device] or lines[device].spans != before[device].spans:
+                    self.replace_option_prompt(str(device), lines[device])
             return
-        chosen = self.chosen
+        chosen, top = self.chosen, self.scroll_offset.y
         self.clear_options()
-        self.add_options(entry(line, id=id) for id, line in lines.items())
-        if chosen in lines:
+        self.add_options(entry(lines[device], id=str(device)) for device in wanted)
+        if chosen is not None and chosen in lines:
             with self.prevent(OptionList.OptionHighlighted):  # nobody has chosen anything
-                self.highlighted = list(lines).index(chosen)
+                self.highlighted = wanted.index(chosen)
         elif lines:
             self.highlighted = 0
+            return
+        self.scroll_to(y=top, animate=False, force=True)

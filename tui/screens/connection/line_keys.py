@@ -1,13 +1,16 @@
-"""Keys of the Connection screen that open and close a line."""
+"""Keys of Line that open and close a line."""
 
 from __future__ import annotations
 
+import asyncio
+
 from textual import work
 
-from tui.bus.errors import LineError
+from tui.bus.errors import LineError, LinkSyntaxError
 from tui.drive.errors import DriveError
 
 from .choices import LINE_FORMS, LineChoice, fault_of_line, same_line
+from .line_form import ADDRESSES
 from .scanning import Scanning
 
 
@@ -20,7 +23,7 @@ class LineKeys(Scanning):
     def action_refresh_lines(self) -> None:
         """Look for serial ports and recent lines."""
         self.lines.look_for_lines()
-        self.lines.fill()
+        self.lines.fill(self.app.line_text)
 
     def line_of(self, choice: LineChoice) -> str:
         """The line of a choice, with the settings of the form where it is a port."""
@@ -58,12 +61,15 @@ class LineKeys(Scanning):
     @work(exclusive=True, group="line", exit_on_error=False)
     async def _open_in_its_place(self, text: str) -> None:
         self.forget_drives()
-        self.say(f"Opening {text}", "")
         if await self._opens(text):
             self.action_scan()
 
+    def tell_opening(self, text: str) -> None:
+        """What there is to see until the line is there."""
+        self.advise(f"Opening {text}", "It is given up after a few seconds.")
+
     def _is_good(self) -> bool:
-        """Whether the open line is one with drives, or one on which they are looked for."""
+        """Whether the open line is one with drives, or one on which they are searched for."""
         return self._connected() and (bool(self.found) or self.scanning)
 
     def is_on_open_line(self) -> bool:
@@ -79,7 +85,7 @@ class LineKeys(Scanning):
     def _tell_open(self) -> None:
         """Enter on the line that is open looks for its drives, unless that goes on."""
         if self.scanning:
-            self.say("This line is open; drives are looked for.", "Esc stops.")
+            self.app.tell("This line is open; drives are searched for. Esc ends that.")
         else:
             self.action_scan()
 
@@ -99,8 +105,14 @@ class LineKeys(Scanning):
     async def _opens(self, text: str) -> bool:
         """Whether the line could be opened; if not, why is shown."""
         self._opening = text
+        self.end_search()
+        self.tell_opening(text)
         try:
             await self.app.connect(text)
+        except LinkSyntaxError as error:
+            self.lines.forget_named()  # nothing that could be opened, now or later
+            self.fail(error)
+            return False
         except (LineError, DriveError) as error:
             self.fail(error)
             self._point_at(text)
@@ -109,9 +121,22 @@ class LineKeys(Scanning):
             self._opening = ""
         self._led = False
         self.action_refresh_lines()
-        self._point_at(self.app.line_text)
-        self.show_heads()
+        chosen = self.lines.chosen
+        if chosen is None or not chosen.path:  # a port stays the port that it is
+            self.lines.offer(self.app.line_text)
+        self.form.offer_addresses(await asyncio.to_thread(self._addresses_here))
+        self.look()
         return True
+
+    def _addresses_here(self) -> str:
+        """The addresses that were asked here last, or those that a simulated line has."""
+        from tui.session.connect.addresses import addresses_text
+        from tui.session.connect.line_key import line_key
+        from tui.session.paths import addresses_asked
+
+        opened = self.app.opened
+        known = addresses_text(opened.devices) if opened else ""
+        return addresses_asked(line_key(self.app.line_text)) or known or ADDRESSES
 
     def _point_at(self, text: str) -> None:
         """The cursor on a line; it stays where that is meant already, however it is spelled."""
@@ -127,5 +152,6 @@ class LineKeys(Scanning):
         self.forget_drives()
         await self.app.disconnect()
         self.say("The line is closed.", "Choose a line and press Enter.")
-        self.show_heads()
+        self.lines.fill("")
+        self.look()
         self.lines.focus()

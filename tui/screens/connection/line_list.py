@@ -1,4 +1,4 @@
-"""The list of lines on the Connection screen: serial ports, those used lately, simulated ones."""
+"""The list of lines on Line: serial ports, those used lately, simulated ones."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
 from tui.session.paths import recent_lines
+from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT
 from tui.widgets.plain import entry
 
@@ -20,7 +21,9 @@ class LineList(OptionList):
         super().__init__(id=id, compact=True)
         self._groups: list[Group] = []
         self._choices: dict[str, LineChoice] = {}
-        self._shown: tuple[int, list[Group]] | None = None
+        self._shown: tuple[int, list[Group], str] | None = None
+        self._here = ""
+        """The key of the line that is open."""
         self._named = ""
         """A line that somebody has named: it may be none of those used lately."""
 
@@ -46,17 +49,27 @@ class LineList(OptionList):
         """Put the cursor on a line that was named, so that Enter means no other."""
         self._named = text
         self.look_for_lines()
-        self.fill()
+        self._fill()
         fits = [id for id, choice in self._choices.items() if choice.text == text]
         if fits:
             self.highlighted = self.get_option_index(fits[0])
 
-    def fill(self) -> None:
-        """Show what was found; the cursor stays on its line."""
-        width = max(20, self.size.width - 1)
-        if self._shown == (width, self._groups):
+    def forget_named(self) -> None:
+        """What was named is no line."""
+        self._named = ""
+        self.look_for_lines()
+        self._fill()
+
+    def fill(self, opened: str) -> None:
+        """Show what was found, and which line is open; the cursor stays on its line."""
+        self._here = _key(opened) if opened else ""
+        self._fill()
+
+    def _fill(self) -> None:
+        width = max(12, self.size.width - 1)
+        if self._shown == (width, self._groups, self._here):
             return
-        self._shown = (width, self._groups)
+        self._shown = (width, self._groups, self._here)
         at = self.highlighted
         chosen = None if at is None else self.get_option_at_index(at).id
         self._choices.clear()
@@ -69,11 +82,19 @@ class LineList(OptionList):
 
     def _rows(self, group: Group, width: int) -> list[Option]:
         """A heading with its lines, or with what is said of none."""
-        found = [entry(Text(group.title, FAINT), disabled=True)]
+        found = [entry(Text(f" {group.title}", FAINT), disabled=True)]
         for choice in group.choices:
             key = f"{group.title} {choice.text}"
             self._choices[key] = choice
-            found.append(entry(choice_line(choice, width), id=key))
+            here = bool(self._here) and _key(choice.text) == self._here
+            found.append(entry(choice_line(choice, width, here=here), id=key))
         if not group.choices:
-            found.append(entry(Text(f"  {group.empty}", FAINT), disabled=True))
+            found.append(entry(Text(short(f"  {group.empty}", width), FAINT), disabled=True))
         return found
+
+
+def _key(text: str) -> str:
+    """Which line is meant; asked while one is open only: what a line is made of is there then."""
+    from tui.session.connect.line_key import line_key
+
+    return line_key(text)

@@ -1,4 +1,4 @@
-"""The search for drives on the open line, and the way from one of them to Monitor."""
+"""The search for drives on the open line, which goes on below other screens; opening one."""
 
 from __future__ import annotations
 
@@ -11,74 +11,85 @@ from textual import work
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
-from .state import ALARM_KIND, ConnectionView
+from .state import ALARM_KIND, LineView
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
 
 
-class Scanning(ConnectionView):
+class Scanning(LineView):
     """Asks each address; a drive that answers gets its profile and is looked after."""
 
     _led = False
     """Whether the cursor was led to the drives of the open line."""
 
-    def action_scan(self) -> None:
-        """Look for drives at the addresses given."""
-        opened = self.app.opened
-        if opened is None:
+    def action_scan(self) -> bool:
+        """Search for drives at the addresses given; those that were found stay.
+
+        False where there is no line, or where they are no addresses: then it says so.
+        """
+        if self.app.fleet is None:
             self.say("No line is open.", "Choose one and press Enter.", ALARM_KIND)
-            return
+            return False
         try:
-            wanted = list(opened.devices) or self.form.addresses()
+            wanted = self.form.addresses()
         except LineError as error:
-            self.fail(error)
-            return
+            self.say(str(error), "c changes the addresses, Enter searches them.", ALARM_KIND)
+            return False
         self._led = False
-        self.scan(wanted)
+        self.scan(wanted, self.form.addresses_text)
+        return True
 
     @work(exclusive=True, group="scan", exit_on_error=False)
-    async def scan(self, devices: Sequence[int]) -> None:
-        """Ask each address; drives appear as they answer."""
-        from tui.session.connect.identify import scan
+    async def scan(self, devices: Sequence[int], typed: str = "") -> None:
+        """Ask each address; drives appear as they answer, whatever screen is on top.
 
-        opened = self.app.opened
-        if opened is None:
+        `typed` is remembered as the addresses of this line.
+        """
+        from tui.session.connect.search import Search
+
+        fleet = self.app.fleet
+        if fleet is None:
             return
-        results: list[ScanResult] = []
-        for number, device in enumerate(devices, start=1):
-            self.say(f"Asking address {device}, {number} of {len(devices)}", "Esc stops.")
-            try:
-                await scan(opened.line, [device], results.append)
-            except LineError as error:
+        search = fleet.search = Search(devices)
+        self.tell_search()
+        self.look()
+        if typed:
+            await asyncio.to_thread(_remember, self.app.line_text, typed)
+        try:
+            await search.run(fleet.line, self._take)
+        except LineError as error:
+            if self.app.fleet is fleet:
                 self.fail(error)
-                return
-            while results:
-                await self._take(results.pop())
-        self._sum_up(devices)
+            return
+        self.sum_up(devices)
+        self.look()
 
-    def _sum_up(self, devices: Sequence[int]) -> None:
+    def tell_search(self) -> None:
+        """What there is to see while nobody has answered yet."""
+        self.advise("Drives are searched for.", "Each appears here as it answers; Esc ends it.")
+
+    def sum_up(self, devices: Sequence[int]) -> None:
+        """What a search that was done has come to."""
+        from tui.session.connect.addresses import addresses_text
+
         if not self.found:
-            span = f"{devices[0]} to {devices[-1]}" if len(devices) > 1 else f"{devices[0]}"
             self.say(
-                f"No drive answered at address {span}.",
-                "Check baud, format and wiring; try other addresses (Ask), then s.",
+                f"No drive answered at address {addresses_text(devices)}, asked twice.",
+                "Check baud, format and wiring; c changes the addresses, s searches again.",
                 ALARM_KIND,
             )
             return
-        self.say(
-            f"{len(self.found)} of {len(devices)} addresses answered.",
-            "Choose a drive and press Enter to watch it.",
-        )
+        there = len(self.search.answered) if self.search else len(self.found)
+        self.say(f"Search done: {there} of {len(devices)} addresses answered.", "")
 
     async def _take(self, result: ScanResult) -> None:
         """Keep a drive that answered, with its profile and state."""
         if result.identity is None:
-            self.say(result.error, "The address is taken; scan again with s.", ALARM_KIND)
+            self.say(f"{result.error} The address is taken; s searches again.", "", ALARM_KIND)
             return
         await self._equip(result.identity)
-        self.show_drives()
-        self.show_heads()
+        self.look()
         self._lead_to_drives()
 
     def _lead_to_drives(self) -> None:
@@ -89,8 +100,8 @@ class Scanning(ConnectionView):
 
     @property
     def scanning(self) -> bool:
-        """Whether drives are looked for now."""
-        return any(w.group == "scan" and w.is_running for w in self.workers)
+        """Whether drives are searched for now."""
+        return self.search is not None and self.search.goes_on
 
     async def _equip(self, identity: DriveIdentity) -> None:
         """Keep a drive that answered with its profile: the typed one, else the one that fits."""
@@ -134,21 +145,37 @@ class Scanning(ConnectionView):
             )
             self.form.ask_for_profile()
             return
-        self.action_stop_scan()
         self.app.show_monitor(drive.console)
 
     def action_stop_scan(self) -> None:
-        """Stop looking for drives."""
+        """End the search."""
         stopped = self.scanning
-        self.workers.cancel_group(self, "scan")
+        self.end_search()
         if stopped:
-            self.say("Stopped looking for drives.", "s looks again.")
+            self.say("The search is ended.", "s searches again.")
+            self.look()
+
+    def end_search(self) -> None:
+        """Nobody is asked any more."""
+        self.workers.cancel_group(self, "scan")
+
+    def action_addresses(self) -> None:
+        """Change the addresses to ask."""
+        self.form.ask_for_addresses()
 
     def forget_drives(self) -> None:
         """Let go of what was found, and stop looking."""
-        self.workers.cancel_group(self, "scan")
+        self.end_search()
         self.workers.cancel_group(self, "open")
         if self.app.fleet is not None:
             self.app.fleet.forget()
         self.warned.clear()
-        self.show_drives()
+        self.look()
+
+
+def _remember(line: str, addresses: str) -> None:
+    """Keep the addresses of a line for the next time it is opened."""
+    from tui.session.connect.line_key import line_key
+    from tui.session.paths import remember_addresses
+
+    remember_addresses(line_key(line), addresses)

@@ -1,13 +1,12 @@
-"""Connection: choose a line, find the drives on it."""
+"""Line: choose a line, find the drives on it, see what all of them do."""
 
 from __future__ import annotations
 
 from typing import ClassVar
 
-from textual.widgets import OptionList
+from textual.widgets import Input, OptionList
 
 from ..keys.table import CONNECTION, bindings
-from .found import about_drive, next_step
 from .line_keys import LineKeys
 
 
@@ -31,12 +30,16 @@ class ConnectionScreen(LineKeys):
         if event.option_list is self.lines:
             choice = self.lines.choice(event.option.id)
             self.form.offer_settings(bool(choice and choice.path))
-        elif self.drives.has_focus and (drive := self.found.get(int(event.option.id or 0))):
-            self.say(about_drive(drive), next_step(drive))
+        else:
+            self.show_about()
 
-    def on_input_submitted(self) -> None:
-        """Enter in a field."""
-        self.action_open_chosen()
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Enter in a field: other addresses are for the line that is open."""
+        if event.input.id != "addresses" or self.app.fleet is None:
+            self.action_open_chosen()
+            return
+        if self.action_scan():
+            self.lines.focus()
 
     def action_open_chosen(self) -> None:
         """What Enter does in the lists; a field hands Enter over to the list of lines."""

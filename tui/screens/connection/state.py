@@ -1,4 +1,4 @@
-"""What the Connection screen shows: lines, fields, drives, what happened, what to try next."""
+"""What Line shows: lines and fields at the left, the drives of the open line at the right."""
 
 from __future__ import annotations
 
@@ -14,18 +14,22 @@ from textual.events import Key, Resize
 from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
-from tui.widgets.drawing import cut, rule, wrapped
+from tui.drive.plain import plain
+from tui.widgets.drawing import pair, rule, wrapped
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN, STRONG
+from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN
 
 from ..base import PanelScreen
 from .drive_list import DriveList
-from .found import FoundState
+from .found import about_drive, next_step
 from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
+from .rows import rows_of
+from .wall import column_heads, columns_for, heading, in_order, wall_line
 
 if TYPE_CHECKING:
+    from tui.session.connect.search import Search
     from tui.session.fleet import FoundDrive
     from tui.session.monitor.line_watch import Look
 
@@ -33,41 +37,46 @@ log = logging.getLogger(__name__)
 
 ERROR_KIND, ALARM_KIND = "error", "alarm"
 STATES = 0.5
-"""Seconds between two looks at the states that the line watch has seen."""
+"""Seconds between two looks at the drives and at the line."""
 QUIET = 1.0
 """Seconds without a key after which drives go to their places in the list."""
-LOOK_AT_LINE = 1.0
-"""Seconds between two looks at the clock and the state of the line."""
-MESSAGE = 3
-"""Lines for what happened and what to try next."""
+ABOUT = 2
+"""Lines that tell all of the drive under the cursor."""
+ADVICE = 4
+"""Lines at most for what happened, and for what to do next, while no drive is found."""
+READ_ONLY = "Read-only: nothing is written to a drive, no stop either."
+SEARCH_LABEL = 11
+SEARCH_TEXT = 18
+"""Cells that tell how far a search is."""
 
 
-class ConnectionView(PanelScreen):
-    """Lines on the left, the chosen line and its drives on the right, what to do next below."""
+class LineView(PanelScreen):
+    """Lines on the left, drives on the right, below all that is said of the drive chosen."""
 
     def __init__(self) -> None:
         super().__init__()
         self.warned: set[int] = set()
         """Devices of which it was said that they trip when they are left alone."""
-        self._happened: tuple[str, str, str] = ("", "", "")
+        self._advice: tuple[str, str, str] = ("", "", "")
         self._looking: list[Timer] = []
-        self._away = False
+        self._away = self._was_lost = False
         self._key_at = -math.inf
         """When the last key came, in seconds of the clock."""
 
     def body(self) -> ComposeResult:
         """Two columns and the lines below."""
-        yield Lines(id="header")
         with Horizontal(id="body"):
             with Vertical(id="left"):
                 yield Lines(id="lines-title")
                 yield LineList(id="lines")
-            with Vertical(id="right"):
-                yield Lines(id="line-title")
                 yield LineForm()
+                yield Lines(id="search")
+            with Vertical(id="right"):
                 yield Lines(id="drives-title")
+                yield Lines(id="columns")
+                yield Lines(id="message")
                 yield DriveList(id="drives")
-        yield Lines(id="message")
+        yield Lines(id="about")
 
     @property
     def found(self) -> Mapping[int, FoundDrive]:
@@ -89,14 +98,16 @@ class ConnectionView(PanelScreen):
         """The fields."""
         return self.query_one(LineForm)
 
+    @property
+    def search(self) -> Search | None:
+        """The search on the open line, or the last one."""
+        return self.app.fleet.search if self.app.fleet else None
+
     def on_mount(self) -> None:
         """Show what there is."""
-        self.say("", "Choose a line and press Enter, or n to type one.")
+        self.advise("No line is open.", "Choose a line and press Enter, or n to type one.")
         self.lines.look_for_lines()
-        self._looking = [
-            self.set_interval(LOOK_AT_LINE, self.show_heads),
-            self.set_interval(STATES, self.look),
-        ]
+        self._looking = [self.set_interval(STATES, self.look)]
 
     def on_resize(self, event: Resize) -> None:
         """Titles have the width of their columns, which is known before they are drawn."""
@@ -113,7 +124,7 @@ class ConnectionView(PanelScreen):
             timer.pause()
 
     def on_screen_resume(self) -> None:
-        """States may have changed meanwhile."""
+        """Much may have changed meanwhile."""
         if self._away:
             self._away = False
             self.lines.look_for_lines()
@@ -122,18 +133,48 @@ class ConnectionView(PanelScreen):
         self.call_after_refresh(self._redraw)
 
     def _redraw(self) -> None:
-        self.show_heads()
-        self.lines.fill()
+        self.lines.fill(self.app.line_text)
         self.show_drives()
-        self._show_message()
+        self.show_heads()
+
+    def draw(self, width: int) -> None:
+        """The drives as they are now, the state of the line, how far the search is."""
+        super().draw(width)
+        self._follow_line()
+        self.show_drives()
+        self.show_heads()
+        if self.app.fleet is not None and not (self.search and self.search.goes_on):
+            self._warn(self.app.fleet.line_watch.looks)
+
+    # The drives
 
     def show_drives(self) -> None:
-        """The drives that answered, as they are now."""
-        found = self.found
-        looks = self.app.fleet.line_watch.looks if self.app.fleet else {}
-        connected = self._connected()
-        states = {d: _state(drive, looks.get(d), connected) for d, drive in found.items()}
-        self.drives.fill(found, states, sort=self._hands_are_quiet())
+        """The drives that answered, as they are now; no drawing below another screen."""
+        if not self.is_current:
+            return
+        fleet, width = self.app.fleet, max(20, self.drives.size.width - 1)
+        columns = columns_for(width)
+        now = self.app.clock.monotonic()
+        rows = rows_of(fleet, now, connected=self._connected()) if fleet else {}
+        faults = [fault.device for fault in fleet.alarms.active] if fleet else []
+        faults += [row.device for row in rows.values() if row.kind == "fault"]
+        order = in_order(rows, list(dict.fromkeys(faults)))
+        lines = {device: wall_line(row, columns) for device, row in rows.items()}
+        self.drives.fill(lines, order, sort=self._hands_are_quiet())
+        asked = len({*rows, *(self.search.devices if self.search else ())})
+        title = self.app.line_label or "No line"
+        width = self.query_one("#drives-title").size.width
+        self.put("drives-title", [heading(title, list(rows.values()), asked, width)])
+        self.put("columns", [column_heads(columns)] if rows else [])
+        self._show_advice()
+        self.show_about()
+
+    def show_about(self) -> None:
+        """All that the drive under the cursor says of itself, and what to do about one that not."""
+        drive = self.found.get(self.drives.chosen or 0)
+        parts = [about_drive(drive), next_step(drive)] if drive else []
+        lines = [Text(f" {plain(part)}", FAINT) for part in parts]
+        self.put("about", lines + [Text("")] * (ABOUT - len(lines)))
 
     def on_key(self, event: Key) -> None:
         """While keys come, nothing changes its place under them."""
@@ -146,44 +187,34 @@ class ConnectionView(PanelScreen):
     # The titles
 
     def show_heads(self) -> None:
-        """The titles, with the state of the line."""
+        """The title of the lines, and how far the search is."""
         if not self.is_current:
             return
-        width = self.size.width
-        right = f"{self.app.clock.time_of_day()} "
-        head = Text(no_wrap=True)
-        head.append(cut(" Drive Panel · Connection", width - len(right)), STRONG)
-        head.append(right, FAINT)
-        self.put("header", [head])
-        self._title("lines-title", "Lines")
-        opened = self.app.opened
-        state = opened.line.state if opened else None
-        words = state.status.value if state else "not open"
-        self._title("line-title", self.app.line_label or "No line", words)
-        count = f"{len(self.found)} found" if self.found else ""
-        self._title("drives-title", "Drives", count)
-        if state is not None:
-            from tui.bus.api import LineStatus
-
-            if state.status is LineStatus.LOST:
-                reason = f"LINE LOST: {state.reason}"
-                self.say(reason, "It is tried again by itself.", ALARM_KIND)
-
-    def _title(self, place: str, title: str, right: str = "") -> None:
-        width = self.query_one(f"#{place}").size.width
-        short = cut(title, min(len(title), max(4, width - 14)))
-        self.put(place, [rule(short, width, right)])
+        self.put("lines-title", [rule("Lines", self.query_one("#lines-title").size.width)])
+        far = self.search.text if self.search else "no line"
+        if self.app.fleet is not None and self.search is None:
+            far = "s begins"
+        width = self.query_one("#search").size.width
+        label = SEARCH_LABEL if width > SEARCH_LABEL + SEARCH_TEXT else len(" Search ")
+        self.put("search", [pair(" Search", far, PLAIN, label)])
 
     # What happened
 
     def say(self, happened: str, next_step: str, kind: str = "") -> None:
-        """What happened last, and what to try next."""
-        self._happened = (happened, next_step, kind)
-        self._show_message()
+        """What happened, among the events; what to do next, while there is no drive."""
+        self.app.events.add(kind or "told", happened)
+        self.advise(happened, next_step, kind)
+
+    def advise(self, now: str, next_step: str, kind: str = "") -> None:
+        """What there is instead of drives, and what to do next."""
+        self._advice = (now, next_step, kind)
+        self._show_advice()
 
     def fail(self, error: Exception) -> None:
-        """Show an error with what to try next."""
-        self.say(str(error), hint_for(error), ERROR_KIND)
+        """Tell an error with what to do next."""
+        hint = hint_for(error)
+        self.app.events.add(ERROR_KIND, f"{error} {hint}" if self.found else str(error))
+        self.advise(str(error), hint, ERROR_KIND)
 
     def on_worker_state_changed(self, event: Worker.StateChanged) -> None:
         """An error that nobody foresaw: all of it to the log, one line to the person."""
@@ -195,52 +226,50 @@ class ConnectionView(PanelScreen):
                 ERROR_KIND,
             )
 
-    def _show_message(self) -> None:
-        happened, next_step, kind = self._happened
-        width = max(10, self.size.width - 2)
+    def _show_advice(self) -> None:
+        if not self.is_current:
+            return
+        now, next_step, kind = self._advice
+        width = max(10, self.query_one("#right").size.width - 3)
         style = {ERROR_KIND: FAULT, ALARM_KIND: ALARM}.get(kind, PLAIN)
-        lines = [Text(f" {part}", style) for part in wrapped(happened, width, MESSAGE - 1)]
-        room = MESSAGE - len(lines)
-        lines += [Text(f" {part}", FAINT) for part in wrapped(next_step, width, room)]
-        self.put("message", lines + [Text("")] * (MESSAGE - len(lines)))
+        lines = [Text("")]
+        lines += [Text(f"  {part}", style) for part in wrapped(now, width, ADVICE)]
+        lines += [Text(f"  {part}", FAINT) for part in wrapped(next_step, width, ADVICE)]
+        if self.app.read_only:
+            lines += [
+                Text(""),
+                *(Text(f"  {part}", FAINT) for part in wrapped(READ_ONLY, width, 2)),
+            ]
+        self.put("message", [] if self.found else lines)
 
-    # The states of the drives
-
-    def draw(self, width: int) -> None:
-        """The states that the line watch of the line has seen."""
-        super().draw(width)
-        self.show_drives()
-        if self.app.fleet is not None:
-            self._warn(self.app.fleet.line_watch.looks)
+    def _follow_line(self) -> None:
+        """While no drive is found: a line that is lost, and that came back."""
+        opened = self.app.opened
+        if opened is None:
+            return
+        lost = opened.line.state.status.value == "lost"
+        if lost:
+            reason = f"LINE LOST: {opened.line.state.reason}"
+            self.advise(reason, "It is tried again by itself; then s searches.", ALARM_KIND)
+        elif self._was_lost and self._connected():
+            self.advise("The line is there again.", "s searches for drives.")
+        self._was_lost = lost or (self._was_lost and not self._connected())
 
     def _connected(self) -> bool:
         opened = self.app.opened
-        if opened is None:  # the first picture waits for no import
-            return False
-        from tui.bus.api import LineStatus
-
-        return opened.line.state.status is LineStatus.CONNECTED
+        return opened is not None and opened.line.state.status.value == "connected"
 
     def _warn(self, looks: Mapping[int, Look]) -> None:
         """Say once of a drive that it trips when it is left alone."""
+        assert self.app.fleet is not None
         watching = {d: look.timeout for d, look in looks.items() if look.timeout is not None}
-        if not watching or watching.keys() <= self.warned:
-            return
-        self.warned |= watching.keys()
-        which = ", ".join(f"{device} ({timeout:g} s)" for device, timeout in watching.items())
-        self.say(
-            f"Left alone so long, these drives act on their communication time-out: {which}.",
-            "The panel asks them on while the line is open. Enter on a drive watches it.",
-            ALARM_KIND,
+        new = {device: timeout for device, timeout in watching.items() if device not in self.warned}
+        if not new or self.app.fleet.line_watch.unread():
+            return  # all of them at once
+        self.warned |= new.keys()
+        which = ", ".join(f"{device} ({timeout:g} s)" for device, timeout in sorted(new.items()))
+        self.app.events.add(
+            "told",
+            f"They trip when left alone so long, and are asked on: {which}. It is their"
+            " communication time-out, while this line is open the panel keeps it from them.",
         )
-
-
-def _state(drive: FoundDrive, look: Look | None, connected: bool) -> FoundState:
-    """What a drive does, by the last look at it, and the kind of that."""
-    if not connected:
-        return "not known", "unknown"
-    if drive.session is None:
-        return "no profile", ""
-    if look is None:
-        return "asking", ""
-    return (look.state.headline, look.state.kind) if look.state else ("no answer", "unknown")

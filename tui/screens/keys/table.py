@@ -62,9 +62,10 @@ ACTIONS: tuple[Action, ...] = (
     *on(
         (CONNECTION,),
         ("open_chosen", "enter", "open", "Open the chosen line or drive."),
-        ("scan", "s", "search", "Look for drives at the addresses given."),
+        ("scan", "s", "search", "Search for drives at the addresses given; those found stay."),
+        ("addresses", "c", "addresses", "Change the addresses to search: 1-31, or 1,3,5-7."),
         ("type_line", "n", "another line", "Type a line: serial, TCP, RTU over TCP, sim."),
-        ("stop_scan", "escape", "", "Stop looking for drives."),
+        ("stop_scan", "escape", "", "End the search for drives."),
         ("refresh_lines", "", "", "Look for serial ports again."),
         ("disconnect", "", "", "Close the line; asks where a drive acts on that."),
     ),

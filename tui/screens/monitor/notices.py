@@ -40,5 +40,5 @@ def line_figures(view: View) -> Text:
     if view.snapshot is not None and view.snapshot.block:
         text.append(f" by {view.snapshot.block.lower()}", FAINT)
     counts = view.counters
-    failed = counts.timeouts - counts.empty + counts.checksum + counts.wrong
+    failed = counts.timeouts + counts.checksum + counts.wrong
     return text.append(f", {counts.requests} requests, {failed} failed ", FAINT)

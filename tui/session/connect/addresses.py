@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 from tui.bus.errors import LinkSyntaxError
 
 FIRST, LAST = 1, 247
@@ -19,3 +21,14 @@ def parse_addresses(text: str) -> list[int]:
             raise LinkSyntaxError(f"Slave addresses go from {FIRST} to {LAST}; {part!r} does not.")
         found += range(first, last + 1)
     return list(dict.fromkeys(found))
+
+
+def addresses_text(devices: Iterable[int]) -> str:
+    """Addresses as a person types them, neighbours as one span: `1-3,7`."""
+    spans: list[list[int]] = []
+    for device in sorted(set(devices)):
+        if spans and device == spans[-1][1] + 1:
+            spans[-1][1] = device
+        else:
+            spans.append([device, device])
+    return ",".join(f"{low}" if low == high else f"{low}-{high}" for low, high in spans)

@@ -3,23 +3,28 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import Protocol
 
-from tui.bus.api import IdentificationObjects, ModbusLine, Priority
-from tui.bus.errors import (
-    DeviceException,
-    LineClosed,
-    LineError,
-    LineLost,
-    NoAnswer,
-    RequestRefused,
-)
+from tui.bus.api import IdentificationObjects, Priority, Reply
+from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.bus.expectation import IDENTIFY
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
+
+
+class Askable(Protocol):
+    """As much of a line as it takes to ask who is there."""
+
+    async def identify(self, device: int, *, priority: Priority) -> IdentificationObjects:
+        """Function 43."""
+        ...
+
+    async def read(self, device: int, address: int, count: int = 1, *, priority: Priority) -> Reply:
+        """Function 3."""
+        ...
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,7 +59,7 @@ class ScanResult:
 
 
 async def identify_drive(
-    line: ModbusLine, device: int, *, priority: Priority = Priority.OPERATOR_READ
+    line: Askable, device: int, *, priority: Priority = Priority.OPERATOR_READ
 ) -> DriveIdentity:
     """Ask a drive who it is by function 43.
 
@@ -72,7 +77,7 @@ async def identify_drive(
     return await asyncio.to_thread(_identity, device, answer)
 
 
-async def _ask(line: ModbusLine, device: int, priority: Priority) -> IdentificationObjects:
+async def _ask(line: Askable, device: int, priority: Priority) -> IdentificationObjects:
     """Function 43; a person's question is asked again once, a lost reply is no absent drive."""
     try:
         return await line.identify(device, priority=priority)
@@ -104,7 +109,7 @@ def _identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
     )
 
 
-async def _nameless_families(line: ModbusLine, device: int, priority: Priority) -> tuple[str, ...]:
+async def _nameless_families(line: Askable, device: int, priority: Priority) -> tuple[str, ...]:
     """Profiles without function 43 whose status word the device lets be read.
 
     None of them where it only refuses: it is there. Raises NoAnswer where nothing answers.
@@ -139,23 +144,3 @@ def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
         if status is not None:
             found[status.address] = (*found.get(status.address, ()), profile.id)
     return found
-
-
-async def scan(
-    line: ModbusLine, devices: Iterable[int], found: Callable[[ScanResult], None]
-) -> None:
-    """Ask each address in turn, behind everything else; `found` hears of all not silent.
-
-    What is wrong with one address ends nothing. Raises LineClosed and LineLost.
-    """
-    for device in devices:
-        try:
-            identity = await identify_drive(line, device, priority=Priority.BACKGROUND)
-            result = ScanResult(device, identity)
-        except NoAnswer:
-            continue
-        except (LineClosed, LineLost):
-            raise
-        except LineError as fault:
-            result = ScanResult(device, None, str(fault))
-        found(result)

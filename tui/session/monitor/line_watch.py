@@ -22,6 +22,7 @@ from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.reader import Reader
 from ..reading import Reading
+from .load import unread_limit
 from .monitor import Monitor
 from .rates import monitoring_codes
 from .timeout import TOLD_SHARE, TimeoutWarning, TimeoutWatch, timeout_seconds
@@ -56,6 +57,8 @@ class Look:
     """The drive's communication time-out in seconds, if it is one that runs already."""
     readings: Mapping[str, Reading] = field(default_factory=dict)
     """What was read with the state: output frequency, its reference, motor current."""
+    before: Look | None = None
+    """The last look that brought something, where this one brought nothing."""
 
 
 @dataclass(slots=True)
@@ -149,6 +152,10 @@ class LineWatch:
     def states(self) -> dict[int, DriveState]:
         """The newest state of each drive that was seen at all, by device."""
         seen = {device: self._last_seen(kept)[0] for device, kept in self._kept.items()}
+        for device, look in self._looks.items():
+            if seen.get(device) is None and look.before is not None:
+                # a drive that is not heard for a moment is not one without its fault
+                seen[device] = look.before.state
         return {device: state for device, state in seen.items() if state is not None}
 
     def warnings(self) -> list[TimeoutWarning]:
@@ -233,7 +240,7 @@ class LineWatch:
         profile, device = kept.session.profile, kept.session.device
         state, error, readings = None, "", {}
         try:
-            codes = [*_state_codes(profile), *_glance_codes(profile)]
+            codes = [*_state_codes(profile), *_glance_codes(profile), *unread_limit(kept.session)]
             readings = await kept.reader.read(codes, priority=Priority.POLL)
             state = drive_state(profile, readings)
         except LineError as fault:
@@ -241,13 +248,17 @@ class LineWatch:
         watch = self._watch(kept)
         timeout = watch.timeout if watch and watch.active else None
         if self._kept.get(device) is kept:
-            look = Look(state, error, kept.session.clock.monotonic(), timeout, readings)
+            before = _last_that_brought(self._looks.get(device)) if error else None
+            look = Look(state, error, kept.session.clock.monotonic(), timeout, readings, before)
             self._looks = {**self._looks, device: look}
-        return self._glance_period if kept.learned is not None else GLANCE / 10
+        return self.glance_period if kept.learned is not None else GLANCE / 10
 
     @property
-    def _glance_period(self) -> float:
-        """Longer where many drives share the line, so that looks leave it to the others."""
+    def glance_period(self) -> float:
+        """Seconds between two looks at a drive.
+
+        Longer where many drives share the line, so that looks leave it to the others.
+        """
         return max(GLANCE, GLANCE_EACH * len(self._kept))
 
     async def _learn(self, kept: _Kept) -> None:
@@ -264,6 +275,10 @@ class LineWatch:
         reaction = next((one for one in rules.reactions if one.raw == raw), None)
         kept.watch = None if timeout is None else TimeoutWatch(timeout, reaction)
         kept.learned = kept.session.clock.monotonic()
+
+
+def _last_that_brought(look: Look | None) -> Look | None:
+    return look.before if look is not None and look.error else look
 
 
 def _any_word(profile: Profile) -> int:

@@ -1,0 +1,180 @@
+"""The search for drives: every address once, the silent ones once more, behind everything else."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterable
+from dataclasses import dataclass, field
+from typing import cast
+
+import pytest
+
+from tui.bus.api import IdentificationObjects, ModbusLine, Priority
+from tui.bus.errors import (
+    ChecksumFault,
+    LineBusy,
+    LineClosed,
+    LineError,
+    LineLost,
+    NoAnswer,
+    Superseded,
+    WrongReply,
+)
+from tui.bus.line import Timing
+from tui.bus.schedule.pace import Pace
+from tui.drive.profile import library
+from tui.session.connect.identify import ScanResult, identify_drive
+from tui.session.connect.open_line import demo_line, open_line
+from tui.session.connect.search import REST, Search
+from tui.session.drive import DriveSession
+
+
+@dataclass
+class Replies:
+    """A line on which these addresses answer, some only when they are asked once more."""
+
+    present: set[int]
+    late: set[int] = field(default_factory=set)
+    errors: dict[int, LineError] = field(default_factory=dict)
+    asked: list[tuple[int, Priority]] = field(default_factory=list)
+    pace: Pace = field(default_factory=Pace)
+    timing: Timing = field(default_factory=Timing)
+
+    async def identify(self, device: int, *, priority: Priority) -> IdentificationObjects:
+        self.asked.append((device, priority))
+        if device in self.errors:
+            raise self.errors[device]
+        if device in self.present or (device in self.late and priority is Priority.PATIENT):
+            return IdentificationObjects(1, {1: b"ATV71HU15M3"})
+        raise NoAnswer(device, 43, 0)
+
+    async def read(self, device: int, address: int, *_: object, **__: object) -> None:
+        raise NoAnswer(device, 3, address)
+
+
+async def searched(
+    search: Search, line: Replies | ModbusLine, texts: list[str] | None = None
+) -> list[ScanResult]:
+    """Who was found, and how far it was each time."""
+    results: list[ScanResult] = []
+
+    async def found(result: ScanResult) -> None:
+        results.append(result)
+        if texts is not None:
+            texts.append(search.text)
+
+    await search.run(cast("ModbusLine", line), found)
+    return results
+
+
+def devices(results: Iterable[ScanResult]) -> list[int]:
+    return [result.device for result in results]
+
+
+async def test_a_drive_missed_once_is_asked_again_with_more_patience() -> None:
+    line, texts = Replies({1, 4}, late={3}), list[str]()
+    search = Search(range(1, 6))
+    assert devices(await searched(search, line, texts)) == [1, 4, 3]
+    background = [device for device, priority in line.asked if priority is Priority.BACKGROUND]
+    patient = [device for device, priority in line.asked if priority is Priority.PATIENT]
+    assert (background, patient) == ([1, 2, 3, 4, 5], [2, 3, 5])
+    assert texts == ["1 of 5, 1 found", "4 of 5, 2 found", "2 of 3 again"]
+    assert (search.text, set(search.answered)) == ("done, 3 found", {1, 3, 4})
+
+
+async def test_who_polls_has_the_line_between_two_waits_in_vain() -> None:
+    rests: list[float] = []
+
+    async def rest(seconds: float) -> None:
+        rests.append(seconds)
+
+    line = Replies({1})
+    await searched(Search([1, 2], rest), line)
+    assert not rests, "nobody polls: nothing to wait for"
+    line.pace.claim("a monitor", 0.1, 0.5)
+    await searched(Search([1, 2], rest), line)
+    timing = line.timing
+    # function 43 and the status word of the families without it, in both rounds
+    assert rests == [REST * timing.scan_timeout] * 2 + [REST * timing.patient_timeout] * 2
+
+
+async def test_a_search_that_is_ended_says_so() -> None:
+    line, search = Replies({1}), Search([1, 2, 3])
+    at_the_first = asyncio.Event()
+
+    async def found(_: ScanResult) -> None:
+        at_the_first.set()
+        await asyncio.sleep(60)
+
+    running = asyncio.ensure_future(search.run(cast("ModbusLine", line), found))
+    await at_the_first.wait()
+    assert search.goes_on
+    running.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await running
+    assert (search.goes_on, search.text, search.at) == (False, "stopped, 1 found", None)
+
+
+async def test_a_search_finds_every_drive_and_no_other() -> None:
+    opened = demo_line({"atv21": 35.0, "atv71": 50.0, "powerdrive": 30.0})
+    try:
+        assert devices(await searched(Search(range(1, 6)), opened.line)) == [1, 2, 3]
+        # an empty address that was searched is no failure of the line
+        assert opened.line.counters.timeouts == 0
+        assert opened.line.counters.searched > 4
+    finally:
+        opened.close()
+
+
+async def test_a_second_search_finds_drives_without_function_43_and_those_behind_them() -> None:
+    opened = open_line("sim:powerdrive@1,varmeca@2,atv71@3")
+    try:
+        first = await searched(Search(range(1, 5)), opened.line)
+        for device, profile in enumerate(("powerdrive", "varmeca", "atv71"), start=1):
+            DriveSession(opened.line, device, library.load(profile))  # describes it to the line
+        again = await searched(Search(range(1, 5)), opened.line)
+        assert again == first
+        assert devices(again) == [1, 2, 3]
+        assert not any(result.error for result in again)
+        nobody = library.load("powerdrive")
+        DriveSession(opened.line, 4, nobody)
+        with pytest.raises(NoAnswer):  # what is known of it does not make it present
+            await identify_drive(opened.line, 4)
+    finally:
+        opened.close()
+
+
+@pytest.mark.parametrize(
+    "error",
+    [
+        LineBusy("Too many requests wait."),
+        WrongReply(2, 43, 0),
+        ChecksumFault(2, 43, 0),
+        Superseded(2, 0),
+    ],
+    ids=lambda error: type(error).__name__,
+)
+async def test_what_is_wrong_with_one_address_ends_no_search(error: LineError) -> None:
+    results = await searched(Search(range(1, 4)), Replies({1, 3}, errors={2: error}))
+    assert devices(results) == [1, 2, 3]
+    assert [result.error for result in results] == ["", str(error), ""]
+
+
+@pytest.mark.parametrize("error", [LineLost("gone"), LineClosed()])
+async def test_a_search_ends_with_its_line(error: LineError) -> None:
+    search = Search(range(1, 4))
+    with pytest.raises(type(error)):
+        await searched(search, Replies({1, 3}, errors={2: error}))
+    assert search.text == "stopped, 1 found"
+
+
+async def test_a_broken_profile_of_the_user_ends_no_search() -> None:
+    folder = library.user_folder()
+    folder.mkdir(parents=True)
+    (folder / "mine.toml").write_text('[profile]\nid = "mine"\n', encoding="utf-8")
+    opened = demo_line({"atv71": 50.0, "powerdrive": 30.0})
+    try:
+        results = await searched(Search([1, 2]), opened.line)
+    finally:
+        opened.close()
+    assert [r.identity.candidates[0] for r in results if r.identity] == ["atv71", "powerdrive"]

@@ -1,0 +1,201 @@
+"""Pictures of Line in every state: no line, ports, searching, a wall of drives, lost ones."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+from textual.pilot import Pilot
+
+from tui.bus.api import LineState
+from tui.bus.errors import PortBusy
+from tui.session.connect.identify import DriveIdentity
+from tui.session.connect.search import Search
+from tui.session.events import EventLog
+from tui.session.fleet import FoundDrive
+from tui.session.monitor.line_watch import Look
+
+from . import fakes
+
+Compare = Callable[..., bool]
+PORTS = [("/dev/ttyUSB0", "USB-RS485 adapter"), ("/dev/ttyS0", "")]
+MODELS = ("ATV312HU09M3", "ATV21H075M3X", "ATV71HU15M3")
+LONG_AGO = 1_600_000_031.0
+"""When all was said, time.time(): a message that warns stands on several lines while it is new."""
+OVERBRAKING, OVERLOAD = 18, 20
+"""Raw fault codes of the Altivar 71: ObF, OLF."""
+
+
+@pytest.fixture(autouse=True)
+def same_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same serial ports on every machine."""
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", lambda: list(PORTS))
+    monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
+
+
+def drive(device: int, looks: dict[int, Look], how: dict[str, int], age: float) -> FoundDrive:
+    """A drive of the wall, as a look that is so old saw it."""
+    name = f"PUMP {device:02}" if device % 3 == 0 else ""
+    identity = replace(fakes.ATV71, device=device, reference=MODELS[device % 3], name=name)
+    console = fakes.console_of(None, device=device)
+    console.session.image.confirm("INV", 75, fakes.NOW)
+    looks[device] = fakes.look_of(how, age=age)
+    return FoundDrive(identity, console)
+
+
+def wall(count: int, *, line: LineState = fakes.CONNECTED) -> fakes.StillFleet:
+    """So many drives; of more than 17 two are in fault, and the 17th tripped last."""
+    looks: dict[int, Look] = {}
+    drives = []
+    for device in range(1, count + 1):
+        how = {**fakes.RUNNING, "RFR": 190 + 37 * device % 300, "LCR": 15 + 11 * device % 66}
+        how = fakes.READY if device % 5 == 4 else how
+        if count > 17 and device in (3, 17):
+            how = {**fakes.FAULT, "LFT": OVERLOAD if device == 17 else OVERBRAKING}
+        drives.append(drive(device, looks, how, age=device * 7 % 4))
+    fleet = fakes.StillFleet(*drives, line_watch=fakes.FakeLineWatch(looks=looks), line=line)
+    fleet.search = Search(range(1, max(count, 10) + 1))
+    fleet.search.ended, fleet.search.answered = "done", frozenset(range(1, count + 1))
+    return fleet
+
+
+async def show(app: Any, pilot: Pilot[None], fleet: Any, line: LineState) -> None:
+    app.opened, app.fleet = fakes.opened(line), fleet
+    app.events = EventLog(lambda: LONG_AGO)
+    if fleet is not None:
+        fleet.alarms._wall = lambda: LONG_AGO
+        fleet.alarms._events = app.events
+        fleet.alarms.take({d: s for d, s in fleet.line_watch.states.items() if d != 17})
+        app._look_around()
+    screen = app.connection
+    screen.form.offer_addresses("1-31" if fleet and len(fleet.found) > 10 else "1-10")
+    screen._redraw()
+    if screen.found:
+        screen.drives.focus()
+    await pilot.pause()
+    screen.look()
+    app.draw_frame()
+    await pilot.pause()
+
+
+async def no_line(app: Any, pilot: Pilot[None]) -> None:
+    await pilot.pause()
+
+
+async def read_only(app: Any, pilot: Pilot[None]) -> None:
+    app.read_only = True
+    app.connection.look()
+    app.draw_frame()
+    await pilot.pause()
+
+
+async def opening(app: Any, pilot: Pilot[None]) -> None:
+    app.connection.tell_opening("serial:/dev/ttyUSB0,19200,8E1")
+    await pilot.pause()
+
+
+async def busy(app: Any, pilot: Pilot[None]) -> None:
+    app.events = EventLog(lambda: LONG_AGO)
+    app.connection.fail(PortBusy("/dev/ttyUSB0", "mbpoll (pid 4711)"))
+    app.connection.look()
+    app.draw_frame()
+    await pilot.pause()
+
+
+async def searching(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(0)
+    fleet.search = Search(range(1, 32))
+    fleet.search.asked = fleet.search.at = 7
+    app.connection.tell_search()
+    await show(app, pilot, fleet, fakes.CONNECTED)
+
+
+async def searching_found(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(3)
+    fleet.search = Search(range(1, 32))
+    fleet.search.asked = fleet.search.at = 7
+    fleet.search.answered = frozenset(range(1, 4))
+    await show(app, pilot, fleet, fakes.CONNECTED)
+
+
+async def nobody(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(0)
+    fleet.search = Search(range(1, 11))
+    fleet.search.ended = "done"
+    await show(app, pilot, fleet, fakes.CONNECTED)
+    app.connection.sum_up(range(1, 11))
+    app.draw_frame()
+    await pilot.pause()
+
+
+async def five(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(5)
+    unknown = DriveIdentity(8, "", "", "", "", None, ("powerdrive", "proxidrive", "varmeca"))
+    fleet.hold(FoundDrive(unknown))
+    await show(app, pilot, fleet, fakes.CONNECTED)
+
+
+async def thirty_one(app: Any, pilot: Pilot[None]) -> None:
+    await show(app, pilot, wall(31), fakes.CONNECTED)
+
+
+async def lost_drive(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(5)
+    looks: dict[int, Look] = fleet.line_watch.looks  # type: ignore[assignment]
+    for device, age in ((2, 47.0), (4, 5.0)):
+        before = replace(looks[device], time=fakes.NOW - age)
+        looks[device] = Look(None, "Device did not answer.", fakes.NOW - 1, None, {}, before)
+    await show(app, pilot, fleet, fakes.CONNECTED)
+
+
+async def line_lost(app: Any, pilot: Pilot[None]) -> None:
+    await show(app, pilot, wall(5, line=fakes.LOST), fakes.LOST)
+
+
+async def wrong_addresses(app: Any, pilot: Pilot[None]) -> None:
+    await show(app, pilot, wall(5), fakes.CONNECTED)
+    await pilot.press("c", "1", "-", "enter")
+    app.draw_frame()
+    await pilot.pause()
+
+
+async def dialog(_: Any, pilot: Pilot[None]) -> None:
+    await pilot.press("n")
+    await pilot.press(*"modbus", "enter")
+    await pilot.pause()
+
+
+STATES: dict[str, Callable[[Any, Pilot[None]], Awaitable[None]]] = {
+    "no-line": no_line,
+    "read-only": read_only,
+    "opening": opening,
+    "busy": busy,
+    "searching": searching,
+    "searching-found": searching_found,
+    "nobody": nobody,
+    "five": five,
+    "thirty-one": thirty_one,
+    "lost-drive": lost_drive,
+    "line-lost": line_lost,
+    "wrong-addresses": wrong_addresses,
+    "dialog": dialog,
+}
+USUAL = [(state, size) for state in STATES for size in ((80, 24), (120, 40))]
+OTHERS = [(state, size) for state in ("no-line", "thirty-one") for size in ((60, 20), (200, 60))]
+
+
+@pytest.mark.parametrize(
+    ("state", "size"),
+    [*USUAL, *OTHERS],
+    ids=lambda one: one if isinstance(one, str) else f"{one[0]}x{one[1]}",
+)
+def test_line(snap_compare: Compare, state: str, size: tuple[int, int]) -> None:
+    app = fakes.app_of()
+
+    async def shown(pilot: Pilot[None]) -> None:
+        await pilot.pause()
+        await STATES[state](app, pilot)
+
+    assert snap_compare(app, terminal_size=size, run_before=shown)

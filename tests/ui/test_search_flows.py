@@ -1,0 +1,117 @@
+"""The search for drives goes on below other screens; addresses are changed in place."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+from textual.pilot import Pilot
+from textual.widgets import Input
+
+from tui.app import DrivePanelApp
+from tui.screens.monitor.screen import MonitorScreen
+from tui.session.connect.open_line import OpenLine, open_line
+from tui.session.paths import recent_lines
+from tui.simulator import DriveSpec, Simulation
+
+from .test_flows import shown, until
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+@asynccontextmanager
+async def panel(*specs: DriveSpec) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]:
+    """The panel on a line of which it is not known who is there."""
+    simulation = Simulation(list(specs))
+    simulation.start()
+    text = f"serial:{simulation.serve_pty()},19200,8N1"
+
+    def opener(_: str, **how: object) -> OpenLine:
+        return open_line(text, **how)  # type: ignore[arg-type]
+
+    app = DrivePanelApp(open_line=opener, start=text)
+    try:
+        async with app.run_test(size=(80, 24)) as pilot:
+            yield app, pilot
+    finally:
+        simulation.stop()
+
+
+def said(app: DrivePanelApp) -> list[str]:
+    return [event.text for event in app.events.events]
+
+
+async def test_a_drive_is_opened_while_the_search_for_others_goes_on() -> None:
+    async with panel(DriveSpec("atv71", 1), DriveSpec("atv71", 4)) as (app, pilot):
+        await until(pilot, lambda: app.connection.drives.has_focus)
+        search = app.connection.search
+        assert search is not None
+        assert search.goes_on
+        await pilot.press("enter")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        assert search.goes_on
+        await until(pilot, lambda: set(app.connection.found) == {1, 4})
+        assert isinstance(app.screen, MonitorScreen)
+        assert "…" in shown(app, "tabs"), "the tab of Line says that it goes on"
+        # back there it is the same one, and Esc ends it
+        await pilot.press("1")
+        await until(pilot, lambda: app.connection.drives.option_count == 2)
+        assert app.connection.search is search
+        assert search.goes_on
+        assert f"Search {search.asked} of" in shown(app, "search")
+        await pilot.press("escape")
+        await until(pilot, lambda: "stopped, 2 found" in shown(app, "search"))
+        assert not search.goes_on
+
+
+async def test_a_search_ends_with_its_line_and_says_nothing_of_it() -> None:
+    async with panel(DriveSpec("atv71", 1)) as (app, pilot):
+        await until(pilot, lambda: bool(app.connection.found))
+        search = app.connection.search
+        assert search is not None
+        await app.disconnect()
+        await until(pilot, lambda: not search.goes_on)
+        assert "closed" not in " ".join(said(app))
+
+
+async def test_other_addresses_are_typed_in_place_and_remembered_for_the_line() -> None:
+    async with panel(DriveSpec("atv71", 1), DriveSpec("atv71", 14)) as (app, pilot):
+        await until(pilot, lambda: app.connection.drives.has_focus)
+        await pilot.press("c", "1", "3", "-", "enter")
+        field = app.connection.query_one("#addresses", Input)
+        await until(pilot, lambda: "is no list of addresses" in said(app)[-1])
+        assert field.has_focus
+        await pilot.press("1", "4", "enter")
+        await until(pilot, lambda: set(app.connection.found) == {1, 14})
+        await until(pilot, lambda: app.connection.drives.has_focus)
+        assert "2 of 3" in shown(app, "drives-title"), "those found stay, and count"
+        text = app.line_text
+        await app.disconnect()
+        app.connection.form.offer_addresses("1-10")
+        app.connection.start(text, None)
+        await until(pilot, lambda: app.opened is not None and field.value == "13-14")
+
+
+async def test_what_is_no_line_is_not_remembered() -> None:
+    app = DrivePanelApp(start="sim:")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: "names no profile" in shown(app, "message"))
+        choices = [choice.text for choice in app.connection.lines._choices.values()]
+        assert "sim:" not in choices
+        assert recent_lines() == []
+
+
+async def test_who_trips_when_left_alone_is_told_once() -> None:
+    async with panel(DriveSpec("atv21", 1), DriveSpec("atv71", 2)) as (app, pilot):
+        await until(pilot, lambda: app.connection.drives.option_count == 2)
+        await pilot.press("escape")
+        await until(pilot, lambda: any("1 (3 s)" in text for text in said(app)))
+        await pilot.press("s")
+        await until(pilot, lambda: app.connection.scanning)
+        await pilot.press("escape")
+        await until(pilot, lambda: not app.connection.scanning)
+        assert sum("left alone" in text for text in said(app)) == 1

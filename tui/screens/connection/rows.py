@@ -1,0 +1,108 @@
+"""What the table says of each drive, by its monitor or by the last look at it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from ..frame_source import said_state, said_value
+from .found import profile_text
+from .wall import WallRow
+
+if TYPE_CHECKING:
+    from tui.session.console import DriveConsole
+    from tui.session.drive_state import DriveState
+    from tui.session.fleet import Fleet, FoundDrive
+    from tui.session.monitor.line_watch import Look
+    from tui.session.reading import Reading
+
+TRUSTED_LOOKS = 3
+"""Looks after which a value is no longer taken for the present one."""
+
+Seen = tuple["DriveState | None", Mapping[str, "Reading"], float | None, bool, bool]
+"""State, readings, their age in s, whether that is too old, whether the last look was in vain."""
+
+
+def rows_of(fleet: Fleet, now: float, *, connected: bool) -> dict[int, WallRow]:
+    """A row for each drive that was found, by device; `now` on the line's clock."""
+    looks, period = fleet.line_watch.looks, fleet.line_watch.glance_period
+    return {
+        device: _row(drive, fleet, looks.get(device), (now, period), connected)
+        for device, drive in fleet.found.items()
+    }
+
+
+def _row(
+    drive: FoundDrive, fleet: Fleet, look: Look | None, at: tuple[float, float], connected: bool
+) -> WallRow:
+    identity, console = drive.identity, drive.console
+    who = identity.reference or profile_text(drive) or "unknown drive"
+    if console is None:
+        return WallRow(identity.device, who, identity.name, words="no profile")
+    state, readings, age, old, vain = _seen(console, look, *at)
+    report = fleet.stopper.reports.get(identity.device)
+    kind, words = said_state(console, state, report, at[0])
+    if kind not in ("stop", "stop failed"):
+        words = _called(state, words)
+    if not connected:
+        kind, words, old = "none", "not known", True
+    elif vain:
+        kind, words = "unknown", "lost" if old else "no answer"
+    return WallRow(
+        device=identity.device,
+        drive=who,
+        name=identity.name,
+        kind=kind or "none",
+        words=words,
+        frequency=_figure(console, readings, "output_frequency")[0],
+        current=_figure(console, readings, "motor_current")[0],
+        current_unit=_figure(console, readings, "motor_current")[1],
+        share=_share(console, readings),
+        age=None if age is None else float(int(age)),  # a row is drawn when it changes
+        old=old,
+    )
+
+
+def _seen(console: DriveConsole, look: Look | None, now: float, period: float) -> Seen:
+    """The newest of what was seen, and what was seen before where that brought nothing."""
+    snapshot = console.latest
+    if snapshot is not None and (look is None or snapshot.time >= look.time):
+        heard = max((reading.time for reading in snapshot.readings.values()), default=None)
+        age = None if heard is None else max(0.0, now - heard)
+        each = max(snapshot.period, 1.0) if console.monitor.running else period
+        longest = TRUSTED_LOOKS * each
+        old = age is None or age > longest
+        return snapshot.state, snapshot.readings, age, old, bool(snapshot.error)
+    if look is None:
+        return None, {}, None, False, False
+    brought = look.before if look.error else look
+    if brought is None:
+        return None, {}, None, True, True
+    age = max(0.0, now - brought.time)
+    return brought.state, brought.readings, age, age > TRUSTED_LOOKS * period, bool(look.error)
+
+
+def _called(state: DriveState | None, words: str) -> str:
+    """The words of the strip, quieter; a fault with as much of its name as there is room for."""
+    if state is not None and state.kind == "fault" and state.fault is not None:
+        return f"{state.fault.code} {state.fault.name.lower()}".strip()
+    return words.lower()
+
+
+def _figure(
+    console: DriveConsole, readings: Mapping[str, Reading], quantity: str
+) -> tuple[str, str]:
+    """Text and unit of a value; with a sign where nobody has confirmed it for this family."""
+    from tui.drive.profile.profile import is_verified  # the first picture needs none of it
+
+    text, unit = said_value(console, readings, quantity)
+    parameter = console.session.profile.quantity(quantity)  # type: ignore[arg-type]
+    sign = "?" if text and parameter is not None and not is_verified(parameter) else ""
+    return text + sign, unit
+
+
+def _share(console: DriveConsole, readings: Mapping[str, Reading]) -> float | None:
+    from tui.session.monitor.load import share_of_limit  # what a line is made of
+
+    parameter = console.session.profile.quantity("motor_current")
+    return share_of_limit(console.session, readings.get(parameter.code) if parameter else None)
