@@ -15,10 +15,13 @@ MOST_METHODS = 15
 """Public methods and properties of one class; those of its bases count there."""
 
 EXCEPTIONS: dict[str, tuple[int, str]] = {
-    "bus/api.py:ModbusLine": (18, "what all of a line is asked for; the fake has the same"),
+    "bus/api.py:ModbusLine": (19, "what all of a line is asked for; the fake has the same"),
     "bus/fake.py:FakeLine": (18, "the same as the line that it stands for"),
     "screens/app_port.py:Panel": (19, "all that screens ask of the app, most of it abstract"),
-    "screens/connection/state.py:ConnectionView": (16, "being cut"),
+    "screens/connection/state.py:LineView": (
+        19,
+        "three lists, a form and a search, each named for the keys",
+    ),
 }
 """By module, or module and class: the size that is let pass, and why."""
 

@@ -324,6 +324,9 @@ def test_while_it_is_read(snap_compare: Compare, size: tuple[int, int]) -> None:
         await pilot.pause()
         await pilot.press("tab", "tab")
         await pilot.pause()
+        cast("ParametersScreen", app.screen).look()
+        app.draw_frame()
+        await pilot.pause()
 
     assert snap_compare(app, terminal_size=size, run_before=show)
 

@@ -16,7 +16,7 @@ from tui.drive.values import type_range
 from tui.screens.frames.screen import frame_line
 from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, of_screen
 from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
-from tui.screens.monitor.assembly import monitor_parts, words_of
+from tui.screens.monitor.assembly import monitor_parts, watched_words
 from tui.screens.monitor.commands import order_keys
 from tui.screens.monitor.motor import motor_lines, other_values, value_cells
 from tui.screens.monitor.readouts import readout_lines
@@ -81,7 +81,7 @@ def test_every_part_keeps_its_size_and_its_width(profile_id: str, data: st.DataO
         replace(view_of(profile, data.draw(any_raws(profile)), age=age), word=word)
         for age in (0.1, 20.0)
     ]
-    first, second = (monitor_parts(view, room, words_of(profile)) for view in views)
+    first, second = (monitor_parts(view, room, watched_words(profile)) for view in views)
     for part, lines in first.items():
         assert len(lines) == len(second[part]), part
         for line in (*lines, *second[part]):
@@ -104,7 +104,7 @@ def test_the_parts_have_the_rows_that_they_are_given(
 ) -> None:
     profile = library.load(profile_id)
     room = room_of(profile, size)
-    parts = monitor_parts(view_of(profile, {}), room, words_of(profile))
+    parts = monitor_parts(view_of(profile, {}), room, watched_words(profile))
     assert len(parts["readouts"]) == room.top
     assert len(parts["state"]) == room.top
     assert len(parts["motor"]) == room.values

@@ -62,7 +62,7 @@ class WallRow:
 
 
 @dataclass(frozen=True, slots=True)
-class Columns:
+class WallColumns:
     """Widths of the columns; 0 for one that there is no room for."""
 
     drive: int
@@ -80,21 +80,21 @@ class Columns:
 DEVICE, HERTZ, CURRENT, AGE = 3, 6, 7, 5
 WIDEST_STATE = 30
 LAYOUTS = (
-    Columns(20, 20, 24, 24),
-    Columns(16, 18, 20, 14),
-    Columns(14, 12, 15, 10),
-    Columns(14, 12, 15, 0),
-    Columns(13, 0, 15, 0),
-    Columns(12, 0, 14, 0),
-    Columns(11, 0, 13, 0),
-    Columns(8, 0, 12, 0),
-    Columns(0, 0, 12, 0),
-    Columns(0, 0, 10, 0),
+    WallColumns(20, 20, 24, 24),
+    WallColumns(16, 18, 20, 14),
+    WallColumns(14, 12, 15, 10),
+    WallColumns(14, 12, 15, 0),
+    WallColumns(13, 0, 15, 0),
+    WallColumns(12, 0, 14, 0),
+    WallColumns(11, 0, 13, 0),
+    WallColumns(8, 0, 12, 0),
+    WallColumns(0, 0, 12, 0),
+    WallColumns(0, 0, 10, 0),
 )
 """The widest first: the load goes first, then the name."""
 
 
-def columns_for(width: int) -> Columns:
+def columns_for(width: int) -> WallColumns:
     """The columns that fit a width; what is left over widens the state, as faults have names."""
     found = next((one for one in LAYOUTS if one.taken <= width), LAYOUTS[-1])
     return replace(found, state=min(WIDEST_STATE, found.state + max(0, width - found.taken)))
@@ -124,7 +124,7 @@ def heading(label: str, rows: Sequence[WallRow], asked: int, width: int) -> Text
     return text.append(" ─", LINE)
 
 
-def column_heads(columns: Columns) -> Text:
+def column_heads(columns: WallColumns) -> Text:
     """The names of the columns above their places."""
     text = Text(f"{'Dev':>{DEVICE + 1}}", FAINT, no_wrap=True)
     for title, width in (("Drive", columns.drive), ("Name", columns.name)):
@@ -135,7 +135,7 @@ def column_heads(columns: Columns) -> Text:
 
 
 @lru_cache(maxsize=512)
-def wall_line(row: WallRow, columns: Columns) -> Text:
+def wall_line(row: WallRow, columns: WallColumns) -> Text:
     """A drive in one line: nothing in it moves when a value changes.
 
     The same row gives the same line again, which is not to be changed.

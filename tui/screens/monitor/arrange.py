@@ -24,7 +24,7 @@ WORD_ROWS = 16
 WORD_WIDTH = 29
 TREND_LEAST = 4
 """A heading or an empty line, two rows, the axis."""
-STATE_WIDTH = 22
+STATE_BLOCK_WIDTH = 22
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +52,7 @@ class Arrangement:
     @property
     def state_width(self) -> int:
         """Columns of the block at the right."""
-        return STATE_WIDTH if self.width < 100 else min(60, self.width // 3)
+        return STATE_BLOCK_WIDTH if self.width < 100 else min(60, self.width // 3)
 
 
 def arrange(width: int, height: int, count: int) -> Arrangement:

@@ -106,7 +106,7 @@ def _side_by_side(view: View, room: Arrangement, words: Sequence[Parameter]) -> 
     return parts
 
 
-def words_of(profile: Profile) -> list[Parameter]:
+def watched_words(profile: Profile) -> list[Parameter]:
     """Words with named bits: the monitoring set's, then inputs and outputs."""
     watched = [profile[v.parameter] for v in profile.data.monitoring.values]
     found = [parameter for parameter in watched if parameter.bits]
@@ -124,5 +124,5 @@ def codes_beside(profile: Profile) -> list[str]:
         parameter = profile.quantity(quantity)
         if parameter is not None:
             codes.append(parameter.code)
-    codes += [parameter.code for parameter in words_of(profile)]
+    codes += [parameter.code for parameter in watched_words(profile)]
     return list(dict.fromkeys(codes))

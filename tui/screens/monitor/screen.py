@@ -19,7 +19,7 @@ from tui.widgets.palette import STALE
 from ..frame import FrameView
 from ..keys.table import MONITOR, bindings, keys_line
 from .arrange import Arrangement, arrange
-from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, words_of
+from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words
 from .commands import order_keys
 from .motor import other_values
 from .run_keys import RunKeys
@@ -49,7 +49,7 @@ class MonitorScreen(RunKeys):
         profile = self.session.profile
         self._word: int | None = None if profile.quantity("output_frequency") else 0
         """The word with all its bits in the place of the trend, which is None."""
-        self._words = words_of(profile)
+        self._words = watched_words(profile)
         self._span = SPANS.index(USUAL_SPAN)
         self._timer: Timer | None = None
         self._still: Timer | None = None

@@ -94,11 +94,13 @@ def results_table(applied: Applied) -> Table:
         edit = result.edit
         values = f"{edit.old_text or NOT_AVAILABLE} → {edit.text}"
         word = OUTCOME_WORDS.get(result.outcome, "NOT WRITTEN")
-        code = Text(edit.code, STRONG, no_wrap=True)
-        became = Text(word, _style(result), no_wrap=True)
-        table.add_row(code, became, Text(plain(values), PLAIN))
+        table.add_row(
+            Text(edit.code, STRONG, no_wrap=True),
+            Text(word, _style(result), no_wrap=True),
+            Text(plain(values), PLAIN),
+        )
         if not result.done and result.outcome is not EditOutcome.WAITS:
-            table.add_row("", "", Text(plain(_reason(result)), FAINT))
+            table.add_row(Text(), Text(), Text(plain(_reason(result)), FAINT))
     return table
 
 
