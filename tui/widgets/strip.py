@@ -91,7 +91,8 @@ def strip_line(view: StripView, width: int) -> Text:
     """The first line: the open drive, or the line where none is open."""
     right = _right(view, narrow=width < NARROW)
     if view.drive is None:
-        left = Text(" Drive Panel", STRONG, no_wrap=True)
+        left = Text(no_wrap=True)
+        left.append(" Drive Panel", STRONG)
         left.append(f" · {plain(view.line)}" if view.line else "", FAINT)
         left.truncate(max(0, width - right.cell_len - 1), overflow="ellipsis")
     else:
