@@ -86,7 +86,7 @@ def head_line(width: int, other: str) -> Text:
     text.append(f"{'Value':>{columns.value}}   {'Staged':>{columns.staged}}", TITLE)
     text.append(f" {short(other, columns.other):>{columns.other}}   ", TITLE)
     if columns.range:
-        text.append(f"{'LimitsInForce':<{columns.range}}", TITLE)
+        text.append(f"{'Limits':<{columns.range}}", TITLE)
     if columns.address:
         text.append(f"{'Address':<{columns.address}}", TITLE)
     return text
