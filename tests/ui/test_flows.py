@@ -127,7 +127,7 @@ async def test_frames_help_and_palette_open_and_close() -> None:
         await to_monitor(app, pilot, 2)
         await pilot.press("7")
         await until(pilot, lambda: isinstance(app.screen, FramesScreen))
-        await until(pilot, lambda: "out" in shown(app, "frames"))
+        await until(pilot, lambda: "→" in shown(app, "frames"))
         await pilot.press("escape")
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         await pilot.press("question_mark")

@@ -61,12 +61,12 @@ async def test_keys_that_were_not_taken_are_told_of_without_markup() -> None:
         app.keys_not_taken(1)
         app.keys_not_taken(2, late=True)
         await pilot.pause()
-        assert [notice.message for notice in app._notifications] == [
+        assert [event.text for event in app.events.events] == [
             "3 keys came at once and were not taken.",
             "1 key did not come alone and was not taken.",
             "2 keys came too late and were not taken.",
         ]
-        assert not any(notice.markup for notice in app._notifications)
+        assert not app._notifications, "a toast is for a motor that does not stop"
 
 
 async def test_what_is_known_of_a_key_is_known_while_it_has_its_effect() -> None:
