@@ -39,7 +39,7 @@ async def to_blocks(made: Bench, sees: str = "ETA") -> None:
 
 async def message(made: Bench, *parts: str) -> None:
     def said() -> str:
-        return " ".join(shown(made.app, "message").split())
+        return " ".join(f"{shown(made.app, 'said')} {shown(made.app, 'detail')}".split())
 
     await until(made.pilot, lambda: all(part in said() for part in parts))
 
@@ -83,7 +83,7 @@ async def test_pick_move_write_and_verify() -> None:
         await made.pilot.press("w")
         await message(made, "Not armed")
         await made.pilot.press("a")
-        await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
+        await until(made.pilot, lambda: " ARMED" in shown(made.app, "strip"))
         await write(made)
         await message(made, "Written and read back: NMA2, NMA3", "Lost at power-off")
         assert [made.drive().raw(f"NMA{n}") for n in (1, 2, 3)] == [3201, 3204, 8604]

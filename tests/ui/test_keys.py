@@ -105,7 +105,7 @@ def test_letters_that_stop_at_once_are_stops() -> None:
 
 def test_where_a_key_has_a_meaning() -> None:
     assert elsewhere(CONNECTION, "r").startswith("r has a meaning on Monitor (2): Run forward")
-    assert elsewhere("frames", "V").startswith("V has a meaning on Scanner and blocks (4)")
+    assert elsewhere("frames", "V").startswith("V has a meaning on Scanner (4)")
     assert elsewhere("monitor", "asterisk", "*").startswith("* has a meaning on Parameters (3)")
     assert elsewhere("parameters", "less_than_sign", "<").startswith("< has a meaning on Monitor")
     assert elsewhere("monitor", "r") == ""
@@ -142,7 +142,7 @@ async def test_a_key_without_a_meaning_says_where_it_has_one_and_does_nothing(sc
 
 
 def notices(made: Bench) -> str:
-    return " ".join(one.message for one in made.app._notifications)
+    return " ".join(event.text for event in made.app.events.events)
 
 
 @pytest.mark.parametrize("key", "123567")
@@ -176,7 +176,7 @@ async def stage(made: Bench) -> None:
     await made.pilot.press("minus", "4")
     await until(made.pilot, lambda: "ACC" in shown(made.app, "second"))
     await made.pilot.press("delete")
-    await until(made.pilot, lambda: "proposed otherwise" in shown(made.app, "message"))
+    await until(made.pilot, lambda: "proposed otherwise" in shown(made.app, "detail"))
 
 
 @pytest.mark.parametrize("screen", EVERYWHERE)
@@ -210,7 +210,7 @@ async def back_to(made: Bench, screen: str) -> None:
     if app.place != "monitor":
         await made.pilot.press("2")
         await until(made.pilot, lambda: app.place == "monitor")
-    await until(made.pilot, lambda: bool(shown(app, "message")))
+    await until(made.pilot, lambda: bool(shown(app, "state")))
     if "Esc no" in " ".join(shown(app, "message").split()):
         await made.pilot.press("escape")
     console = app.chosen

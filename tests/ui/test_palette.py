@@ -164,7 +164,7 @@ async def test_an_action_of_this_screen_is_done() -> None:
         await typed(made, "line typ")
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, ConnectionScreen))
-        await until(made.pilot, lambda: "n on Connection" in told(made.app))
+        await until(made.pilot, lambda: "n on Line" in told(made.app))
         assert not isinstance(made.app.screen, Ask)
 
 

@@ -289,7 +289,7 @@ async def test_the_panel_follows_a_drive_to_its_new_address() -> None:
         await until(made.pilot, lambda: "Follow the drive?" in question(made))
         await made.pilot.press("y")
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
-        await until(made.pilot, lambda: "device 7" in shown(made.app, "header"))
+        await until(made.pilot, lambda: shown(made.app, "strip").startswith(" 7 "))
 
 
 def question(made: Bench) -> str:

@@ -314,14 +314,14 @@ async def write_block(made: Bench) -> None:
     await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))
     await until(made.pilot, lambda: "ETA" in shown(made.app, "first"))
     await made.pilot.press("delete", "a")
-    await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
+    await until(made.pilot, lambda: " ARMED" in shown(made.app, "strip"))
     await made.pilot.press("w")
 
 
 async def control_source(made: Bench) -> None:
     await made.pilot.press("6")
     await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))
-    await until(made.pilot, lambda: "reading" not in shown(made.app, "message"))
+    await until(made.pilot, lambda: "reading" not in shown(made.app, "now"))
     await made.pilot.press("down", "a", "enter")
 
 
@@ -361,7 +361,7 @@ async def outputs(made: Bench) -> None:
     await made.pilot.press("4")
     await until(made.pilot, lambda: "DEC" in shown(made.app, "second"))
     await made.pilot.press("a")
-    await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
+    await until(made.pilot, lambda: " ARMED" in shown(made.app, "strip"))
     await made.pilot.press("X", *"ACC=5.5", "enter")
 
 

@@ -133,7 +133,7 @@ async def blocks(made: Bench) -> None:
     await made.pilot.press("4", "a")
     await until(made.pilot, lambda: isinstance(made.app.screen, BlocksScreen))
     await until(made.pilot, lambda: "DEC" in shown(made.app, "second"))
-    await until(made.pilot, lambda: " ARMED" in shown(made.app, "title"))
+    await until(made.pilot, lambda: " ARMED" in shown(made.app, "strip"))
     for key in ("ctrl+s", "(words)", "X"):
         await dialog(made, key)
     await files(made)
@@ -220,9 +220,10 @@ async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written(
             assert as_shown in picture(app)
             app.screen.dismiss()
             await pilot.pause()
-            app.notify(text, title=text)
-            app.connection.notify(text)
-            await until(pilot, lambda text=as_shown: picture(app).count(text) >= 3)  # type: ignore[misc]
+            app.cry(text)
+            await until(pilot, lambda text=as_shown: text in picture(app))  # type: ignore[misc]
+            app.notify(text)
+            await until(pilot, lambda text=as_shown: text[:12] in shown(app, "said"))  # type: ignore[misc]
             app.clear_notifications()
             assert str(entry(Text(text)).prompt) == as_shown.replace("␇", "")
             app.connection.form.query_one("#profile", Input).value = f"<{text}>"

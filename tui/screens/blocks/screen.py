@@ -91,9 +91,19 @@ class BlocksScreen(BlockKeys):
         for place, one in zip(("first", "second"), block_editor.proposals.blocks, strict=False):
             at = self._at if one is block else None
             self.put(place, table_lines(block_editor, one, each, at, double=double))
-        detail = [rule("Slot", width), *slot_lines(block_editor, block, self._at, width)]
+        detail = [
+            rule("Slot", width, self._proposed()),
+            *slot_lines(block_editor, block, self._at, width),
+        ]
         self.put("detail", detail)
         self.put("cost", cost_lines(block_editor, block, block_editor.proposals.saving(), width))
+
+    def _proposed(self) -> str:
+        """How much is proposed and what becomes of it, or why nothing is read."""
+        count = self.block_editor.proposals.count
+        slots = "slot" if count == 1 else "slots"
+        told = f"{count} {slots} proposed otherwise: w writes, u drops" if count else ""
+        return told or self.block_editor.trouble
 
     def _show_neighbours(self, width: int) -> None:
         why = [Text(f" {t}") for t in wrapped(no_blocks(self.session.profile), width - 2, 3)]

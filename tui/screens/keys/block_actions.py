@@ -7,7 +7,7 @@ from .action import BLOCKS, on
 BLOCK_ACTIONS = on(
     (BLOCKS,),
     ("pick", "enter", "pick", "Choose what the slot stands for."),
-    ("best", "p", "propose", "Propose the slots that save most for what Monitor shows."),
+    ("best", "p", "best", "Propose the slots that save most for what Monitor shows."),
     ("write", "w", "write", "Write what is proposed; armed, motor at rest, asks."),
     ("other_table", "tab,left,right", "", "Inputs or outputs."),
     ("move(-1)", "up", "", "One slot up."),
@@ -16,7 +16,7 @@ BLOCK_ACTIONS = on(
     ("shift(-1)", "-", "", "Propose the slot's content one place up."),
     ("clear", "delete", "", "Propose the slot unused."),
     ("undo", "u,U", "", "Drop what is proposed."),
-    ("verify", "V", "verify", "Compare each slot with direct reads."),
+    ("verify", "V", "", "Compare each slot with direct reads."),
     ("factory", "", "", "Propose the factory assignment."),
     ("exchange", "X", "", "Write values through the output slots; armed, asks."),
     ("words", "", "", "Choose the four user words."),
