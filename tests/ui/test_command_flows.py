@@ -281,8 +281,9 @@ async def test_stop_works_on_every_screen(screen: str) -> None:
 
 
 def told(app: DrivePanelApp) -> str:
-    """What the notices say that are shown now."""
-    return " ".join(one.message for one in app._notifications)
+    """What was said, the toasts for a motor that does not stop included."""
+    said = [event.text for event in app.events.events]
+    return " ".join([*said, *(one.message for one in app._notifications)])
 
 
 async def test_space_stops_outside_texts_only() -> None:

@@ -74,7 +74,7 @@ async def test_choose_a_drive_watch_it_and_come_back() -> None:
     async with app.run_test(size=(80, 24)) as pilot:
         screen = await to_monitor(app, pilot, 2)
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
-        assert "ATV" in shown(app, "strip")
+        assert "MACHINE" in shown(app, "strip")
         await until(pilot, lambda: "Hz" in shown(app, "readouts"))
         assert screen.console.monitor.running
         await pilot.press("escape")
