@@ -207,6 +207,8 @@ async def back_to(made: Bench, screen: str) -> None:
         await made.pilot.press("escape")
     if app.place == screen != CONNECTION and console.session.arming.armed:
         return
+    if app.place == CONNECTION:
+        app.connection.drives.focus()  # in the field of addresses a figure is text
     if app.place != "monitor":
         await made.pilot.press("2")
         await until(made.pilot, lambda: app.place == "monitor")

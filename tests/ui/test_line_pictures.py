@@ -68,7 +68,7 @@ async def show(app: Any, pilot: Pilot[None], fleet: Any, line: LineState) -> Non
         fleet.alarms._wall = lambda: LONG_AGO
         fleet.alarms._events = app.events
         fleet.alarms.take({d: s for d, s in fleet.line_watch.states.items() if d != 17})
-        app._look_around()
+        app.look_around()
     screen = app.connection
     screen.form.offer_addresses("1-31" if fleet and len(fleet.found) > 10 else "1-10")
     screen._redraw()
