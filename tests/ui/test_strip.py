@@ -9,11 +9,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import cell_len
 
-from tui.screens.frame import TABS, Said, said_lines
+from tui.screens.frame import TABS, said_lines
 from tui.screens.keys.table import MONITOR, PLACES
 from tui.widgets.drawing import cut_at_word
 from tui.widgets.palette import ATTENTION, CURSOR, FAULT, FAULT_BLOCK
-from tui.widgets.strip import DriveNow, StripView, strip_line, tabs_line
+from tui.widgets.strip import DriveNow, Said, StripView, strip_line, tabs_line
 
 RUNS = DriveNow(
     device=2,

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from tui.session.events import EventLog
     from tui.session.fleet import Fleet
     from tui.terminal.stroke import Stroke
+    from tui.widgets.strip import FrameView
 
 
 class Panel(App[None]):
@@ -120,6 +121,10 @@ class Panel(App[None]):
     @abstractmethod
     def journal_trouble(self) -> str:
         """Why what is written is not on record; empty while it is."""
+
+    @abstractmethod
+    def frame_now(self) -> FrameView:
+        """What stands around every screen at this moment."""
 
     @abstractmethod
     def say_first(self, happened: str, next_step: str, kind: str = "") -> None:

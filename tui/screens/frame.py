@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
 from rich.style import Style
@@ -19,7 +18,7 @@ from tui.drive.plain import plain
 from tui.widgets.drawing import wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, PLAIN, STRONG
-from tui.widgets.strip import StripView, Tab, said_line, strip_line, tabs_line
+from tui.widgets.strip import FrameView, Said, Tab, said_line, strip_line, tabs_line
 
 from .keys.action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
 
@@ -52,28 +51,6 @@ WHOLE_FOR = 15.0
 WHOLE_LINES = 3
 
 
-@dataclass(frozen=True, slots=True)
-class Said:
-    """The message of now; `age` in seconds."""
-
-    when: str
-    text: str
-    kind: str
-    age: float
-    there: bool = False
-    """Whether it is about another drive than the one that is open."""
-
-
-@dataclass(frozen=True, slots=True)
-class FrameView:
-    """All that stands around a screen at one moment."""
-
-    strip: StripView
-    place: str
-    marks: dict[str, tuple[str, Style]]
-    said: Said | None
-
-
 class Framed(Screen[Any]):
     """A screen, or a dialog over one, with the frame around it; the app draws it now and then."""
 
@@ -88,24 +65,37 @@ class Framed(Screen[Any]):
     """
 
     def framed(self) -> Iterable[Widget]:
-        """The parts of the frame, above whatever else stands there."""
-        yield Lines(id="strip")
-        yield Lines(id="tabs")
-        yield Lines(id="said")
+        """The parts of the frame as it is now: the first picture has them, too."""
+        view, width = self.app.frame_now(), self.app.size.width
+        for place, lines in self._parts(view, width).items():
+            part = Lines(id=place)
+            part.show(lines)
+            yield part
+
+    def _parts(self, view: FrameView, width: int) -> dict[str, list[Text]]:
+        here = (self.TITLE or "").lower() or view.place
+        return {
+            "strip": [strip_line(view.strip, width)],
+            "tabs": [tabs_line(TABS, here, view.marks, width)],
+            "said": said_lines(view.said, width),
+        }
+
+    def on_screen_resume(self) -> None:
+        """What stood still below another screen is not shown for a moment."""
+        self.draw_frame(self.app.frame_now())
 
     def draw_frame(self, view: FrameView) -> None:
         """Put the frame as it is now; what stays the same is not drawn."""
         width = self.size.width
-        strip = self.query("#strip")
-        if not width or not strip:
+        if not width or not self.query("#strip"):
             return
-        self.query_one("#strip", Lines).show([strip_line(view.strip, width)])
-        self.query_one("#tabs", Lines).show([tabs_line(TABS, view.place, view.marks, width)])
-        place = self.query_one("#said", Lines)
-        lines = said_lines(view.said, width)
-        if place.styles.height is None or place.styles.height.value != len(lines):
-            place.styles.height = len(lines)
-        place.show(lines)
+        parts = self._parts(view, width)
+        said = self.query_one("#said", Lines)
+        height = len(parts["said"])
+        if said.styles.height is None or said.styles.height.value != height:
+            said.styles.height = height
+        for place, lines in parts.items():
+            self.query_one(f"#{place}", Lines).show(lines)
 
 
 def said_lines(said: Said | None, width: int) -> list[Text]:

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from rich.style import Style
 
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT
-from tui.widgets.strip import DriveNow, StripView
+from tui.widgets.strip import DriveNow, FrameView, Said, StripView
 
-from .frame import FrameView, Said, at
+from .frame import at
 from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
 
 if TYPE_CHECKING:

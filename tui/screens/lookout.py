@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from tui.widgets.strip import FrameView
+
 from .app_port import Panel
 from .frame import Framed
 from .frame_source import FrameSource
@@ -40,6 +42,10 @@ class Lookout(Panel):
             self.notify(trouble, severity="error")
         self._journal_trouble = trouble
         self.draw_frame()
+
+    def frame_now(self) -> FrameView:
+        """What stands around every screen at this moment."""
+        return self._frame.view()
 
     def draw_frame(self) -> None:
         """Put the frame of the screen on top as it is now."""

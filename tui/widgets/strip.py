@@ -214,3 +214,25 @@ def said_line(when: str, said: str, style: Style, hint: str, width: int) -> Text
         text.append(key, KEY)
         text.append(f" {does}", FAINT)
     return text
+
+
+@dataclass(frozen=True, slots=True)
+class Said:
+    """The message of now; `age` in seconds."""
+
+    when: str
+    text: str
+    kind: str
+    age: float
+    there: bool = False
+    """Whether it is about another drive than the one that is open."""
+
+
+@dataclass(frozen=True, slots=True)
+class FrameView:
+    """All that stands around a screen at one moment."""
+
+    strip: StripView
+    place: str
+    marks: dict[str, tuple[str, Style]]
+    said: Said | None

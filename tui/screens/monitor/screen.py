@@ -15,8 +15,8 @@ from tui.session.console import DriveConsole
 from tui.session.reading import Rating
 from tui.widgets.lines import Lines
 from tui.widgets.palette import STALE
+from tui.widgets.strip import FrameView
 
-from ..frame import FrameView
 from ..keys.table import MONITOR, bindings, keys_line
 from .arrange import Arrangement, arrange
 from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words
