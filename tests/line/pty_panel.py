@@ -218,7 +218,7 @@ class PtyPanel:
         self.settle(0.2)
         self.type("\r")
         wait_until(lambda: self.look() and RUN in self.log.writes[before:], "the run")
-        self.shows("RUNNING FORWARD")
+        self.shows("FORWARD")
 
     def stopped(self, since: int, seconds: float = 0.6) -> None:
         """Stops have gone out since so many writes, and nothing else; the drive is not armed."""
@@ -242,7 +242,7 @@ def panel_on_a_pty(*options: str, drives: int = 1) -> Iterator[PtyPanel]:
         line = [f"tcp:127.0.0.1:{log.port}", "-d", "1"]
         panel = PtyPanel(*_started([*line, *options]), simulation, log)
         try:
-            panel.shows("READY")
+            panel.shows("STANDBY")
             yield panel
         finally:
             with suppress(ProcessLookupError):

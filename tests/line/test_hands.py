@@ -70,9 +70,9 @@ def test_the_stop_keys_of_every_terminal_stop_and_do_nothing_else(
         assert "only drive" not in panel.text()
         if pieces[0] == "\x1b" and gap > ESCAPE_DELAY:
             # an ESC that nothing followed in time is the key Escape
-            panel.shows("Connection")
+            panel.shows("Lines ─")
             panel.type("2")
-        panel.shows("device 1", "a arm")
+        panel.shows("Output", "a arm")
 
 
 @pytest.mark.parametrize("dialect", DIALECTS)
@@ -84,7 +84,7 @@ def test_the_other_function_keys_of_every_terminal_type_nothing(
         for cut in range(len(sequence)):
             panel.type(*filter(None, (sequence[:cut], sequence[cut:])))
             panel.settle(APART + 0.02)
-    panel.shows("device 1", "a arm")
+    panel.shows("Output", "a arm")
     assert len(panel.log.writes) == before
     assert "only drive" not in panel.text()
     assert "at once" not in panel.text()
@@ -102,7 +102,7 @@ def test_keys_and_a_stop_in_one_write_stop_and_do_nothing_else(
     before = len(panel.log.writes)
     panel.type(typed)
     panel.stopped(before)
-    panel.shows("device 1", "a arm")
+    panel.shows("Output", "a arm")
 
 
 @pytest.mark.parametrize("armed", [True, False], ids=["armed", "unarmed"])
@@ -117,7 +117,7 @@ def test_a_paste_without_brackets_only_stops(panel: PtyPanel, armed: bool, seed:
     before = len(panel.log.writes)
     panel.type(b"".join(keys[:cut]), b"".join(keys[cut:]))
     panel.stopped(before, seconds=1.5)
-    panel.shows("device 1", "a arm")
+    panel.shows("Output", "a arm")
 
 
 def test_a_paste_with_brackets_does_nothing_at_all(panel: PtyPanel) -> None:
@@ -128,7 +128,7 @@ def test_a_paste_with_brackets_does_nothing_at_all(panel: PtyPanel) -> None:
         panel.type(text[:cut], text[cut:])
     panel.settle()
     assert panel.log.writes[before:] == []
-    panel.shows("device 1", "a arm")
+    panel.shows("Output", "a arm")
 
 
 def test_keys_that_were_not_taken_are_told_of(fresh_panel: PtyPanel) -> None:

@@ -98,7 +98,7 @@ class Far:
         self.terminal.wait_for("30  Hz")
         self.terminal.answer("Enter")
         wait_until(lambda: RUN in self.log.writes, "a run")
-        self.terminal.wait_for("RUNNING FORWARD")
+        self.terminal.wait_for("FORWARD")
 
     def type_while_hung(self, *keys: tuple[float, str]) -> None:
         """Press keys at these seconds of a time in which the link hangs."""
@@ -131,7 +131,7 @@ def far(ssh_host: SshHost, terminal_with: Start, tmp_path: Path, peer: Peer) -> 
         host = replace(ssh_host, login=(*login[:-1], "-o", alias, login[-1]))
         arguments = (f"tcp:127.0.0.1:{log.port}", "-d", "1")
         terminal = terminal_with(panel_over(host, tmp_path, *arguments))
-        terminal.wait_for("NOT ARMED", "READY")
+        terminal.wait_for("STANDBY")
         yield Far(terminal, link, log, simulation)
         with suppress(OSError, ValueError):
             os.kill(int((tmp_path / "pid").read_text()), 15)
@@ -144,7 +144,7 @@ def test_a_stop_behind_earlier_keys_is_the_last_word_on_a_running_motor(far: Far
     far.type_while_hung((1.0, key), (2.5, "Space"))
     wait_until(lambda: len(far.log.writes) > before, "the stop")
     wait_until(lambda: far.simulation.drive(1).motor.frequency == 0, "the motor stands")
-    far.terminal.wait_for("NOT ARMED")
+    far.terminal.wait_for("a arms")
     time.sleep(1.0)
     assert far.moved(before) == []
 
@@ -156,7 +156,7 @@ def test_a_line_that_is_open_when_the_link_hangs_runs_nothing_behind_a_stop(far:
     far.terminal.wait_for("RUN FORWARD at")
     far.type_while_hung((1.0, "3"), (1.3, "0"), (2.0, "Enter"), (4.0, "Space"))
     wait_until(lambda: bool(far.log.writes), "the stop")
-    far.terminal.wait_for("NOT ARMED")
+    far.terminal.wait_for("a arms")
     time.sleep(1.0)
     assert far.moved(0) == []
 

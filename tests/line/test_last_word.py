@@ -146,7 +146,7 @@ def leave_questions(panel: PtyPanel) -> None:
     for key in ("\x1b", "\x1b", "2"):
         panel.type(key)
         panel.settle(0.3)
-    panel.shows("device 1", "State")
+    panel.shows("Output", "Current")
 
 
 def test_keys_two_seconds_apart_on_a_link_that_hangs_are_a_message(panel: PtyPanel) -> None:

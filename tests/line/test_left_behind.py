@@ -36,7 +36,7 @@ def test_the_next_panel_knows_the_motor_and_takes_it_over(
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         assert made.speed > 2
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("RUNNING", "Runs since", "that program ended", "T takes over")
+        terminal.wait_for("FORWARD", "Runs since", "that program ended", "T takes over")
         # not armed: nothing is taken over
         terminal.press("T")
         terminal.wait_for("Not armed")
@@ -61,11 +61,11 @@ def test_a_motor_that_is_disowned_is_not_left_without_a_question(
         os.kill(made.pid, signal.SIGKILL)
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("RUNNING", "Runs since")
+        terminal.wait_for("FORWARD", "Runs since")
         terminal.press("q")
         terminal.wait_for("Leave the panel?", "30 s after the last")
         terminal.press("Escape")
-        terminal.wait_for("RUNNING")
+        terminal.wait_for("FORWARD")
         assert made.speed > 2
 
 
@@ -76,12 +76,12 @@ def test_a_stop_that_was_seen_withdraws_the_offer(
         os.kill(made.pid, signal.SIGKILL)
         wait_until(lambda: not runs(made.pid), "the panel is gone")
         terminal = again(second_terminal, made.line)
-        terminal.wait_for("RUNNING", "Runs since")
+        terminal.wait_for("FORWARD", "Runs since")
         terminal.press("Space")
         made.stopped()
         terminal.wait_for("STOPPED")
         made.simulation.drive(1).run(30.0)
-        terminal.wait_for("RUNNING")
+        terminal.wait_for("FORWARD")
         assert "Runs since" not in terminal.text()
 
 
@@ -111,7 +111,7 @@ def test_where_a_start_cannot_be_recorded_the_panel_asks(
         with open(os.path.join(state, "starts"), "w") as file:
             file.write("")
         terminal = terminal_with([*PANEL, line, "-d", "1"])
-        terminal.wait_for("NOT ARMED", "READY")
+        terminal.wait_for("STANDBY")
         terminal.press("a")
         wait_until(lambda: "ARMED" in terminal.text().replace("NOT ARMED", ""), "it is armed")
         terminal.press("r")

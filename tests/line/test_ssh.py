@@ -106,11 +106,11 @@ def test_the_demo_over_ssh(
     ssh_host: SshHost, terminal_with: Callable[[list[str]], Terminal], tmp_path: Path
 ) -> None:
     terminal = terminal_with(panel_over(ssh_host, tmp_path, "demo"))
-    terminal.wait_for("Connection", "5 found")
+    terminal.wait_for("Drive Panel", "5 of 5")
     choose(terminal, "ATV71")
     terminal.wait_for("Device 4:")
     terminal.press("Enter")
-    terminal.wait_for("ATV71", "device 4", "RUNNING", "Hz")
+    terminal.wait_for("4 MACHINE", "FORWARD", "Hz")
     terminal.press("q")
     terminal.wait_for("Leave the panel?", "Device 1, Altivar 21: left alone it acts 3 s after")
     terminal.answer("y")
@@ -127,7 +127,7 @@ def test_a_terminal_that_stands_still_does_not_stop_the_polling(
     ):
         line = f"tcp:127.0.0.1:{counter.port}"
         terminal = terminal_with(panel_over(ssh_host, tmp_path, line, "-d", "2"))
-        terminal.wait_for("RUNNING", "Hz")
+        terminal.wait_for("FORWARD", "Hz")
         panel = int((tmp_path / "pid").read_text())
         assert not _stands_still(panel)
         with stopped(terminal.client(), _parent(panel)):
@@ -143,7 +143,7 @@ def test_a_terminal_that_stands_still_does_not_stop_the_polling(
                 f"{MORE_REQUESTS} more requests while the terminal stands still",
             )
             assert _stands_still(panel)
-        terminal.wait_for("RUNNING", "Hz")
+        terminal.wait_for("FORWARD", "Hz")
         stale = terminal.text()
         wait_until(lambda: terminal.text() != stale, "the screen goes on after the stall")
         terminal.press("q")

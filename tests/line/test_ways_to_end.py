@@ -47,7 +47,7 @@ def running(start: Start, *options: str, family: str = "atv71") -> Iterator[Runn
     try:
         line = f"serial:{simulation.serve_pty()},19200,8N1"
         terminal = start([sys.executable, "-m", "tui", line, "-d", "1", *options])
-        terminal.wait_for("NOT ARMED", "READY")
+        terminal.wait_for("STANDBY")
         # one after another: keys that come at once are not taken
         terminal.press("a")
         wait_until(lambda: "ARMED" in terminal.text().replace("NOT ARMED", ""), "it is armed")
@@ -58,7 +58,7 @@ def running(start: Start, *options: str, family: str = "atv71") -> Iterator[Runn
         terminal.wait_for("30  Hz")
         terminal.answer("Enter")
         wait_until(lambda: simulation.drive(1).motor.frequency > 2, "the motor runs")
-        terminal.wait_for("RUNNING")
+        terminal.wait_for("FORWARD")
         yield Running(simulation, terminal, terminal.client(), line)
     finally:
         simulation.stop()
@@ -94,7 +94,7 @@ def test_leaving_it_running_is_a_choice(terminal_with: Start) -> None:
 def test_ctrl_c_in_the_terminal_ends_nothing(terminal_with: Start) -> None:
     with running(terminal_with) as made:
         made.terminal.press("C-c")
-        made.terminal.wait_for("RUNNING")
+        made.terminal.wait_for("FORWARD")
         assert made.speed > 2
         made.terminal.press("Space")
         made.stopped()
