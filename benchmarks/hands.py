@@ -73,7 +73,7 @@ def home(panel: PtyPanel) -> None:
     for key in (b"\x1b", b"\x1b", b"\x1b", b"2"):
         panel.type(key)
         settle(panel, 0.4)
-    panel.shows("Motor", "State")
+    panel.shows("Output", "Current")
 
 
 def arm(panel: PtyPanel) -> None:

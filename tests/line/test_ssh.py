@@ -108,7 +108,7 @@ def test_the_demo_over_ssh(
     terminal = terminal_with(panel_over(ssh_host, tmp_path, "demo"))
     terminal.wait_for("Drive Panel", "5 of 5")
     choose(terminal, "ATV71")
-    terminal.wait_for("Device 4:")
+    terminal.wait_for("4 · MACHINE")
     terminal.press("Enter")
     terminal.wait_for("4 MACHINE", "FORWARD", "Hz")
     terminal.press("q")
