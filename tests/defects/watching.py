@@ -85,8 +85,8 @@ DEFECTS = (
     Defect(
         "trend-repeats-the-last-value",
         "tui/session/monitor",
-        "if code and code in readings and not snapshot.error else None",
-        "if code and code in readings else None",
+        "if code and code in readings and not snapshot.error\n",
+        "if code and code in readings\n",
         "A trend shows a motor running evenly while nobody heard the drive.",
         ("tests/session/test_monitor_faults.py",),
     ),
