@@ -47,7 +47,7 @@ async def test_urgent_requests_overtake(open_line: OpenLine) -> None:
             waiting.append(asyncio.create_task(line.read(1, int(priority), priority=priority)))
             await asyncio.sleep(0.005)
         await asyncio.gather(*waiting)
-        assert [request[3] for request in peer.requests] == [50, 0, 1, 2, 3, 4, 5]
+        assert [request[3] for request in peer.requests] == [50, *range(len(Priority))]
 
 
 @pytest.mark.parametrize("function", [6, 16, 23])

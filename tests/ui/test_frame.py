@@ -128,3 +128,12 @@ async def test_a_question_leaves_the_strip_live() -> None:
         before = made.shown("strip")
         made.simulation.drive(1).run(10.0)
         await made.until(lambda: made.shown("strip") != before)
+
+
+@pytest.mark.parametrize("part", ["said", "strip", "state", "top"])
+async def test_a_screen_on_its_way_out_is_drawn_no_more(part: str) -> None:
+    """The parts of a screen go one by one, and the next look around may come between."""
+    async with panel() as made:
+        await made.app.screen.query(f"#{part}").remove()
+        made.app.look_around()
+        assert made.app.is_running

@@ -87,15 +87,17 @@ class Framed(Screen[Any]):
     def draw_frame(self, view: FrameView) -> None:
         """Put the frame as it is now; what stays the same is not drawn."""
         width = self.size.width
-        if not width or not self.query("#strip"):
+        if not width:
             return
         parts = self._parts(view, width)
-        said = self.query_one("#said", Lines)
-        height = len(parts["said"])
-        if said.styles.height is None or said.styles.height.value != height:
-            said.styles.height = height
+        # a screen that is being made, or goes, has none of them or some
+        for said in self.query("#said").results(Lines):
+            height = len(parts["said"])
+            if said.styles.height is None or said.styles.height.value != height:
+                said.styles.height = height
         for place, lines in parts.items():
-            self.query_one(f"#{place}", Lines).show(lines)
+            for part in self.query(f"#{place}").results(Lines):
+                part.show(lines)
 
 
 def said_lines(said: Said | None, width: int) -> list[Text]:

@@ -34,6 +34,10 @@ STILL_TOLD = 5.0
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
 
 
+PLACED = frozenset({"top", "motor", "trend", "words", "state", "said"})
+"""Parts whose rows depend on the room there is."""
+
+
 class MonitorScreen(RunKeys):
     """One drive, watched live; the screen only looks at what the line's worker brought."""
 
@@ -121,13 +125,15 @@ class MonitorScreen(RunKeys):
 
     def _said_rows(self) -> int:
         """Rows of the message."""
-        height = self.query_one("#said").styles.height
+        said = self.query("#said")
+        height = said.first().styles.height if said else None
         return int(height.value) if height is not None else 1
 
     def _place(self, room: Arrangement) -> None:
         """Give each part its rows; only where they change is anything laid out anew."""
-        if len(self.query(".word")) < WORDS_MOST:
-            return  # not made yet
+        there = {part.id for part in self.query("Lines, Horizontal, Vertical")}
+        if not there >= PLACED or len(self.query(".word")) < WORDS_MOST:
+            return  # not made yet, or on its way out
         bottom = max(room.bottom, self._run_rows)
         placed = (room, bottom, self._said_rows())
         if placed == self._placed:

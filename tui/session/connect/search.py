@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 
 from tui.bus.api import IdentificationObjects, ModbusLine, Priority, Reply
 from tui.bus.errors import LineClosed, LineError, LineLost, NoAnswer
 
+from ..clock import REAL_CLOCK
 from .identify import ScanResult, identify_drive
 
 REST = 2.0
@@ -22,7 +22,7 @@ class Search:
     Any loop may look at how far it is.
     """
 
-    def __init__(self, devices: Iterable[int], rests: Rests = asyncio.sleep) -> None:
+    def __init__(self, devices: Iterable[int], rests: Rests = REAL_CLOCK.sleep) -> None:
         self.devices = tuple(devices)
         self.of = len(self.devices)
         """How many addresses are asked in this round."""
