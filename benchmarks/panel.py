@@ -174,7 +174,7 @@ def faster(terminal: Terminal) -> None:
     """Poll at 10 Hz instead of 2 Hz."""
     for rate in ("5.0", "10.0"):  # one after another: keys that come at once are not taken
         terminal.press("\x10")
-        terminal.see("Search for commands")
+        terminal.see("What shall be done")
         terminal.press("Poll twice")
         terminal.see("Poll twice as fast")
         terminal.run(CHOSEN)
