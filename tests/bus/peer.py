@@ -6,6 +6,7 @@ import os
 import pty
 import select
 import socket
+import tempfile
 import threading
 import time
 import tty
@@ -164,18 +165,23 @@ class Peer:
 
 
 class PtyPeer(Peer):
-    """A peer on a pseudo-terminal; with `link` reached by a symbolic link that can be moved."""
+    """A peer on a pseudo-terminal, reached by a symbolic link that goes with it.
+
+    The number of a pseudo-terminal is given away again as soon as it is closed: a line that looks
+    for its lost port by number would open that of another test. `link` can be moved to a next peer.
+    """
 
     def __init__(self, script: Script, *, echo: bool = False, link: Path | None = None) -> None:
         super().__init__(script, echo=echo)
         self._master, self._slave = pty.openpty()
         tty.setraw(self._slave)
-        self.path = os.ttyname(self._slave)
         self._lock = threading.Lock()
-        if link is not None:
-            link.unlink(missing_ok=True)
-            link.symlink_to(self.path)
-            self.path = str(link)
+        self._folder = None if link else tempfile.mkdtemp(prefix="peer-")
+        self._link = link or Path(f"{self._folder}/line")
+        self._link.unlink(missing_ok=True)
+        self._device = Path(os.ttyname(self._slave))
+        self._link.symlink_to(self._device)
+        self.path = str(self._link)
 
     def send(self, data: bytes) -> None:
         """Say something that nobody asked for."""
@@ -205,6 +211,10 @@ class PtyPeer(Peer):
                     # the thread leaves the descriptor first, so that its number is not used anew
                     self._stop.set()
                     self._thread.join()
+                if self._link.is_symlink() and self._link.readlink() == self._device:
+                    self._link.unlink()
+                if self._folder is not None:
+                    os.rmdir(self._folder)
                 os.close(self._slave)
                 os.close(self._master)
                 self._master = self._slave = -1
