@@ -103,7 +103,7 @@ async def test_a_lost_line_is_shown_and_comes_back() -> None:
         assert app.opened.simulation is not None
         app.opened.simulation.unplug()
         await until(pilot, lambda: "LINE LOST" in shown(app, "said"))
-        assert "NOT KNOWN NOW" in shown(app, "state")
+        await until(pilot, lambda: "NOT KNOWN NOW" in shown(app, "state"))
         app.opened.simulation.replug()
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
 
