@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any
 
 import pytest
+from textual.events import Key
 from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
@@ -194,3 +195,13 @@ async def test_closing_the_line_of_a_drive_that_will_trip_asks_first() -> None:
             await pilot.press(answer)
             await until(pilot, lambda: app.screen is app.connection)
         await until(pilot, lambda: app.opened is None)
+
+
+async def test_a_panel_that_ends_meets_no_error_without_its_screens() -> None:
+    """Textual takes the screens away first; a look around or a key just then ended it badly."""
+    app = DrivePanelApp(open_line=lambda text, **_: fakes.opened())
+    async with app.run_test(size=(80, 24)):
+        pass
+    assert app.screen_stack == []
+    app.look_around()
+    await app.on_event(Key("a", "a"))

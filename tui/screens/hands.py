@@ -6,7 +6,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TYPE_CHECKING
 
-from textual.events import Event, Key, Paste
+from textual.events import Event, InputEvent, Key, Paste
 
 from tui.bus.errors import LineClosed
 from tui.terminal.admission import Admission
@@ -145,6 +145,8 @@ class Hands(Panel):
 
     async def on_event(self, event: Event) -> None:
         """A key keeps an armed drive armed; the next one waits for it."""
+        if isinstance(event, InputEvent | Paste) and not self.is_running:
+            return  # the panel ends: there is no screen any more that could take it
         if isinstance(event, Key | Paste) and not event.is_forwarded:
             if not self._typed.admit(event):
                 return

@@ -33,6 +33,8 @@ class Lookout(Panel):
 
     def look_around(self) -> None:
         """What must be seen on every screen: the frame, a new fault, a stop that failed."""
+        if not self.is_running:
+            return  # the panel ends: its screens are gone before its timers
         if self.fleet is not None:
             if self.fleet.alarms.take(self.fleet.line_watch.states) and self.bell_rings:
                 self.bell()
