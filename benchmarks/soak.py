@@ -34,7 +34,7 @@ from benchmarks import soak_peers
 from benchmarks.soak_drives import FAMILIES, Prepared, Values, prepare
 from benchmarks.wire import share
 from tui.bus.errors import LineError
-from tui.bus.line import Line
+from tui.bus.line import Line, Timing
 from tui.bus.link import parse_link
 from tui.drive.profile.library import load
 from tui.session.drive import DriveSession
@@ -88,7 +88,7 @@ class Watched:
     def __init__(self, served: soak_peers.Served, values: Values, seed: int) -> None:
         self.served = served
         self.tally = Tally()
-        self.line = Line(parse_link(served.text))
+        self.line = Line(parse_link(served.text), timing=Timing(wire_time=True))
         self._values = values
         self._owners = {raw: (d, code) for d, own in values.items() for code, raw in own.items()}
         self._began = time.monotonic()

@@ -128,7 +128,7 @@ def right(device: int, address: int, words: int) -> list[int]:
 async def ours(path: str, job: Job) -> Tally:
     """Our line: an retrying for each drive, some requests given up on their way, some writes."""
     link = SerialLink(path, 19200 if job.real else 115200, "8N1")
-    line = Line(link, timing=Timing() if job.real else FAST)
+    line = Line(link, timing=Timing(wire_time=True) if job.real else FAST)
     tally = Tally(job.contestant, time_out=line.timing.first_timeout)
     for device in DEVICES:
         line.describe(device, WIDE)

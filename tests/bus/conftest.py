@@ -50,3 +50,8 @@ def open_line() -> Iterator[OpenLine]:
     yield opened
     for line in lines:
         line.close()
+
+
+def sent(line: Line) -> list[float]:
+    """When each request went out, by the line itself: a busy machine lets a peer see them late."""
+    return [frame.time for frame in line.trace if frame.direction == "out"]

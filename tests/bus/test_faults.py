@@ -5,6 +5,8 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 from pymodbus.pdu.pdu import ModbusPDU
@@ -18,9 +20,10 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.bus.line import Timing
+from tui.bus.link import SerialLink, silence
 from tui.wire.frames import frame
 
-from .conftest import BRISK, PATIENT, OpenLine
+from .conftest import BRISK, PATIENT, OpenLine, sent
 from .peer import PtyPeer, Script, Step, eventually, honest, reply, silent
 from .plain import outcome, plain_serial
 
@@ -320,7 +323,7 @@ async def test_operator_read_is_repeated_after_silence(open_line: OpenLine) -> N
         assert (await line.read(1, 6, priority=OPERATOR)).words == (6,)
         assert len(peer.requests) == 3
         # the same read goes out again only when the lost reply cannot come any more
-        assert peer.arrivals[2] - peer.arrivals[1] >= 0.4
+        assert sent(line)[2] - sent(line)[1] >= 0.4
 
 
 async def test_plain_client_sends_a_write_four_times() -> None:
@@ -353,8 +356,6 @@ async def test_plain_client_keeps_no_silence() -> None:
 
 
 async def test_silence_is_kept(open_line: OpenLine) -> None:
-    from tui.bus.link import SerialLink, silence
-
     with PtyPeer(honest) as peer:
         link = SerialLink(peer.path, 2400)
         line = open_line(link)
@@ -369,13 +370,28 @@ def _pauses(peer: PtyPeer) -> list[float]:
     return [came - left for left, came in zip(peer.departures, following, strict=False)]
 
 
+@pytest.mark.parametrize(("wire_time", "taken"), [(True, 5), (None, 77)])
+async def test_a_reply_that_began_before_its_request_was_over_is_anothers(
+    open_line: OpenLine, wire_time: bool | None, taken: int
+) -> None:
+    """Where bytes take their time; a pseudo-terminal without a line's times may be that quick."""
+
+    def at_last_one_of_another(request: bytes, count: int) -> Sequence[Step]:
+        return [frame(1, b"\x03\x02\x00\x4d")] * (count == 9) + [0.1, reply(request)]
+
+    with PtyPeer(at_last_one_of_another) as peer:
+        line = open_line(SerialLink(peer.path, 2400), replace(PATIENT, wire_time=wire_time))
+        answers = [(await line.read(1, 5)).words for _ in range(10)]
+        assert answers == [(5,)] * 9 + [(taken,)]
+
+
 async def test_plain_client_runs_broadcasts_into_each_other() -> None:
     with PtyPeer(honest) as peer:
         async with plain_serial(peer.path) as client:
-            for value in (1, 2):
+            for value in range(10):
                 await client.write_register(5, value, device_id=0, no_response_expected=True)
-            await asyncio.to_thread(peer.await_requests, 2)
-        assert peer.arrivals[1] - peer.arrivals[0] < 0.1
+            await asyncio.to_thread(peer.await_requests, 10)
+        assert min(b - a for a, b in pairwise(peer.arrivals)) < 0.1
 
 
 async def test_broadcasts_are_kept_apart(open_line: OpenLine) -> None:
@@ -386,8 +402,8 @@ async def test_broadcasts_are_kept_apart(open_line: OpenLine) -> None:
         await asyncio.gather(*(line.broadcast(5, [value], limits=WIDE) for value in (1, 2)))
         assert (await line.read(1, 5)).words == (5,)
         assert [len(burst) for burst in peer.bursts] == [8, 8, 8]
-        assert peer.arrivals[1] - peer.arrivals[0] >= PATIENT.turnaround_delay
-        assert peer.arrivals[2] - peer.arrivals[1] >= PATIENT.turnaround_delay
+        first, second, third = sent(line)
+        assert min(second - first, third - second) >= PATIENT.turnaround_delay
         assert line.counters.timeouts == 0
 
 

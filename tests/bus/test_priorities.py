@@ -12,7 +12,7 @@ from tui.bus.api import Priority
 from tui.bus.errors import LineBusy, NoAnswer, RequestRefused
 from tui.bus.line import Timing
 
-from .conftest import OpenLine
+from .conftest import OpenLine, sent
 from .peer import PtyPeer, Step, honest, reply, silent
 from .plain import outcome, plain_serial
 
@@ -174,7 +174,8 @@ async def test_polls_go_on_by_themselves_after_the_back_off(open_line: OpenLine)
             assert state.failures == failures
             assert state.next_try is not None
             await asyncio.sleep(max(0.0, state.next_try - time.monotonic()) + 0.01)
-        assert peer.arrivals[1] - peer.arrivals[0] >= 0.3
+        first, second = sent(line)
+        assert second - first >= 0.3
         peer.script = honest
         assert (await line.read(DEAD, 2)).words == (2,)
 

@@ -130,5 +130,8 @@ class Timing:
     """Least silence that ends a damaged reply: adapters hand over bytes in lumps (FTDI 16 ms)."""
     frame_gap_tcp: float = 0.08
     """The same for RTU over TCP."""
+    wire_time: bool | None = None
+    """Whether bytes take the time of their baud, so that a reply which began before its request
+    was over is another's. None: on every serial port that is no pseudo-terminal."""
     queue_length: int = 256
     trace_length: int = 1000

@@ -37,12 +37,15 @@ class RtuMaster:
         link: Link,
         around: LineContext,
         ended: Callable[[], None],
+        *,
+        wire_time: bool,
     ) -> None:
         self.echo: bool | None = None
         self.failure: LineLost | None = None
         self._transport = transport
         self._around = around
         self._ended = ended
+        self._wire_time = wire_time
         self._character = character_time(link)
         self._silence = silence(link)
         timing = around.timing
@@ -86,9 +89,9 @@ class RtuMaster:
     def _came_too_early(self, result: ExchangeResult, time: float) -> bool:
         """Whether a reply began before its request was over: then it is that of another one.
 
-        Only where the line is known to keep the time of its baud: a pseudo-terminal does not.
+        Only where the line is known to keep the time of its baud.
         """
-        if result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
+        if not self._wire_time or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
             return False
         begun = time - (len(result.pdu) + 3) * self._character
         early = begun < self._sent - TOLERANCE

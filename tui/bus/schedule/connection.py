@@ -102,16 +102,20 @@ class Connection:
             master.close()
 
     async def _open(self) -> Master:
-        link, wake = self._link, self._dispatcher.wake
+        link, wake, timing = self._link, self._dispatcher.wake, self._around.timing
+        wire_time = False
         match link:
             case SerialLink():
                 transport = open_port(link)
+                wire_time = not is_pseudo_terminal(link.path)
             case TcpLink() | RtuTcpLink():
-                transport = await connect_tcp(link, self._around.timing.connect_timeout)
+                transport = await connect_tcp(link, timing.connect_timeout)
         self._say(LineStatus.CONNECTED, transport.note)
         if isinstance(link, TcpLink):
             return TcpMaster(transport, self._around, wake)
-        return RtuMaster(transport, link, self._around, wake)
+        if timing.wire_time is not None:
+            wire_time = timing.wire_time
+        return RtuMaster(transport, link, self._around, wake, wire_time=wire_time)
 
     def _say(
         self,
