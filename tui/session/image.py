@@ -10,6 +10,7 @@ import math
 import threading
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from types import MappingProxyType
 
 from tui.drive.profile.profile import Profile
@@ -18,17 +19,26 @@ from .clock import REAL_CLOCK, Clock
 from .reading import Origin, Reading
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True)
 class _State:
     """Everything at one moment; replaced as a whole, so that any thread may look."""
 
     held: Mapping[str, Reading]
-    raws: Mapping[str, int]
-    trusted: Mapping[str, int]
     refused: Mapping[str, Reading]
+    since: float
+    """What was read before may have changed."""
 
+    # worked out where somebody asks: replies come far more often
+    @cached_property
+    def raws(self) -> Mapping[str, int]:
+        return MappingProxyType(
+            {code: one.raw for code, one in self.held.items() if one.raw is not None}
+        )
 
-_EMPTY = _State({}, MappingProxyType({}), MappingProxyType({}), {})
+    @cached_property
+    def trusted(self) -> Mapping[str, int]:
+        held, since = self.held, self.since
+        return MappingProxyType({c: raw for c, raw in self.raws.items() if held[c].time >= since})
 
 
 class RegisterImage:
@@ -41,7 +51,7 @@ class RegisterImage:
         self._profile = profile
         self._clock = clock
         self._lock = threading.Lock()
-        self._now = _EMPTY
+        self._now = _State({}, {}, -math.inf)
         self._doubted: dict[str, float] = {}
         """When a word was last written, or may have been."""
         self._trusted_from = -math.inf
@@ -132,7 +142,4 @@ class RegisterImage:
             self._set(kept, {} if gone is None else self._now.refused)
 
     def _set(self, held: Mapping[str, Reading], refused: Mapping[str, Reading]) -> None:
-        raws = {code: one.raw for code, one in held.items() if one.raw is not None}
-        since = self._trusted_from
-        trusted = {code: raw for code, raw in raws.items() if held[code].time >= since}
-        self._now = _State(held, MappingProxyType(raws), MappingProxyType(trusted), refused)
+        self._now = _State(held, refused, self._trusted_from)
