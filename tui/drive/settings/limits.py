@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from decimal import Decimal
+from functools import lru_cache
 
 from ..profile.profile import Profile
 from ..shown import number_of, shown
 from .edits import Edits
 
 
-def limit_pairs(profile: Profile) -> list[tuple[str, str]]:
+# a profile stays as it was loaded, and every row of a table asks
+@lru_cache(maxsize=32)
+def limit_pairs(profile: Profile) -> tuple[tuple[str, str], ...]:
     """Pairs of codes of which the first must never be above the second, in the same unit."""
     pairs: dict[tuple[str, str], None] = {}
     for parameter in profile.parameters:
@@ -18,7 +21,7 @@ def limit_pairs(profile: Profile) -> list[tuple[str, str]]:
             pairs[parameter.min_from, parameter.code] = None
         if parameter.max_from:
             pairs[parameter.code, parameter.max_from] = None
-    return [(low, high) for low, high in pairs if profile[low].unit == profile[high].unit]
+    return tuple(pair for pair in pairs if profile[pair[0]].unit == profile[pair[1]].unit)
 
 
 def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, str]:

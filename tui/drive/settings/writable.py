@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Literal
 
 from ..profile.profile import Profile, is_verified
@@ -197,6 +198,8 @@ def warning(profile: Profile, parameter: Parameter, raw: int) -> str:
     return ""
 
 
+# a profile stays as it was loaded, and every row of a table asks
+@lru_cache(maxsize=32)
 def _order_codes(profile: Profile) -> frozenset[str]:
     """Codes of command words, references, and of values that a block passes on."""
     codes = {reference.parameter for reference in profile.data.references}
