@@ -12,16 +12,20 @@ import asyncio
 from collections import deque
 from collections.abc import Callable
 from contextlib import suppress
+from typing import Any
 
 from textual.app import App
 from textual.dom import DOMNode
 from textual.events import Key, Paste
 from textual.message_pump import MessagePump
+from textual.screen import Screen
 
 from .stroke import Stroke, stroke_of
 
-WAIT_LONGEST = 0.3
-"""Seconds that a key waits at most for the one before."""
+WAIT_LONGEST = 3.0
+"""Seconds that a key waits at most for the one before: a slow computer builds a screen in less."""
+LOOK = 0.05
+"""Seconds between two looks whether a queue that is waited for is still that of the key."""
 
 Typed = Key | Paste
 
@@ -79,18 +83,24 @@ class TypeAhead:
 
     async def _worked_off(self) -> None:
         """Wait for every queue on the key's way, and for a screen that it opened."""
-        while True:
+        while self._app.is_running:
             screen = self._app.screen
             at: DOMNode | None = self._app.focused or screen
             while at is not None:
-                await _emptied(at)
+                await self._emptied(at, screen)
                 at = at.parent
-            if self._app.screen is screen:
+            if self._top() is screen:
                 return
 
+    def _top(self) -> Screen[Any] | None:
+        return self._app.screen if self._app.is_running else None
 
-async def _emptied(pump: MessagePump) -> None:
-    """Wait until a queue has come to what is in it now."""
-    done = asyncio.Event()
-    if pump.call_later(done.set):
-        await done.wait()
+    async def _emptied(self, pump: MessagePump, screen: Screen[Any]) -> None:
+        """Wait until a queue has come to what is in it now, or is none of the screen on top."""
+        done = asyncio.Event()
+        if not pump.call_later(done.set):
+            return
+        while not done.is_set() and pump.is_running and self._top() is screen:
+            with suppress(TimeoutError):
+                async with asyncio.timeout(LOOK):
+                    await done.wait()

@@ -61,8 +61,8 @@ class LineForm(Vertical):
             self.typed = True
 
     def ask_for_addresses(self) -> None:
-        """Into the field of the addresses."""
-        self._field("addresses").focus()
+        """Into the field of the addresses, at once: what is typed next belongs there."""
+        self.screen.set_focus(self._field("addresses"))
 
     @property
     def profile(self) -> str:
@@ -70,8 +70,8 @@ class LineForm(Vertical):
         return self._typed("profile").lower()
 
     def ask_for_profile(self) -> None:
-        """Into the field of the profile."""
-        self._field("profile").focus()
+        """Into the field of the profile, at once: what is typed next belongs there."""
+        self.screen.set_focus(self._field("profile"))
 
     def offer_settings(self, port: bool) -> None:
         """Only a serial port has settings that are chosen here."""

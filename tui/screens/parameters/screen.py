@@ -159,8 +159,8 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         self.list_again()
 
     def action_search(self) -> None:
-        """Into the search."""
-        self.query_one("#search", Input).focus()
+        """Into the search, at once: what is typed next is searched for."""
+        self.set_focus(self.query_one("#search", Input))
 
     def on_input_changed(self) -> None:
         """Search as one types; the best match is chosen."""
