@@ -8,6 +8,7 @@ import re
 import stat
 import subprocess
 import sys
+import tomllib
 import zipfile
 from importlib import metadata
 from pathlib import Path
@@ -164,6 +165,16 @@ def test_the_gate_runs_the_test_command_of_readme() -> None:
     assert done.stdout.strip() == commands()[1]
     for check in ("ruff check", "ruff format --check", "mypy", "lint-imports", "DRIVEPANEL_PEERS"):
         assert check in script
+
+
+def test_every_folder_of_tests_is_run_by_one_of_the_two_commands() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    at_once = settings["tool"]["pytest"]["ini_options"]["testpaths"]
+    folders = {f"tests/{found.parent.name}" for found in (ROOT / "tests").glob("*/test_*.py")}
+    assert {*at_once} == {*(folders - {"tests/line"}), "tests/test_*.py"}
+    layer = ".venv/bin/python -m pytest -q -n 4"
+    assert f"{layer} tests/line" in README
+    assert re.search(rf"PEERS=required {layer}.* tests/line$", CI.read_text("utf-8"), re.MULTILINE)
 
 
 def test_links_of_readme_lead_somewhere() -> None:
