@@ -225,10 +225,10 @@ async def back_to(made: Bench, screen: str) -> None:
     assert console is not None
     if app.place == "monitor" and "Enter" in shown(app, "message"):
         await made.pilot.press("escape")
-    if app.place == screen != CONNECTION and console.session.arming.armed:
-        return
     if app.place == CONNECTION:
-        app.connection.drives.focus()  # in the field of addresses a figure is text
+        app.connection.drives.focus()  # in a field a letter is text
+    if app.place == screen and console.session.arming.armed:
+        return
     if app.place != "monitor":
         await made.pilot.press("2")
         await until(made.pilot, lambda: app.place == "monitor")

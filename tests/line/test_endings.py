@@ -13,14 +13,13 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
+from tests.cli.commands import tcp_line
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, port_of, served, simulated
 from tui.cli.shared.output import readings_table
 from tui.drive.profile import library
 from tui.drive.values import decode
 from tui.session.monitor.rates import monitoring_codes
 from tui.session.reading import Quality, Reading
-
-from .commands import tcp_line
 
 WATCH = ("watch", "sim:atv71@2", "-d", "2", "ETA", "--every", "0.1", "--json")
 ENDINGS = [signal.SIGINT, signal.SIGTERM]
