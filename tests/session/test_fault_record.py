@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from tui.session.monitor.fault_record import Recorder, record_name, record_text
 
 from .test_command import Bench, bench
@@ -60,7 +62,7 @@ async def test_the_record_as_a_text() -> None:
         await made.order("forward")
         await made.until(lambda: recorder._kind == "running")
         made.drive.provoke(17)
-        await made.until(lambda: recorder.latest is not None)
+        await made.until(lambda: recorder.latest is not None and recorder.latest.fault is not None)
         assert recorder.latest is not None
         session = made.session
         text = record_text(session, recorder.latest, [("FE00", "Output frequency", "12.34 Hz")])
@@ -69,3 +71,23 @@ async def test_the_record_as_a_text() -> None:
         rows = text.partition("## Values")[2].partition("## Written")[0].splitlines()
         assert len({row.count("|") for row in rows if row.startswith("|")}) == 1
         assert record_name(session, recorder.latest).endswith("-E.md")
+
+
+async def test_a_fault_that_is_read_after_the_state_comes_into_the_record() -> None:
+    async with bench("atv71") as made:
+        monitor = made.console.monitor
+        await made.until(lambda: monitor.latest is not None and not monitor.latest.error)
+        calm = monitor.latest
+        assert calm is not None
+        made.drive.provoke("ObF")
+        await made.until(lambda: monitor.latest.state.fault is not None)  # type: ignore[union-attr]
+        tripped = monitor.latest
+        assert tripped is not None
+        monitor.stop()
+        recorder = Recorder(made.session, made.console.journal)
+        for snapshot in (calm, replace(tripped, state=replace(tripped.state, fault=None))):
+            recorder.take(snapshot)
+        assert recorder.latest is not None
+        assert recorder.latest.fault is None
+        recorder.take(tripped)
+        assert recorder.latest.fault == tripped.state.fault

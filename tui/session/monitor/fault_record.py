@@ -8,7 +8,7 @@ from __future__ import annotations
 import time
 from collections import deque
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from tui.drive.profile.schema import FaultCode
@@ -73,6 +73,9 @@ class Recorder:
         if self._kind == "fault" and before not in ("fault", "unknown"):
             self.latest = self._freeze(snapshot)
             self.seen = False
+        elif self._kind == "fault" and self.latest is not None and self.latest.fault is None:
+            # the word of the fault may be read a cycle after the state
+            self.latest = replace(self.latest, fault=snapshot.state.fault)
 
     def _freeze(self, now: Snapshot) -> FaultRecord:
         codes = record_codes(self.session)
