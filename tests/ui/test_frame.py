@@ -12,6 +12,7 @@ from textual.pilot import Pilot
 from tui.app import DrivePanelApp
 from tui.screens.dialogs.question import Question
 from tui.screens.faults.screen import FaultsScreen
+from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
 from tui.session.connect.open_line import demo_line
 from tui.simulator import Simulation
@@ -131,9 +132,16 @@ async def test_a_question_leaves_the_strip_live() -> None:
 
 
 @pytest.mark.parametrize("part", ["said", "strip", "state", "top"])
-async def test_a_screen_on_its_way_out_is_drawn_no_more(part: str) -> None:
-    """The parts of a screen go one by one, and the next look around may come between."""
+async def test_a_screen_on_its_way_out_is_drawn_no_more(
+    part: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """When the panel ends the parts go one by one, and the next look may come between."""
     async with panel() as made:
-        await made.app.screen.query(f"#{part}").remove()
-        made.app.look_around()
-        assert made.app.is_running
+        screen = made.app.screen
+        assert isinstance(screen, MonitorScreen)
+        with monkeypatch.context() as ending:
+            ending.setattr(type(made.app), "is_running", property(lambda _: False))
+            await screen.query(f"#{part}").remove()
+            made.app.look_around()
+            screen.look()
+            made.app.exit()

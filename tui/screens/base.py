@@ -61,7 +61,8 @@ class PanelScreen(Framed):
 
     def look(self) -> None:
         """Show what there is now; lines that stay the same are not drawn."""
-        if self.is_current and self.size.width:
+        # when the panel ends the parts of a screen go one by one, and timers still tick
+        if self.is_current and self.size.width and self.app.is_running:
             self.draw(self.size.width)
 
     def draw(self, width: int) -> None:
