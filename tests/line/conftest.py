@@ -14,6 +14,7 @@ import pytest
 from tests.conftest import need_peer
 from tests.programs import PATIENCE
 
+from .pty_panel import PtyPanel, panel_on_a_pty
 from .terminal import Terminal
 
 HERE = Path(__file__).parent
@@ -66,6 +67,23 @@ def node(peer: Peer, monkeypatch: pytest.MonkeyPatch) -> str:
         )
     monkeypatch.setenv("NODE_PATH", modules)
     return program
+
+
+@pytest.fixture(scope="module")
+def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PtyPanel]:
+    """A panel on Monitor, for several tests; each leaves it there, its motor at rest."""
+    with pytest.MonkeyPatch.context() as patch:
+        for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
+            patch.setenv(name, str(tmp_path_factory.mktemp(name.lower())))
+        with panel_on_a_pty() as made:
+            yield made
+
+
+@pytest.fixture
+def fresh_panel() -> Iterator[PtyPanel]:
+    """A panel on Monitor, for one test."""
+    with panel_on_a_pty() as made:
+        yield made
 
 
 @pytest.fixture

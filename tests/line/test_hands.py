@@ -30,23 +30,6 @@ RANDOM_KEYS += [
 ]
 
 
-@pytest.fixture(scope="module")
-def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PtyPanel]:
-    """A panel on Monitor, for several tests; each leaves it there."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
-            patch.setenv(name, str(tmp_path_factory.mktemp(name.lower())))
-        with panel_on_a_pty() as made:
-            yield made
-
-
-@pytest.fixture
-def fresh_panel() -> Iterator[PtyPanel]:
-    """A panel on Monitor, for one test."""
-    with panel_on_a_pty() as made:
-        yield made
-
-
 def ways(sequence: str) -> Iterator[tuple[tuple[str, ...], float]]:
     """Whole, and in two writes at every place: near, and after ESC was taken for a key."""
     yield (sequence,), 0.0

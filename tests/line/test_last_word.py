@@ -3,36 +3,18 @@
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator
 
 import pytest
 
 from benchmarks.hands import Counted, bursts, is_stop, unarmed
 from tests.programs import wait_until
 
-from .pty_panel import LINE_SETTLED, PtyPanel, Write, panel_on_a_pty
+from .pty_panel import LINE_SETTLED, PtyPanel, Write
 from .test_hands import RANDOM_KEYS
 
 F12, F9 = "\x1b[24~", "\x1b[20~"
 PAUSES = (0.02, 0.06, 0.2, 0.5)
 """Seconds between two parts of a paste: one piece, two pieces, longer than a question settles."""
-
-
-@pytest.fixture(scope="module")
-def panel(tmp_path_factory: pytest.TempPathFactory) -> Iterator[PtyPanel]:
-    """A panel on Monitor, for several tests; each leaves it there, its motor at rest."""
-    with pytest.MonkeyPatch.context() as patch:
-        for name in ("HOME", "DRIVEPANEL_CONFIG", "DRIVEPANEL_STATE"):
-            patch.setenv(name, str(tmp_path_factory.mktemp(name.lower())))
-        with panel_on_a_pty() as made:
-            yield made
-
-
-@pytest.fixture
-def fresh_panel() -> Iterator[PtyPanel]:
-    """A panel on Monitor, for one test."""
-    with panel_on_a_pty() as made:
-        yield made
 
 
 def at_rest(panel: PtyPanel) -> None:
