@@ -259,4 +259,4 @@ def test_a_key_that_cannot_work_now_is_dim(raws: dict[str, int], armed: float | 
     line = order_keys(view, keys_line("monitor", 80))
     bright = {line.plain[span.start : span.end] for span in line.spans if span.style == ATTENTION}
     assert ("x" in bright) is (faulty and armed is not None)
-    assert ("r" in bright) is (armed is not None)
+    assert ("r" in bright) is (armed is not None and not faulty)

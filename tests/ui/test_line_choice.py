@@ -14,7 +14,7 @@ from textual.screen import Screen
 from textual.widgets import Input
 
 from tui.app import DrivePanelApp
-from tui.screens.connection.choices import same_line
+from tui.screens.connection.choices import groups, same_line
 from tui.screens.connection.drive_list import DriveList
 from tui.screens.connection.state import QUIET
 from tui.screens.dialogs.confirm import Confirm
@@ -242,3 +242,12 @@ async def test_sorting_waits_while_keys_come() -> None:
         app.connection.look()
         assert [option.id for option in listed.options] == ["2", "4", "7"]
         assert listed.chosen == 4
+
+
+def test_a_simulated_line_that_is_offered_anyway_stands_once() -> None:
+    serial, recent, simulated = groups(
+        [], ["sim:atv71@2,atv21", "sim:atv21@1,atv31@2,atv312@3,atv71@4,powerdrive@5", "tcp:plc"]
+    )
+    assert [choice.text for choice in recent.choices] == ["sim:atv71@2,atv21", "tcp:plc"]
+    assert len(simulated.choices) == 2
+    assert serial.choices == ()

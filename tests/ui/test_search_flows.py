@@ -114,4 +114,4 @@ async def test_who_trips_when_left_alone_is_told_once() -> None:
         await until(pilot, lambda: app.connection.scanning)
         await pilot.press("escape")
         await until(pilot, lambda: not app.connection.scanning)
-        assert sum("left alone" in text for text in said(app)) == 1
+        assert sum("Kept asking" in text for text in said(app)) == 1

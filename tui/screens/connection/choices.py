@@ -45,12 +45,17 @@ class Group:
 def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
     """The headings with their lines; `ports` are paths with descriptions."""
     serial = tuple(LineChoice(path, description, path) for path, description in ports)
-    lately = tuple(LineChoice(text, "") for text in recent)
+    lately = tuple(LineChoice(text, "") for text in recent if not _offered_simulated(text))
     return [
         Group("Serial ports", serial, "none found"),
         Group("Recent", lately, "none yet: n types one"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in SIMULATED_LINES)),
     ]
+
+
+def _offered_simulated(text: str) -> bool:
+    """Whether it is one of the simulated lines, which are offered anyway."""
+    return text.startswith("sim:") and any(same_line(text, one) for one, _ in SIMULATED_LINES)
 
 
 def fault_of_line(text: str) -> str:

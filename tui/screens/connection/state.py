@@ -270,6 +270,6 @@ class LineView(PanelScreen):
         which = ", ".join(f"{device} ({timeout:g} s)" for device, timeout in sorted(new.items()))
         self.app.events.add(
             "told",
-            f"They trip when left alone so long, and are asked on: {which}. It is their"
-            " communication time-out, while this line is open the panel keeps it from them.",
+            f"Kept asking: {which}. Drives trip at the end of their communication time-out;"
+            " it cannot run out while this line is open.",
         )

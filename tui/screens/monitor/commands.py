@@ -28,6 +28,7 @@ def works_now(view: View, action: str) -> bool:
     """Whether an order can work now, as far as is known without asking the drive."""
     if view.control.armed_for is None or view.lost or view.snapshot is None:
         return False
-    if action == "reset":
-        return view.snapshot.state.kind == "fault"
+    in_fault = view.snapshot.state.kind == "fault"
+    if action == "reset" or in_fault:
+        return in_fault and action in ("reset", "run_line('reference')")
     return view.control.hindrance is None or action == "run_line('reference')"
