@@ -20,7 +20,6 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
-from datetime import datetime
 from pathlib import Path
 from typing import Any
 
@@ -110,32 +109,6 @@ class Bench:
 # What is measured
 
 
-class ClockLag:
-    """How late the clock on the picture turns to a new second.
-
-    The panel looks at its clock every 0.25 s, so that up to 0.25 s of it is no lag.
-    """
-
-    def __init__(self) -> None:
-        self.late: list[float] = []
-        self._shown = ""
-
-    def see(self, text: str) -> None:
-        """Look at the picture just after it changed."""
-        found = re.search(r"\d\d:\d\d:\d\d", text)
-        if found and found[0] != self._shown:
-            now = datetime.now()
-            told = datetime.combine(now.date(), datetime.strptime(found[0], "%H:%M:%S").time())
-            self.late += [(now - told).total_seconds()] if self._shown else []
-            self._shown = found[0]
-
-
-def watched(terminal: Terminal, seconds: float) -> Figures:
-    """The panel left alone, with the lag of its picture."""
-    clock = ClockLag()
-    return steady(terminal, seconds, clock.see) | {"behind": spread(clock.late)}
-
-
 # The programs
 
 
@@ -162,9 +135,9 @@ def panel(bench: Bench, size: tuple[int, int]) -> dict[str, Figures]:
     with bench.watch(size) as terminal:
         values = terminal.see("FORWARD") - terminal.started
         terminal.run(SETTLED)
-        default = watched(terminal, bench.options.seconds)
+        default = steady(terminal, bench.options.seconds)
         faster(terminal)
-        fast = watched(terminal, bench.options.seconds)
+        fast = steady(terminal, bench.options.seconds)
         fast["key"] = press_often(terminal, WORD, bench.options.presses)
         fast["help"] = press_often(terminal, HELP, bench.options.presses // 5)
     return {"2 Hz": default | {"start_to_values_s": values}, "10 Hz": fast}
@@ -179,7 +152,7 @@ def faster(terminal: Terminal) -> None:
         terminal.see("Poll twice as fast")
         terminal.run(CHOSEN)
         terminal.press("\r")
-        terminal.see(f"of {rate} cycles")
+        terminal.see(f"asked {rate} times a second")
     terminal.run(SETTLED)
 
 
@@ -198,7 +171,7 @@ def slow(bench: Bench, size: tuple[int, int]) -> Figures:
     with bench.watch(size, rate=SLOW) as terminal:
         terminal.see("FORWARD")
         faster(terminal)
-        found = watched(terminal, bench.options.seconds)
+        found = steady(terminal, bench.options.seconds)
         found["key"] = press_often(terminal, WORD, bench.options.presses // 8)
         found["help"] = press_often(terminal, HELP, bench.options.presses // 50)
     return found
@@ -274,8 +247,6 @@ ROWS: dict[str, tuple[tuple[str, ...], str, float, str]] = {
     "?: worst, ms": (("help", "worst_ms"), ".1f", 1.0, ""),
     "?: lost": (("help", "lost"), ".0f", 1.0, "0"),
     "?: bytes a press": (("help", "bytes_a_press"), ".0f", 1.0, ""),
-    "clock late: median, ms": (("behind", "median_ms"), ".0f", 1.0, "125"),
-    "clock late: worst, ms": (("behind", "worst_ms"), ".0f", 1.0, "250"),
 }
 """Rows of the table: where the figure is, its form, its factor, the aim."""
 COLUMNS = {

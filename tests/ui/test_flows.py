@@ -272,3 +272,11 @@ async def test_the_next_word_moves_nothing_else(size: tuple[int, int]) -> None:
             titles.add(shown(app, part).split()[0])
             assert {widget.id: widget.region for widget in screen.query(Lines)} == places
         assert len(titles) > 1
+
+
+async def test_how_often_the_drive_is_asked_is_told() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        screen = await to_monitor(app, pilot, 2)
+        screen.action_change_rate(1)
+        await until(pilot, lambda: "asked 5.0 times a second" in shown(app, "said"))
