@@ -148,7 +148,7 @@ def faster(terminal: Terminal) -> None:
     for rate in ("5.0", "10.0"):  # one after another: keys that come at once are not taken
         terminal.press("\x10")
         terminal.see("What shall be done")
-        terminal.press("Poll twice")
+        terminal.press("twice")
         terminal.see("Poll twice as fast")
         terminal.run(CHOSEN)
         terminal.press("\r")

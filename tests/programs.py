@@ -16,6 +16,8 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from tui.simulator import Simulation
+
 PATIENCE = 60.0
 """Seconds after which a program that hangs ends its test; never a measure of anything."""
 
@@ -117,6 +119,12 @@ def free_port() -> int:
     with socket.create_server(("127.0.0.1", 0)) as probe:
         port: int = probe.getsockname()[1]
     return port
+
+
+def rtu_tcp(simulation: Simulation) -> str:
+    """The LINE to simulated drives of this process: RTU frames, and no pseudo-terminal to time."""
+    host, port = simulation.serve_rtu_tcp()
+    return f"rtu-tcp:{host}:{port}"
 
 
 @contextmanager

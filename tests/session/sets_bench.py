@@ -9,10 +9,11 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
+from tests.programs import wait_until
 from tui.bus.api import LineStatus
 from tui.bus.errors import DeviceException
 from tui.bus.line import Line
-from tui.bus.link import RtuTcpLink, SerialLink
+from tui.bus.link import Link, RtuTcpLink, SerialLink
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.edits import Edits
@@ -129,20 +130,24 @@ def bench(
     *,
     read_only: bool = False,
     faults: FaultRates | None = None,
-    tcp: bool = False,
+    serial: bool = False,
     **spec: object,
 ) -> Iterator[Bench]:
-    """A simulated drive behind a pseudo-terminal, or over TCP where the line is to come back."""
+    """A simulated drive, RTU over TCP; on a serial port where the settings of one matter."""
     drive = DriveSpec(family, 1, **spec)  # type: ignore[arg-type]
     simulation = Simulation([drive], faults=faults, seed=3)
     simulation.start()
-    if tcp:
-        line = Line(RtuTcpLink(*simulation.serve_rtu_tcp()), read_only=read_only)
-    else:
-        line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
+    link: Link = (
+        SerialLink(simulation.serve_pty(), 19200, "8N1")
+        if serial
+        else RtuTcpLink(*simulation.serve_rtu_tcp())
+    )
+    line = Line(link, read_only=read_only)
     journal = Journal()
     try:
         line.open(wait=5.0)
+        if spec.get("run_hz"):
+            wait_until(lambda: simulation.drive(1).motor.frequency > 0, "the motor turns")
         session = DriveSession(line, 1, library.load(family))
         yield Bench(simulation.drive(1), session, journal, simulation)
     finally:

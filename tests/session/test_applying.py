@@ -294,7 +294,7 @@ async def test_nobody_answers_before_anything_was_written(
 
 
 async def test_an_address_at_once_is_sent_last_and_the_new_place_is_named() -> None:
-    with bench("atv21") as made:
+    with bench("atv21", serial=True) as made:
         applied = await made.apply(F802="7", F803="5", F800="9600")
         assert [result.edit.code for result in applied.results] == ["F803", "F800", "F802"]
         assert outcomes(applied)["F802"] is EditOutcome.SENT

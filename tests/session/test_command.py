@@ -15,7 +15,7 @@ import pytest
 
 from tests.session.sets_bench import state_known
 from tui.bus.line import Line, Timing
-from tui.bus.link import SerialLink
+from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR
@@ -114,9 +114,7 @@ async def bench(
     specs = [DriveSpec(family, 1, **spec)]  # type: ignore[arg-type]
     simulation = Simulation(specs, clock=clock.monotonic)
     simulation.start()
-    line = Line(
-        SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only, timing=timing
-    )
+    line = Line(RtuTcpLink(*simulation.serve_rtu_tcp()), read_only=read_only, timing=timing)
     line.open(wait=5.0)
     journal = Journal()
     console = DriveConsole(DriveSession(line, 1, library.load(family), clock=clock), journal)

@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from tests.blocks import block_of
+from tests.programs import rtu_tcp
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, RequestRefused
 from tui.bus.line import Reply
@@ -429,7 +430,7 @@ async def test_trembling_values_of_a_real_line_are_no_difference() -> None:
     timing = LineTiming(19200, "8N1", True)
     simulation = Simulation([DriveSpec("atv21", 1, sets=sets, run_hz=35.0)], timing=timing)
     simulation.start()
-    opened = open_line(f"serial:{simulation.serve_pty()},19200,8N1", wait=5.0)
+    opened = open_line(rtu_tcp(simulation), wait=5.0)
     try:
         session = DriveSession(opened.line, 1, library.load("atv21"))
         mapper = Mapper(session)

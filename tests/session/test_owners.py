@@ -15,7 +15,7 @@ import pytest
 from tui.bus.api import ModbusLine, Priority, Reply
 from tui.bus.errors import NoAnswer
 from tui.bus.line import Line
-from tui.bus.link import SerialLink
+from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.session.console import DriveConsole
@@ -62,7 +62,7 @@ async def bench(family: str, *, watch: bool = True, **spec: Any) -> AsyncIterato
     """One simulated drive in a fleet, watched."""
     simulation = Simulation([DriveSpec(family, 1, **spec)])
     simulation.start()
-    line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"))
+    line = Line(RtuTcpLink(*simulation.serve_rtu_tcp()))
     line.open(wait=5.0)
     journal = Journal()
     fleet = Fleet(line, journal)

@@ -25,7 +25,7 @@ SECTIONS = [
 
 @pytest.mark.parametrize("family", FAMILIES)
 async def test_every_family_has_its_report(family: str) -> None:
-    with bench(family) as made:
+    with bench(family, serial=True) as made:
         upload = Upload(made.session)
         await upload.run()
         text = report_text(made.profile, upload.parameter_set(), [])

@@ -141,7 +141,7 @@ async def test_killed_half_way_and_resumed(family: str) -> None:
 
 
 async def test_a_lost_line_keeps_the_rest_and_the_mark() -> None:
-    with bench("atv71", sets=known("atv71"), tcp=True) as made:
+    with bench("atv71", sets=known("atv71")) as made:
         values = await backed_up(made)
         await to_factory(made)
 
@@ -167,7 +167,7 @@ async def test_a_lost_line_keeps_the_rest_and_the_mark() -> None:
 
 
 async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
-    with bench("atv312", sets=known("atv312"), tcp=True) as made:
+    with bench("atv312", sets=known("atv312")) as made:
         values = await backed_up(made)
         await to_factory(made)
         looked: list[int] = []

@@ -10,6 +10,7 @@ from typing import Protocol
 
 import pytest
 
+from tests.programs import rtu_tcp
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.drive import DriveSession
@@ -30,7 +31,7 @@ def start() -> Iterator[Start]:
     def begin(spec: DriveSpec, timing: LineTiming | None = None) -> tuple[Simulation, OpenLine]:
         simulation = Simulation([spec], timing=timing)
         simulation.start()
-        line = open_line(f"serial:{simulation.serve_pty()},19200,8N1", wait=5.0)
+        line = open_line(rtu_tcp(simulation), wait=5.0)
         opened.append((simulation, line))
         return opened[-1]
 

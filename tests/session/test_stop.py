@@ -10,7 +10,7 @@ import pytest
 
 from tui.bus.api import Priority
 from tui.bus.line import Line
-from tui.bus.link import SerialLink
+from tui.bus.link import RtuTcpLink
 from tui.drive.orders import OrderRefused, chart_in_force, choose, walk
 from tui.drive.profile import library
 from tui.session.command.stop import Stopper
@@ -34,7 +34,7 @@ def start(journal: Journal) -> Iterator[Start]:
     def begin(*specs: DriveSpec, read_only: bool = False) -> tuple[Simulation, Line]:
         simulation = Simulation(list(specs))
         simulation.start()
-        line = Line(SerialLink(simulation.serve_pty(), 19200, "8N1"), read_only=read_only)
+        line = Line(RtuTcpLink(*simulation.serve_rtu_tcp()), read_only=read_only)
         line.open(wait=5.0)
         opened.append((simulation, line))
         return opened[-1]

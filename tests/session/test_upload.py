@@ -46,7 +46,7 @@ async def test_what_the_drive_refuses_is_absent_with_why() -> None:
 
 
 async def test_a_lost_line_and_on_where_it_was() -> None:
-    with bench("atv31", tcp=True) as made:
+    with bench("atv31") as made:
         cut = [False]
 
         def progress(done: int, of: int) -> None:

@@ -13,6 +13,7 @@ from textual.events import Key
 from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
+from tests.programs import rtu_tcp
 from tui.app import DrivePanelApp
 from tui.screens.command.options import OptionsScreen
 from tui.screens.connection.screen import ConnectionScreen
@@ -144,7 +145,7 @@ async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]
     ]
     simulation = Simulation(specs)
     simulation.start()
-    text = f"serial:{simulation.serve_pty()},19200,8N1"
+    text = rtu_tcp(simulation)
 
     def opener(_: str, **how: object) -> OpenLine:
         opened = open_line(text, **how)  # type: ignore[arg-type]

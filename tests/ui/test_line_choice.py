@@ -13,6 +13,7 @@ from textual.pilot import Pilot
 from textual.screen import Screen
 from textual.widgets import Input
 
+from tests.programs import rtu_tcp
 from tui.app import DrivePanelApp
 from tui.screens.connection.choices import groups, same_line
 from tui.screens.connection.drive_list import DriveList
@@ -58,7 +59,7 @@ async def line(*, first: int = 3, family: str = "atv21") -> AsyncIterator[Line]:
     """The panel that was started on a line; below the first drive nobody answers."""
     simulation = Simulation([DriveSpec(family, first, run_hz=30.0), DriveSpec("atv71", first + 3)])
     simulation.start()
-    real = f"serial:{simulation.serve_pty()},19200,8N1"
+    real = rtu_tcp(simulation)
     opened: list[str] = []
 
     def opener(text: str, **how: object) -> OpenLine:

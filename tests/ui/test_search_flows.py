@@ -9,6 +9,7 @@ import pytest
 from textual.pilot import Pilot
 from textual.widgets import Input
 
+from tests.programs import rtu_tcp
 from tui.app import DrivePanelApp
 from tui.screens.monitor.screen import MonitorScreen
 from tui.session.connect.open_line import OpenLine, open_line
@@ -28,7 +29,7 @@ async def panel(*specs: DriveSpec) -> AsyncIterator[tuple[DrivePanelApp, Pilot[N
     """The panel on a line of which it is not known who is there."""
     simulation = Simulation(list(specs))
     simulation.start()
-    text = f"serial:{simulation.serve_pty()},19200,8N1"
+    text = rtu_tcp(simulation)
 
     def opener(_: str, **how: object) -> OpenLine:
         return open_line(text, **how)  # type: ignore[arg-type]
