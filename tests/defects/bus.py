@@ -192,4 +192,20 @@ DEFECTS = (
         "Over a gateway the values of one motor are shown as those of another.",
         ("tests/bus/test_tcp.py",),
     ),
+    Defect(
+        "early-reply-taken",
+        "tui/bus/rtu/master.py",
+        "        return early and seldom and len(self._early) >= JUDGED\n",
+        "        return False\n",
+        "A reply that was on its way before the request is taken for its answer.",
+        ("tests/bus/test_faults.py",),
+    ),
+    Defect(
+        "pseudo-terminals-judged-by-their-baud",
+        "tui/bus/schedule/connection.py",
+        "wire_time = not is_pseudo_terminal(link.path)",
+        "wire_time = True",
+        "On a busy computer a simulated drive falls silent now and then.",
+        ("tests/bus/test_faults.py",),
+    ),
 )

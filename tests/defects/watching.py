@@ -138,4 +138,20 @@ DEFECTS = (
         "A trip is explained by the cause and remedy of another fault.",
         ("tests/session/test_drive_state.py",),
     ),
+    Defect(
+        "fault-read-late-not-recorded",
+        "tui/session/monitor/fault_record.py",
+        "            self.latest = replace(self.latest, fault=snapshot.state.fault)\n",
+        "            _ = replace(self.latest, fault=snapshot.state.fault)\n",
+        "The record of a trip does not say which fault it was.",
+        ("tests/session/test_fault_record.py",),
+    ),
+    Defect(
+        "what-is-known-is-not-distrusted",
+        "tui/session/image.py",
+        "for c, raw in self.raws.items() if held[c].time >= since}",
+        "for c, raw in self.raws.items() if held[c].time >= 0 * since}",
+        "A decision rests on what was read before the drive was reset.",
+        ("tests/session/test_owners.py", "tests/session/test_editor.py"),
+    ),
 )
