@@ -59,7 +59,7 @@ def word_sign(text: str) -> tuple[object, ...]:
     """The word of bits that Monitor shows first: its title and the names of its bits."""
     rows = text.split("\n")
     for y, row in enumerate(rows):
-        if title := re.match(r" ?([A-Z]\w+(?: \d/\d)?) ─+ 16#", row):
+        if title := re.match(r" ?([A-Z]\w+(?: .*)?) ─+ 16#", row):
             return title[1], *(row[5:13].strip() for row in rows[y + 1 : y + 13])
     return ()
 
