@@ -28,7 +28,7 @@ class FakePanel:
 @pytest.fixture
 def panel(monkeypatch: pytest.MonkeyPatch) -> type[FakePanel]:
     """A panel that is not drawn, on a terminal that is none."""
-    monkeypatch.setattr("tui.cli.commands.panel._has_terminal", lambda: True)
+    monkeypatch.setattr("tui.cli.commands.panel._terminal_trouble", str)
     monkeypatch.setattr("tui.app.DrivePanelApp", FakePanel)
     monkeypatch.setattr(FakePanel, "ends_with", 0)
     return FakePanel

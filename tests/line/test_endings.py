@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import os
 import signal
 import socket
 import subprocess
@@ -142,3 +143,21 @@ def test_a_narrow_terminal_cuts_names_and_never_a_number(width: int) -> None:
         reading = readings[code]
         for part in (code, str(reading.raw), reading.text, f"(16#{reading.parameter.address:04X})"):
             assert f" {part} " in f" {line} "
+
+
+def test_the_panel_is_not_drawn_into_a_file(tmp_path: Path) -> None:
+    """`2>file` swallowed the whole panel, and its keys went on working unseen."""
+    said = tmp_path / "said"
+    near, far = os.openpty()
+    with said.open("w") as file:
+        process = subprocess.Popen(
+            [*DRIVEPANEL, "demo"], stdin=far, stdout=far, stderr=file, start_new_session=True
+        )
+        try:
+            assert process.wait(PATIENCE) == 2
+        finally:
+            process.kill()
+            os.close(near)
+            os.close(far)
+    assert "drawn on standard error" in said.read_text("utf-8")
+    assert "\x1b" not in said.read_text("utf-8")

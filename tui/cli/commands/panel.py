@@ -40,8 +40,8 @@ def run_panel(
     bell: bool = True,
 ) -> None:
     """Run the panel until it is left."""
-    if not _has_terminal():
-        raise Failure("The panel needs a terminal. Without one, use read, watch or --help.", USAGE)
+    if trouble := _terminal_trouble():
+        raise Failure(trouble, USAGE)
     gc.disable()  # until the first picture: what is imported and built for it stays
     os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
     from tui.app import DrivePanelApp
@@ -80,8 +80,13 @@ def _collect_garbage() -> None:
     gc.enable()
 
 
-def _has_terminal() -> bool:
-    return sys.stdin.isatty() and sys.stdout.isatty()
+def _terminal_trouble() -> str:
+    """Why the panel cannot be drawn here, or nothing."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return "The panel needs a terminal. Without one, use read, watch or --help."
+    if not sys.stderr.isatty():
+        return "The panel is drawn on standard error: leave away what leads that elsewhere (2>)."
+    return ""
 
 
 on_hangup_option = click.option(
