@@ -18,7 +18,7 @@ from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults.screen import FaultsScreen
-from tui.screens.frames.screen import FramesScreen
+from tui.screens.frames.screen import FEW, FramesScreen
 from tui.screens.keys.help import HelpScreen
 from tui.screens.keys.table import ACTIONS, EVERYWHERE
 from tui.screens.messages.screen import MessagesScreen
@@ -280,3 +280,14 @@ async def test_how_often_the_drive_is_asked_is_told() -> None:
         screen = await to_monitor(app, pilot, 2)
         screen.action_change_rate(1)
         await until(pilot, lambda: "asked 5.0 times a second" in shown(app, "said"))
+
+
+async def test_on_a_slow_link_frames_come_a_few_at_a_time_and_are_all_there_held() -> None:
+    app = DrivePanelApp(open_line=demo, start="demo", low_bandwidth=True)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await to_monitor(app, pilot, 2)
+        await pilot.press("7")
+        await until(pilot, lambda: "h shows all" in shown(app, "frames"))
+        assert len(shown(app, "frames").splitlines()) == 1 + FEW
+        await pilot.press("h")
+        await until(pilot, lambda: len(shown(app, "frames").splitlines()) == 20)

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
+from dataclasses import replace
 
 import pytest
 from textual.pilot import Pilot
@@ -17,6 +19,7 @@ from tui.screens.parameters.screen import ParametersScreen
 from tui.session.connect.open_line import demo_line
 from tui.simulator import Simulation
 from tui.widgets.lines import Lines
+from tui.widgets.strip import FrameView
 
 
 class Panel:
@@ -145,3 +148,33 @@ async def test_a_screen_on_its_way_out_is_drawn_no_more(
             made.app.look_around()
             screen.look()
             made.app.exit()
+
+
+async def test_on_a_slow_link_figures_are_drawn_seldom_and_a_trip_at_once(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    async with panel() as made:
+        drawn: list[FrameView] = []
+        made.app.low_bandwidth = True
+        monkeypatch.setattr(made.app.screen, "draw_frame", drawn.append)
+        values = itertools.count()
+        view = made.app.frame_now()
+
+        def trembling() -> FrameView:
+            assert view.strip.drive is not None
+            drive = replace(view.strip.drive, frequency=f"{next(values)}")
+            return replace(view, strip=replace(view.strip, drive=drive))
+
+        monkeypatch.setattr(made.app._frame, "view", trembling)
+        for _ in range(50):
+            made.app.draw_frame()
+        assert len(drawn) <= 1
+        view = replace(view, strip=replace(view.strip, faults=1, unseen=True))
+        made.app.draw_frame()
+        assert drawn[-1].strip.faults == 1
+        assert view.strip.drive is not None
+        drive = replace(view.strip.drive, words="FAULT", kind="fault")
+        view = replace(view, strip=replace(view.strip, drive=drive))
+        made.app.draw_frame()
+        assert drawn[-1].strip.drive is not None
+        assert drawn[-1].strip.drive.kind == "fault"

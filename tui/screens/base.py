@@ -15,7 +15,7 @@ from tui.terminal.fields import takes_space
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
-from .frame import Framed
+from .frame import SELDOM, Framed
 from .keys.table import elsewhere, keys_line
 
 
@@ -48,7 +48,7 @@ class PanelScreen(Framed):
     def on_mount(self) -> None:
         """Look now and then."""
         if self.LOOK is not None:
-            self.set_interval(self.LOOK, self.look)
+            self.set_interval(SELDOM if self.app.low_bandwidth else self.LOOK, self.look)
 
     def on_resize(self, event: Resize) -> None:
         """More room, more lines."""

@@ -44,6 +44,8 @@ SAID_STYLES: dict[str, Style] = {
     "working": ATTENTION,
     "done": PLAIN,
 }
+SELDOM = 2.0
+"""Seconds between two looks on a slow link; state, stop and fault are shown at once."""
 WARNS = frozenset({"fault", "failed", "error", "refused", "alarm", "told"})
 """Kinds of a message that is shown whole for a while, on more lines where it takes them."""
 WHOLE_FOR = 15.0

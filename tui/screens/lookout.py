@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from tui.widgets.strip import FrameView
 
 from .app_port import Panel
-from .frame import Framed
+from .frame import SELDOM, Framed
 from .frame_source import FrameSource
 
 if TYPE_CHECKING:
@@ -29,6 +29,9 @@ class Lookout(Panel):
         self._cried: list[StopReport] = []
         """Stops that failed, and of which that was said."""
         self._frame = FrameSource(self)
+        self._drawn: object = None
+        """What of the frame is shown at once, as it was drawn last."""
+        self._drawn_at = 0.0
         self._journal_trouble = ""
 
     def look_around(self) -> None:
@@ -50,9 +53,15 @@ class Lookout(Panel):
         return self._frame.view()
 
     def draw_frame(self) -> None:
-        """Put the frame of the screen on top as it is now."""
-        if isinstance(self.screen, Framed):
-            self.screen.draw_frame(self._frame.view())
+        """Put the frame of the screen on top as it is now; on a slow link its figures seldom."""
+        if not isinstance(self.screen, Framed):
+            return
+        view, now = self._frame.view(), self.clock.monotonic()
+        drawn = (self.screen, self.screen.size, view.at_once)
+        if self.low_bandwidth and drawn == self._drawn and now < self._drawn_at + SELDOM:
+            return
+        self._drawn, self._drawn_at = drawn, now
+        self.screen.draw_frame(view)
 
     def _cry_for_stops(self, fleet: Fleet) -> None:
         """Say over everything, once, that a motor does not stop."""

@@ -5,6 +5,7 @@ Every part has its place, so that nothing moves when a value changes. Pure funct
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
@@ -236,3 +237,13 @@ class FrameView:
     place: str
     marks: dict[str, tuple[str, Style]]
     said: Said | None
+
+    @property
+    def at_once(self) -> object:
+        """What is shown at once on a slow link too: state, stop, fault, arming, what was said."""
+        strip, drive, said = self.strip, self.strip.drive, self.said
+        who = drive and (drive.device, drive.kind, drive.words, drive.age is None, drive.by)
+        armed = drive is not None and drive.armed is not None
+        # figures in a message count seconds
+        text = said and re.sub(r"\d+", "", said.text)
+        return who, armed, strip.faults, strip.unseen, self.place, self.marks, text

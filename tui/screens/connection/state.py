@@ -20,6 +20,7 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN
 
 from ..base import PanelScreen
+from ..frame import SELDOM
 from .drive_list import DriveList
 from .found import about_drive, next_step
 from .hints import hint_for
@@ -107,7 +108,7 @@ class LineView(PanelScreen):
         """Show what there is."""
         self.advise("No line is open.", "Choose a line and press Enter, or n to type one.")
         self.lines.look_for_lines()
-        self._looking = [self.set_interval(STATES, self.look)]
+        self._looking = [self.set_interval(SELDOM if self.app.low_bandwidth else STATES, self.look)]
 
     def on_resize(self, event: Resize) -> None:
         """Titles have the width of their columns, which is known before they are drawn."""

@@ -31,6 +31,10 @@ BESIDE_BYTES = 110
 """Columns from which on words and bytes stand side by side."""
 
 
+FEW = 6
+"""Frames that are shown on a slow link while they come."""
+
+
 class FramesScreen(PanelScreen):
     """The frame log of the line in words; the newest at the bottom."""
 
@@ -54,18 +58,21 @@ class FramesScreen(PanelScreen):
         """Show the newest frames that fit."""
         super().draw(width)
         frames = self._held if self._held is not None else tuple(self._line.trace)
-        room = max(1, self.size.height - 5)
+        room, columns, few = max(1, self.size.height - 5), width, ""
+        if self.app.low_bandwidth and self._held is None:
+            # all of them anew each time is more than a slow link carries
+            room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h shows all, "
         # one more than fits: a reply at the top is told by its request
         told = decoded(
             frames[-room - 1 :], self._profile, self._raws, tcp=isinstance(self._line.link, TcpLink)
         )[-room:]
         held = " (held)" if self._held is not None else ""
-        lines = [rule(f"Frames on the line{held}", width, f"{len(frames)} kept")]
+        lines = [rule(f"Frames on the line{held}", width, f"{few}{len(frames)} kept")]
         now = self.app.clock.monotonic()
         for frame, words in zip(frames[-room:], told, strict=True):
             if self._bytes:
                 words = ""
-            lines.append(frame_line(frame, now, width, words))
+            lines.append(frame_line(frame, now, columns, words))
         self.put("frames", lines)
 
     def _profile(self, device: int) -> Profile | None:

@@ -17,6 +17,7 @@ from tui.widgets.lines import Lines
 from tui.widgets.palette import STALE
 from tui.widgets.strip import FrameView
 
+from ..frame import SELDOM
 from ..keys.table import MONITOR, bindings, keys_line
 from .arrange import Arrangement, arrange
 from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words
@@ -28,7 +29,6 @@ from .view import SPANS, USUAL_SPAN, View
 
 REFRESH = 0.25
 """Seconds between two looks at the latest snapshot; the line polls at its own pace."""
-LOW_BANDWIDTH_REFRESH = 2.0
 STILL_TOLD = 5.0
 """Seconds under a dialog after which it is told that the values below it stand still."""
 PERIODS = (0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0)
@@ -77,9 +77,7 @@ class MonitorScreen(RunKeys):
         """Start watching."""
         beside = codes_beside(self.session.profile)
         self.console.monitor.start(period=self.app.period, extra=beside)
-        self._timer = self.set_interval(
-            LOW_BANDWIDTH_REFRESH if self.app.low_bandwidth else REFRESH, self.look
-        )
+        self._timer = self.set_interval(SELDOM if self.app.low_bandwidth else REFRESH, self.look)
 
     def on_unmount(self) -> None:
         """Stop watching; nobody looks any more, and nothing is commanded any more."""
