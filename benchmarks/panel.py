@@ -69,6 +69,16 @@ def saying(*words: str) -> Callable[[str], tuple[object, ...]]:
     return lambda text: tuple(word in text for word in words)
 
 
+SCREENS = {
+    "2": "Monitor",
+    "1": "Line",
+    "3": "Parameters",
+    "4": "Scanner",
+    "5": "Faults",
+    "6": "Control",
+    "7": "Frames",
+    "m": "Messages",
+}
 WORD = Key("\t", word_sign)
 HELP = Key("?", saying("Keys on Monitor", "──╮", "──╯"))
 HELLO_TEXT = Key("w", saying(*TEXTS))
@@ -166,6 +176,20 @@ def low_bandwidth(bench: Bench, size: tuple[int, int]) -> Figures | None:
         return steady(terminal, max(LOW_SECONDS, bench.options.seconds))
 
 
+def low_screens(bench: Bench, size: tuple[int, int]) -> Figures | None:
+    """Bytes a second of every screen in the low-bandwidth mode; None where it has no such mode."""
+    if "low_bandwidth" not in inspect.signature(run_panel).parameters:
+        return None
+    found: Figures = {}
+    with bench.watch(size, "--low-bandwidth") as terminal:
+        terminal.see("FORWARD")
+        for key, name in SCREENS.items():
+            terminal.press(key)
+            terminal.run(3 * SETTLED)
+            found[name] = steady(terminal, LOW_SECONDS)["bytes_a_second"]
+    return found
+
+
 def slow(bench: Bench, size: tuple[int, int]) -> Figures:
     """The panel at 10 Hz on a slow terminal."""
     with bench.watch(size, rate=SLOW) as terminal:
@@ -205,6 +229,7 @@ def measure(bench: Bench, size: tuple[int, int]) -> Figures:
         "start": starts(bench, size, bench.options.rounds),
         **panel(bench, size),
         "low": low_bandwidth(bench, size),
+        "low_screens": low_screens(bench, size),
         "slow": slow(bench, size),
         "hello": hello(bench, size),
         "htop": htop(bench, size),
@@ -270,6 +295,9 @@ def show(console: Console, size: str, figures: Figures) -> None:
         cells = [_cell(figures[name], place, form, factor) for name in COLUMNS]
         table.add_row(title, *cells, aim)
     console.print(table)
+    if low := figures["low_screens"]:
+        rates = ", ".join(f"{screen} {rate:.0f}" for screen, rate in low.items())
+        console.print(f"Low bandwidth, bytes a second (aim 500): {rates}")
 
 
 def _reason(name: str) -> str:
