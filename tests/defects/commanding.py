@@ -262,12 +262,4 @@ DEFECTS = (
             "::test_an_exchange_needs_arming_and_the_interlocks_of_an_order",
         ),
     ),
-    Defect(
-        "typed-ahead-reaches-the-screen-below",
-        "tui/terminal/type_ahead.py",
-        "WAIT_LONGEST = 3.0",
-        "WAIT_LONGEST = 0.0",
-        "On a slow computer a letter of a search arms the drive.",
-        ("tests/ui/test_keys.py::test_on_a_slow_computer_too", "tests/ui/test_run_line.py"),
-    ),
 )
