@@ -31,7 +31,7 @@ Step = tuple[str, str]
 """A key as tmux names it, and the words to wait for behind it; none where empty."""
 SETTLED = 0.35
 """Seconds that a question has to stand before its answer counts."""
-SLACK = 0.06
+SLACK = 0.1
 """Seconds between two keys with nothing to wait for: nearer ones count as one piece."""
 
 
@@ -70,7 +70,7 @@ TASKS = (
     ),
     Task(
         "look up a fault and clear it",
-        [("5", "Overbraking"), ARM, ("x", "Reset the fault?"), ("y!", "Fault reset")],
+        [("5", "Overbraking"), ARM, ("x", "Reset the fault?"), ("y!", "is reset.")],
         [("h", "Overbraking"), ("Escape", "State"), ("x", "DONE")],
         lambda drive: drive.provoke("ObF"),
     ),
@@ -100,7 +100,7 @@ TASKS = (
         [("4", "Scanner"), ("Enter", "stands for"), *typed("LCR"), ("Enter", "proposed"),
          ("w", "Write 1"), ("y", "Written and read back")],
     ),
-    Task("who commands it", [("6", "Control source")], [("2", "State"), ("c", "Control source")]),
+    Task("who commands it", [("6", "Commanded by")], [("2", "State"), ("c", "Control source")]),
     Task("the frames on the line", [("7", "Frames")], [("2", "State"), ("l", "Frames")]),
     Task("leave", [("q", "Leave|$"), ("y!", "")], [("q", "Leave|$"), ("y", "")]),
 )  # fmt: skip
