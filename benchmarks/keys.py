@@ -89,8 +89,8 @@ TASKS = (
         [("b", "Back up to"), ("Enter", "parameters")],
     ),
     Task(
-        "compare with the factory settings",
-        [("C-o", "Compare with"), ("Enter!", "factory settings")],
+        "compare with the last backup (before: the factory settings)",
+        [("C-o", "Compare with"), ("Enter!", "differ")],
         [("o", "Compare with"), *typed("factory"), ("Enter", "factory settings")],
     ),
     Task(
