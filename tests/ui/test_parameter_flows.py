@@ -336,10 +336,10 @@ async def test_behind_a_failure_the_rest_is_asked_about(key: str) -> None:
         screen.editor.staging.stage("ACC", "4")
         await made.pilot.press("a", "w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
-        assert "Write 2 parameters?" in question(made)
+        await until(made.pilot, lambda: "Write 2 parameters?" in question(made))
         await made.pilot.press("y")
         await until(made.pilot, lambda: isinstance(made.app.screen, RestQuestion))
-        assert "Write the other parameter all the same?" in question(made)
+        await until(made.pilot, lambda: "Write the other parameter all the same?" in question(made))
         assert made.drive().raw("ACC") == 30
         await made.pilot.press(key)
         await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
