@@ -18,7 +18,7 @@ from tui.session.events import EventLog
 from tui.session.paths import state_folder
 from tui.terminal.driver import with_own_keys
 from tui.terminal.last_words import LastWords
-from tui.terminal.lean import LeanApp
+from tui.terminal.lean_app import LeanApp
 from tui.widgets.palette import THEME
 
 from .screens.hands import Hands
@@ -56,7 +56,7 @@ class DrivePanelApp(LeanApp, LastWords, Hands, Lookout, LineOwner, Places, Leavi
         bell: bool = True,
         on_shown: Callable[[], None] | None = None,
     ) -> None:
-        super().__init__()
+        super().__init__(slow=low_bandwidth)
         self.register_theme(THEME)
         self.theme = THEME.name
         self.clock = clock or Clock()

@@ -18,6 +18,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 
+from tests.answering import read_answering
 from tests.bus.peer import tcp_request_length
 from tests.programs import wait_until
 from tui.simulator import DriveSpec, Simulation
@@ -139,7 +140,7 @@ class PtyPanel:
         """Take what the panel sends; False once it has ended."""
         while select.select([self.terminal], [], [], seconds)[0]:
             try:
-                data = os.read(self.terminal, 65536)
+                data = read_answering(self.terminal)
             except OSError:
                 return False
             self.sent += data

@@ -16,6 +16,7 @@ import pytest
 from rich.text import Text
 from textual.widgets import Input
 
+from tests.answering import read_answering
 from tui.app import DrivePanelApp
 from tui.drive.settings.restore_plan import RestoreItem
 from tui.screens.blocks.pick_parameter import PickParameter
@@ -292,5 +293,5 @@ def read_until(terminal: int, *wanted: bytes) -> bytes:
     while not all(part in seen for part in wanted):
         assert time.monotonic() < end, seen[-2000:]
         if select.select([terminal], [], [], 0.2)[0]:
-            seen += os.read(terminal, 65536)
+            seen += read_answering(terminal)
     return seen

@@ -46,6 +46,10 @@ class Panel(App[None]):
         """What is known of the key that has its effect now; None while there is none."""
 
     @abstractmethod
+    def hurry(self) -> None:
+        """What changes now is for a person who waits for it, or must see it at once."""
+
+    @abstractmethod
     def follow(self, line: str, device: int) -> None:
         """Open the line anew as a drive now wants it, and watch that drive."""
 

@@ -48,6 +48,7 @@ class Hands(Panel):
             return False
         if key == STOP_OUTSIDE_TEXT and takes_space(self.focused) and not left:
             return False
+        self.hurry()
         self._stop(everything=key == STOP_ALL)
         if key == STOP and self._trying_f12:
             self._f12_arrived()
@@ -150,6 +151,7 @@ class Hands(Panel):
         if isinstance(event, Key | Paste) and not event.is_forwarded:
             if not self._typed.admit(event):
                 return
+            self.hurry()
             if isinstance(event, Key):
                 for session in self.fleet.sessions if self.fleet else ():
                     session.arming.touch()
