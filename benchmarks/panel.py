@@ -20,6 +20,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -60,7 +61,8 @@ def word_sign(text: str) -> tuple[object, ...]:
     rows = text.split("\n")
     for y, row in enumerate(rows):
         if title := re.match(r" ?([A-Z]\w+(?: .*)?) ─+ 16#", row):
-            return title[1], *(row[5:13].strip() for row in rows[y + 1 : y + 13])
+            bits = takewhile(re.compile(r" +\d+ [●·] ").match, rows[y + 1 :])
+            return title[1], *(row[5:13].strip() for row in bits)
     return ()
 
 
