@@ -24,7 +24,6 @@ from statistics import median
 from typing import Any
 
 from benchmarks.wire import share
-from tests.answering import Answers
 
 CHUNK = 65536
 SLOW_CHUNK = 100
@@ -183,7 +182,7 @@ class Terminal:
 
     def _read(self, rate: float | None) -> None:
         """Take what the program writes, and note when it had come; ends with the program."""
-        free, answers = 0.0, Answers(self._terminal)
+        free = 0.0
         while True:
             try:
                 data = os.read(self._terminal, CHUNK if rate is None else SLOW_CHUNK)
@@ -192,7 +191,6 @@ class Terminal:
             if rate is not None:
                 free = max(free, time.monotonic()) + len(data) / rate
                 time.sleep(max(0.0, free - time.monotonic()))
-            answers.take(data)
             self._come.put((time.monotonic(), data))
             if not data:
                 return

@@ -8,21 +8,6 @@ from contextlib import suppress
 ASK, ANSWER = b"\x1b[6n", b"\x1b[1;1R"
 
 
-class Answers:
-    """Answers a program's questions in what was read from it, cut anywhere."""
-
-    def __init__(self, terminal: int) -> None:
-        self._terminal = terminal
-        self._tail = b""
-
-    def take(self, data: bytes) -> None:
-        """The terminal shows these bytes now."""
-        seen = self._tail + data
-        self._tail = seen.rpartition(ASK)[2][1 - len(ASK) :]
-        with suppress(OSError):
-            os.write(self._terminal, ANSWER * seen.count(ASK))
-
-
 def read_answering(terminal: int, size: int = 65536) -> bytes:
     """Read what a program writes to a terminal, and answer what it asks; raises OSError.
 
