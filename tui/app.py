@@ -16,9 +16,9 @@ from tui.session.clock import Clock
 from tui.session.connect.open_line import open_line
 from tui.session.events import EventLog
 from tui.session.paths import state_folder
+from tui.terminal.abilities import EVERYTHING, Abilities
 from tui.terminal.driver import with_own_keys
 from tui.terminal.last_words import LastWords
-from tui.terminal.lean_app import LeanApp
 from tui.widgets.palette import THEME
 
 from .screens.hands import Hands
@@ -30,12 +30,13 @@ from .screens.places import Places
 log = logging.getLogger(__name__)
 
 
-class DrivePanelApp(LeanApp, LastWords, Hands, Lookout, LineOwner, Places, Leaving):
+class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, Places, Leaving):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
     `leave_running` motors are not stopped when the panel ends without being asked. With `mouse` the
-    terminal reports its mouse. `on_shown` is called after the first picture.
+    terminal reports its mouse. `abilities` is what the terminal can show. `on_shown` is
+    called after the first picture.
     """
 
     TITLE = "Drive Panel"
@@ -54,9 +55,11 @@ class DrivePanelApp(LeanApp, LastWords, Hands, Lookout, LineOwner, Places, Leavi
         leave_running: bool = False,
         mouse: bool = False,
         bell: bool = True,
+        abilities: Abilities = EVERYTHING,
         on_shown: Callable[[], None] | None = None,
     ) -> None:
-        super().__init__(slow=low_bandwidth)
+        super().__init__()
+        self.fit_terminal(abilities, slow=low_bandwidth)
         self.register_theme(THEME)
         self.theme = THEME.name
         self.clock = clock or Clock()

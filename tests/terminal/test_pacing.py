@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from tui.terminal.pacing import LEAST, LOST_AFTER, MUTE_AFTER, WHOLE, Pacing
+from tui.terminal.pacing import LOST_AFTER, MUTE_AFTER, PIECE_LEAST, WHOLE, Pacing
 
 
 @dataclass
@@ -58,7 +58,7 @@ def test_a_frame_waits_for_the_answer_to_the_one_before() -> None:
 
 def test_what_hurries_follows_a_small_piece_and_no_large_one() -> None:
     pacing = Pacing()
-    pacing.sent(LEAST, 0.0)
+    pacing.sent(PIECE_LEAST, 0.0)
     assert pacing.room(0.1, hurry=True)
     pacing.sent(1, 0.1)
     assert not pacing.room(0.2, hurry=True)
@@ -109,7 +109,7 @@ def test_on_a_slow_link_no_more_than_a_second_is_on_its_way(rate: float) -> None
             link.send(min(room, 4000), now)
         longest = max(longest, link.free - now)
         now += 0.02
-    assert longest < 2 * LEAST / rate + 0.31
+    assert longest < 2 * PIECE_LEAST / rate + 0.31
 
 
 @pytest.mark.parametrize(("rate", "way"), [(2000.0, 0.15), (2000.0, 0.3), (20000.0, 0.05)])

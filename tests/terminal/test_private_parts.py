@@ -197,15 +197,6 @@ def _updates_have_a_beginning_and_an_end() -> bool:
     return asked and "self._begin_update()" in sends and "self._end_update()" in sends
 
 
-def _console_knows_its_colours() -> bool:
-    from rich.color import ColorSystem
-    from rich.console import Console
-
-    known: Any = Console(color_system="256")._color_system
-    none: Any = Console(color_system=None)._color_system
-    return known is ColorSystem.EIGHT_BIT and none is None
-
-
 def _loop_is_there_while_the_app_runs() -> bool:
     from textual.app import App
 
@@ -333,12 +324,6 @@ PARTS = [
         "lean_app.py",
         "LeanApp: how Textual brackets what a terminal is to show at one time",
         _updates_have_a_beginning_and_an_end,
-    ),
-    Part(
-        "rich.console.Console._color_system",
-        "lean_app.py",
-        "LeanApp: how many colours Rich says that the terminal has",
-        _console_knows_its_colours,
     ),
     Part(
         "App._loop",

@@ -39,6 +39,7 @@ from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.reading import Quality, Reading
+from tui.terminal.abilities import EVERYTHING, Abilities
 
 NOW = 1000.0
 CONNECTED = LineState(LineStatus.CONNECTED, "", NOW - 60)
@@ -314,10 +315,12 @@ async def press(pilot: Pilot[None], *keys: str) -> None:
             await pilot.press(key)
 
 
-def app_of(open_line: Callable[..., OpenLine] | None = None) -> DrivePanelApp:
+def app_of(
+    open_line: Callable[..., OpenLine] | None = None, abilities: Abilities = EVERYTHING
+) -> DrivePanelApp:
     """The panel with a clock that stands still."""
 
     def closed(*_: Any, **__: Any) -> OpenLine:
         raise AssertionError("no line is opened in this picture")
 
-    return DrivePanelApp(open_line=open_line or closed, clock=StillClock())
+    return DrivePanelApp(open_line=open_line or closed, clock=StillClock(), abilities=abilities)

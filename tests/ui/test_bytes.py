@@ -40,6 +40,7 @@ class Terminal:
     def __init__(self) -> None:
         self.cells: dict[tuple[int, int], Cell] = {}
         self._x, self._y, self._colour = 0, 0, ""
+        self._pen: dict[str, str] = {}
 
     def feed(self, data: str) -> None:
         at = 0
@@ -50,8 +51,24 @@ class Terminal:
                 row, column = control[1].split(";")
                 self._x, self._y = int(column) - 1, int(row) - 1
             elif control[2] == "m":
-                self._colour = re.sub(r"^0;?", "", control[1])
+                self._set_colour(control[1])
+            elif control[2] == "X":
+                for x in range(self._x, self._x + int(control[1])):
+                    self.cells[self._y, x] = (" ", self._colour)
         self._write(data[at:])
+
+    def _set_colour(self, numbers: str) -> None:
+        """One number after another, as a terminal takes them."""
+        left = numbers.split(";")
+        while left:
+            size = 1
+            if left[0] in ("38", "48"):
+                size = {"2": 5, "5": 3}[left[1]]
+            name = _part(left[0])
+            self._pen = {**self._pen, name: ";".join(left[:size])} if name else {}
+            left = left[size:]
+        order = sorted(self._pen, key=lambda name: (name == "behind", name == "front", name))
+        self._colour = ";".join(self._pen[name] for name in order)
 
     def _write(self, text: str) -> None:
         for character in text:
@@ -75,13 +92,22 @@ class Terminal:
         ]
 
 
+def _part(number: str) -> str:
+    """What a number of a style sets; nothing where it resets all."""
+    if number in ("48", *map(str, (*range(40, 48), *range(100, 108)))):
+        return "behind"
+    if number in ("38", *map(str, (*range(30, 38), *range(90, 98)))):
+        return "front"
+    return "" if number == "0" else number
+
+
 class Seen(App[None]):
     """Two columns of lines; every update goes to a terminal that is looked at."""
 
     def __init__(self) -> None:
         super().__init__()
         self.terminal = Terminal()
-        self.picture = Picture()
+        self.picture = Picture(erases=True)
         self.sent = 0
 
     def compose(self) -> ComposeResult:
@@ -232,7 +258,7 @@ def test_pieces_of_frames_come_to_the_same_picture(
     steps: list[tuple[int, Text, int]],
 ) -> None:
     """However little a frame may have, and whatever changes before the rest of it is sent."""
-    picture, terminal, last = Picture(), Terminal(), {}
+    picture, terminal, last = Picture(erases=True), Terminal(), {}
     for y, text, room in steps:
         last[y] = strip_of(text)
         picture.want([(0, y, last[y])], ColorSystem.TRUECOLOR)

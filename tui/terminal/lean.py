@@ -18,6 +18,8 @@ from textual.strip import Strip
 
 from tui.drive.plain import commands
 
+from .sgr import change, erasable
+
 Cell = tuple[str, str]
 """A character and its colours; none where the one to the left takes two cells."""
 
@@ -27,14 +29,21 @@ Placed = tuple[int, int, Strip]
 CURSOR_MOVE = 8
 """Bytes that moving the cursor takes: cells that stay the same between others are sent again."""
 
+ERASE = 5
+"""Bytes that erasing cells takes."""
+
 LAST_ROWS = 4
 """Rows at the bottom that are drawn before those above them: message, keys, what is typed."""
 
 
 class Picture:
-    """What the terminal is to show, and what it shows as far as the frames so far tell."""
+    """What the terminal is to show, and what it shows as far as the frames so far tell.
 
-    def __init__(self) -> None:
+    With `erases` the terminal erases cells in the colour that is set.
+    """
+
+    def __init__(self, *, erases: bool = False) -> None:
+        self._erases = erases
         self._wanted: dict[int, list[Cell | None]] = {}
         self._shown: dict[int, list[Cell | None]] = {}
         self._changed: dict[int, tuple[int, int]] = {}
@@ -71,7 +80,7 @@ class Picture:
         It ends with the row in which it gets longer than `room` bytes. Rows come in the order in
         which a person needs them: the first, the last ones, then from the top.
         """
-        pen = Pen()
+        pen = Pen(erases=self._erases)
         for y in self._in_order():
             if pen.size > room:
                 break
@@ -160,9 +169,13 @@ def cells_of(strip: Strip, colours: ColorSystem) -> list[Cell]:
 
 
 class Pen:
-    """Writes cells; moves and changes colour only where it has to."""
+    """Writes cells; moves and changes colour only where it has to.
 
-    def __init__(self) -> None:
+    With `erases` the terminal erases cells in the colour that is set.
+    """
+
+    def __init__(self, *, erases: bool = False) -> None:
+        self._erases = erases
         self._parts: list[str] = []
         self._at: tuple[int, int] | None = None
         self._ansi = ""
@@ -173,13 +186,27 @@ class Pen:
         """Write cells from a place on."""
         if self._at != (x, y):
             self._put(f"\x1b[{y + 1};{x + 1}H")
-        for cell in cells:
-            text, ansi = cell or (" ", "")
-            if ansi != self._ansi:
-                self._put(f"\x1b[0;{ansi}m" if ansi else "\x1b[0m")
-                self._ansi = ansi
-            self._put(text)
-        self._at = (x + len(cells), y)
+        place, moved = 0, True
+        while place < len(cells):
+            text, ansi = cells[place] or (" ", "")
+            if not moved:
+                self._put(f"\x1b[{y + 1};{x + place + 1}H")
+            self._put(change(self._ansi, ansi))
+            self._ansi = ansi
+            blank = self._blank(cells, place)
+            self._put(f"\x1b[{blank}X" if blank else text)
+            place, moved = place + (blank or 1), not blank
+        self._at = (x + len(cells), y) if moved else None
+
+    def _blank(self, cells: Sequence[Cell | None], place: int) -> int:
+        """How many cells from here on are erased rather than written."""
+        cell = cells[place]
+        if not self._erases or cell is None or cell[0] != " " or not erasable(cell[1]):
+            return 0
+        end = place
+        while end < len(cells) and cells[end] == cell:
+            end += 1
+        return end - place if end - place > CURSOR_MOVE + ERASE else 0
 
     def _put(self, text: str) -> None:
         self._parts.append(text)

@@ -8,15 +8,20 @@ from __future__ import annotations
 
 import asyncio
 import time
+from collections.abc import Sequence
 
 from rich.color import ColorSystem
 from rich.console import RenderableType
 from rich.control import Control
 from textual.app import App
+from textual.filter import LineFilter, Monochrome
 from textual.screen import Screen
 
+from .abilities import EVERYTHING, UTF_8, Abilities
 from .lean import Picture, strips_of
 from .pacing import ASK, Pacing
+
+SIXTEEN = frozenset({ColorSystem.STANDARD, ColorSystem.WINDOWS})
 
 HURRY_FOR = 0.5
 """Seconds for which what a key brings goes before what comes by itself."""
@@ -25,18 +30,34 @@ HURRY_FOR = 0.5
 class LeanApp(App[None]):
     """Sends the difference between what is to be shown and what is, when the terminal can take it.
 
-    With `slow` the link is taken for slow until it has shown its rate.
+    `fit_terminal` tells before it runs what the terminal and the way to it are like.
     """
 
-    def __init__(self, *, slow: bool = False) -> None:
+    def __init__(self) -> None:
         super().__init__()
-        self._picture = Picture()
-        self._pacing = Pacing(slow=slow)
+        self.fit_terminal(EVERYTHING)
         self._hurries_until = float("-inf")
         self._later: asyncio.TimerHandle | None = None
         self._asked_first = False
         self._begun = False
         """Whether a frame was sent in part."""
+
+    def fit_terminal(self, abilities: Abilities, *, slow: bool = False) -> None:
+        """Use signs and colours that the terminal has.
+
+        With `slow` the link is taken for slow until it has shown its rate.
+        """
+        self._colours = abilities.colours or ColorSystem.STANDARD
+        self.plain_signs = abilities.encoding != UTF_8
+        """Whether the terminal has signs of ASCII only, or few more."""
+        self._instead = filters_for(abilities)
+        self._picture = Picture(erases=abilities.erases)
+        self._pacing = Pacing(slow=slow)
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Textual's own, but for its way to leave colours out, and those of this terminal."""
+        own = [one for one in super().get_line_filters() if not isinstance(one, Monochrome)]
+        return [*own, *self._instead]
 
     def hurry(self) -> None:
         """What changes now is for a person who waits for it, or must see it at once."""
@@ -52,7 +73,7 @@ class LeanApp(App[None]):
         if strips is None or not self._draws:
             super()._display(screen, renderable)
             return
-        self._picture.want(strips, self.console._color_system or ColorSystem.STANDARD)
+        self._picture.want(strips, self._colours)
         self._send()
         self.post_display_hook()
 
@@ -117,3 +138,21 @@ class LeanApp(App[None]):
     def _anew(self) -> None:
         self._pacing.forget()
         self._picture.forget()
+
+
+def filters_for(abilities: Abilities) -> list[LineFilter]:
+    """What makes a picture one that the terminal can show; nothing where it can show everything."""
+    found: list[LineFilter] = []
+    if abilities.encoding != UTF_8:
+        from .plain_signs import PlainSigns
+
+        found.append(PlainSigns(abilities.encoding))
+    if abilities.colours is None:
+        from .few_colours import NoColours
+
+        found.append(NoColours())
+    elif abilities.colours in SIXTEEN:
+        from .few_colours import SixteenColours
+
+        found.append(SixteenColours())
+    return found

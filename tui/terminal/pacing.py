@@ -20,7 +20,7 @@ MUTE_AFTER: Final = 2.0
 LOST_AFTER: Final = 10.0
 """Seconds after which an answer is taken for lost where others came."""
 
-LEAST: Final = 600
+PIECE_LEAST: Final = 600
 """Bytes that a piece of a frame may always have, and that may be on their way before it."""
 
 WHOLE: Final = 1 << 20
@@ -43,7 +43,7 @@ class Pacing:
         self._asked: deque[tuple[float, int]] = deque(maxlen=OWED_MOST)
         self._answers = False
         self._quickest = float("inf")
-        self._piece = LEAST if slow else WHOLE
+        self._piece = PIECE_LEAST if slow else WHOLE
 
     def sent(self, size: int, now: float) -> None:
         """So many bytes went out, and the question behind them."""
@@ -61,7 +61,7 @@ class Pacing:
     def _learn(self, size: int, took: float) -> None:
         """Fit the size of a piece to the time that one took."""
         if took > 2 * PIECE_TIME:
-            self._piece = max(LEAST, int(size * PIECE_TIME / took))
+            self._piece = max(PIECE_LEAST, int(size * PIECE_TIME / took))
         elif took < PIECE_TIME / 2 and size > self._piece / 2:
             self._piece = min(WHOLE, 2 * self._piece)
 
@@ -72,7 +72,7 @@ class Pacing:
         follows a small piece at once.
         """
         on_its_way, mute = self._on_its_way(now), self._is_mute(now)
-        if on_its_way and not (hurry and (mute or sum(on_its_way) <= LEAST)):
+        if on_its_way and not (hurry and (mute or sum(on_its_way) <= PIECE_LEAST)):
             return 0
         return WHOLE if mute else self._piece
 

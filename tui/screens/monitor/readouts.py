@@ -58,7 +58,7 @@ def _readout(view: View, quantity: Quantity, cells: int) -> list[Text]:
     text, unit, style = _shown(view, quantity, parameter)
     unit = short(unit, 4)
     field = min(_field(parameter, quantity), cells - len(unit) - 2)
-    drawn = dashes(field) if text == NOT_AVAILABLE else big(text, field)
+    drawn = dashes(field) if text == NOT_AVAILABLE else big(text, field, plain=view.plain)
     rows = [_heading(view, quantity, parameter, field + 1 + len(unit))]
     for number, part in enumerate(drawn):
         row = Text(no_wrap=True).append(part, style)

@@ -45,6 +45,7 @@ class ViewSource:
             now=now,
             read_only=app.read_only,
             low_bandwidth=app.low_bandwidth,
+            plain=app.plain_signs,
             watch=fleet.line_watch.watch(session.device) if fleet else None,
             heard=session.line.device_state(session.device).heard,
             control=control,
