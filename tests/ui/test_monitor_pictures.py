@@ -166,7 +166,15 @@ def test_monitor(
     )
 
 
-OTHER_SIZES = {"60x20": (60, 20), "200x60": (200, 60), "40x12": (40, 12), "100x30": (100, 30)}
+OTHER_SIZES = {
+    "60x20": (60, 20),
+    "60x16": (60, 16),
+    "200x60": (200, 60),
+    "100x30": (100, 30),
+    "59x24, too small": (59, 24),
+    "40x12, too small": (40, 12),
+    "24x6, too small": (24, 6),
+}
 
 
 @pytest.mark.parametrize("size", OTHER_SIZES)
