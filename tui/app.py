@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from textual.driver import Driver
+from textual.screen import Screen
 
 from tui.drive.plain import plain
 from tui.screens.connection.screen import ConnectionScreen
@@ -95,9 +96,15 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, Places, Leaving):
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
         self.push_screen(self.connection)
+        first: Screen[None] = self.connection
+        if self._start is not None and self._device is not None:
+            from tui.screens.opening import OpeningScreen
+
+            first = OpeningScreen(self._start, self._device)
+            self.push_screen(first)
         self.set_interval(FRAME_LOOK, self.look_around)
         if self._on_shown is not None:
-            self.connection.call_after_refresh(self._on_shown)
+            first.call_after_refresh(self._on_shown)
         if self._start is None:
             self.call_after_refresh(self.try_f12)
         else:

@@ -37,8 +37,12 @@ class Places(Panel):
 
         log.info("watching device %s, %s", console.device, console.session.profile.id)
         self.chosen = console
-        self._to_base()
-        self.push_screen(MonitorScreen(console))
+        while len(self.screen_stack) > 3:
+            self.pop_screen()
+        if len(self.screen_stack) == 3:  # no picture of Line in between
+            self.switch_screen(MonitorScreen(console))
+        else:
+            self.push_screen(MonitorScreen(console))
 
     def _to_base(self) -> None:
         """Back to the list of lines, whatever is above it."""

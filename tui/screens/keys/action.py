@@ -7,7 +7,19 @@ from dataclasses import dataclass
 CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
 BLOCKS, MESSAGES = "scanner", "messages"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS, MESSAGES)
+OPENING = "opening"
+"""Monitor while its drive is not known yet."""
+EVERYWHERE = (
+    CONNECTION,
+    MONITOR,
+    FRAMES,
+    SOURCES,
+    FAULTS,
+    PARAMETERS,
+    BLOCKS,
+    MESSAGES,
+    OPENING,
+)
 
 KEY_NAMES = {
     "escape": "Esc",
