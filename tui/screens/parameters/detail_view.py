@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter
-from tui.drive.settings.selection import not_factory
+from tui.drive.settings.factory import factory_is_sure
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
 from tui.session.settings.editor import Editor
@@ -15,6 +15,7 @@ from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE
 from .value_text import (
     CONFIDENCE_WORDS,
     factory_text,
+    is_changed,
     limits_now,
     old_text,
     range_text,
@@ -159,9 +160,18 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
         return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
     if refused is not None and refused.reason != "read-only":
         return Text(refused.text, FAINT)
-    if not_factory(editor.session.profile, parameter, editor.values.raws[code]):
-        return Text(f"Not the factory value, {factory_text(editor, parameter)}.", FAINT)
+    if is_changed(editor, parameter):
+        return Text(_not_factory_text(editor, parameter), FAINT)
     return Text("")
+
+
+def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
+    """What a changed setting was, and how surely that is known."""
+    said = f"Not the factory value, {factory_text(editor, parameter)}"
+    grounds = parameter.factory_grounds
+    if grounds is None or factory_is_sure(parameter):
+        return f"{said}."
+    return f"{said}: from {CONFIDENCE_WORDS[grounds.confidence]}, unverified."
 
 
 def status_line(editor: Editor, where: str, width: int) -> Text:

@@ -10,12 +10,11 @@ from rich.text import Text
 
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Parameter
-from tui.drive.settings.selection import not_factory
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import cut_at_word, short
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, LINE, PLAIN, STRONG, TITLE
 
-from .value_text import old_text, other_text, range_text, value_text
+from .value_text import is_changed, old_text, other_text, range_text, value_text
 
 LONGEST_NAME = 46
 
@@ -116,7 +115,7 @@ def _row(editor: Editor, parameter: Parameter, columns: Columns) -> Text:
         text.append(f"{short(parameter.number, columns.number - 1):<{columns.number}}", FAINT)
     name = cut_at_word(parameter.name, columns.name - 1)
     text.append(f"{name:<{columns.name}}", PLAIN if parameter.access != "r" else FAINT)
-    changed = not_factory(editor.session.profile, parameter, editor.values.raws.get(code))
+    changed = is_changed(editor, parameter)
     held = short(value_text(editor, code), columns.value)
     text.append(f"{held:>{columns.value}}", _value_style(editor, parameter, changed))
     text.append_text(_staged(editor, code, columns.staged))
