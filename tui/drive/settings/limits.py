@@ -10,7 +10,7 @@ from ..profile.profile import UNVERIFIED, Profile
 from ..profile.schema import Multiple, Parameter
 from ..shown import number_of, shown
 from .edits import Edits
-from .multiple import value_of, formula_of
+from .multiple import formula_of, value_of
 from .writable import is_order
 
 

@@ -22,7 +22,8 @@ def counts_of(
     if raw is None or scale is None:
         return None
     number = number_of(profile, profile[of.parameter], raw, raws, absent)
-    if number is None:
+    # a rated current of 0 tells nothing
+    if number is None or (number == 0 and Decimal(of.plus) == 0):
         return None
     counts = (Decimal(of.times) * number + Decimal(of.plus)) / scale
     return int(counts.to_integral_value(ROUND_FLOOR))
