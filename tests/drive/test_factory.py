@@ -113,7 +113,7 @@ def test_a_limit_of_a_sister_family_says_so() -> None:
     assert "no document of this family tells" in edit_problems(ATV71, edits, held)["ITH"]
     limits = limits_in_force(ATV71, ATV71["ITH"], held)
     assert limits is not None
-    assert limits.text == "0.9 .. 7.2 A (INV) ?"
+    assert limits.text == "0.9 .. 7.2 A ? (INV)"
     own = limits_in_force(ATV31, ATV31["ItH"], {"INV": 48})
     assert own is not None
     assert own.text == "0.9 .. 7.2 A (INV)"

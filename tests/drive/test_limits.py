@@ -25,8 +25,8 @@ HELD = {"TFR": 600, "HSP": 500, "LSP": 0, "INR": 1, "ACC": 30, "BFR": 0, "TTO": 
     ("code", "text"),
     [
         # that they limit each other is known of the sister families
-        ("HSP", "0.0 .. 60.0 Hz (TFR) ?"),
-        ("LSP", "0.0 .. 50.0 Hz (HSP) ?"),
+        ("HSP", "0.0 .. 60.0 Hz ? (TFR)"),
+        ("LSP", "0.0 .. 50.0 Hz ? (HSP)"),
         ("TFR", "50.0 (HSP) .. 1600.0 Hz"),
         ("TTO", "0.1 .. 30.0 s"),
     ],

@@ -70,11 +70,23 @@ def not_factory(
     What the drive sets itself, by auto-tuning, nobody has changed.
     """
     held = raws.get(parameter.code)
-    if held is None or parameter.set_by_drive or not is_setting(profile, parameter):
-        return False
     factory = factory_raw(profile, parameter, raws, absent)
-    if factory is None:
+    if held is None or factory is None or parameter.set_by_drive:
         return False
+    return _differs(profile, parameter, (held, factory), raws, absent) and is_setting(
+        profile, parameter
+    )
+
+
+def _differs(
+    profile: Profile,
+    parameter: Parameter,
+    pair: tuple[int, int],
+    raws: Mapping[str, int],
+    absent: Collection[str],
+) -> bool:
+    """Whether what is held means something else than the factory setting; raw values both."""
+    held, factory = pair
     if parameter.factory_of is not None:
         # the drive may round its own product the other way
         return abs(held - factory) > 1

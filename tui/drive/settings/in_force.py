@@ -35,16 +35,16 @@ class LimitsInForce:
         """From the lowest to the highest, with what sets them."""
         if self.low is None and self.high is None:
             return ""
-        unit, mark = f" {self.unit}" if self.unit else "", "" if self.sure else " ?"
+        # the mark before what sets them: it stays where the end is cut off
+        unit = (f" {self.unit}" if self.unit else "") + ("" if self.sure else " ?")
+        by_low, by_high = (f" ({by})" if by else "" for by in (self.low_by, self.high_by))
         if self.low is None:
-            return f"up to {self.high:f}{unit}{f' ({self.high_by})' if self.high_by else ''}{mark}"
+            return f"up to {self.high:f}{unit}{by_high}"
         if self.high is None:
-            return f"from {self.low:f}{unit}{f' ({self.low_by})' if self.low_by else ''}{mark}"
-        low, high = f"{self.low:f}", f"{self.high:f}"
-        both = self.low_by == self.high_by  # then it stands once, behind both
-        first = f"{low} ({self.low_by})" if self.low_by and not both else low
-        last = f"{high}{unit} ({self.high_by})" if self.high_by else f"{high}{unit}"
-        return f"{first} .. {last}{mark}"
+            return f"from {self.low:f}{unit}{by_low}"
+        # what sets both stands once, behind them
+        first = f"{self.low:f}" if by_low == by_high else f"{self.low:f}{by_low}"
+        return f"{first} .. {self.high:f}{unit}{by_high}"
 
 
 def limits_in_force(

@@ -30,23 +30,28 @@ TALL_FROM = 32
 """Rows of a terminal that has."""
 
 
-def parameter_lines(editor: Editor, code: str, width: int, height: int) -> list[Text]:
-    """What one parameter is, on so many lines, the last for what happened to it."""
+def parameter_lines(
+    editor: Editor, code: str, width: int, height: int, step: str = ""
+) -> list[Text]:
+    """What one parameter is, on so many lines, the last for what happened to it.
+
+    `step` is what a first commissioning does with it, where that is what is looked at.
+    """
     parameter = editor.session.profile[code]
     news = _news(editor, parameter)
     # what warns is told whole, at the cost of help
     most = 3 if height > SHORT else 1 if news.style == PLAIN else 2
     told = wrapped(news.plain, max(20, width - 3), most)
-    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)))
+    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)), step)
     lines += [_limits(editor, parameter, width), _place(editor, parameter, width)]
     lines += [Text(f" {line}", news.style, no_wrap=True) for line in told]
     return [*lines, *([Text("")] * (height - len(lines)))]
 
 
-def _help(editor: Editor, parameter: Parameter, width: int, room: int) -> list[Text]:
+def _help(editor: Editor, parameter: Parameter, width: int, room: int, step: str) -> list[Text]:
     """Code, whole name, what it does; as many lines as there is room for."""
     head = f"{parameter.code}  {parameter.name}"
-    told = _help_parts(editor, parameter)
+    told = [*([step] if step else []), *_help_parts(editor, parameter)]
     words = " ".join(part if part.endswith(".") else f"{part}." for part in told)
     parts = wrapped(f"{head}. {words}" if words else head, max(20, width - 3), room)
     lines = [Text(f" {part}", FAINT, no_wrap=True) for part in parts]

@@ -21,10 +21,11 @@ LONGEST_NAME = 46
 
 @dataclass(frozen=True, slots=True)
 class TableLine:
-    """A line of the table: a parameter, or the heading of a group."""
+    """A line of the table: a parameter, the heading of a group or of a step, or text below it."""
 
     code: str = ""
     group: str = ""
+    text: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,6 +99,8 @@ def row_line(editor: Editor, item: TableLine, width: int, *, chosen: bool) -> Te
         text.append(f" {item.group} ", TITLE)
         text.append("─" * max(0, width - len(item.group) - 3), LINE)
         return text
+    if not item.code:
+        return Text(f"   {item.text}", FAINT, no_wrap=True)
     text = _row(editor, editor.session.profile[item.code], Columns.of(width))
     if chosen:
         text.append(" " * max(0, width - text.cell_len))
