@@ -161,9 +161,10 @@ def check_raw(
     """Raise ValueRefused unless the profile lets the parameter hold this raw value."""
     low, high = raw_range(parameter)
     if not low <= raw <= high and raw not in names:
+        limits = f"{_plain(parameter, low, scale)} to {_plain(parameter, high, scale)}"
         raise ValueRefused(
             f"{parameter.code}: {_plain(parameter, raw, scale)} is out of range, "
-            f"{_plain(parameter, low, scale)} to {_plain(parameter, high, scale)}."
+            f"{limits}{_doubt(parameter)}."
         )
     to_words(parameter, raw)
     if is_enumeration(parameter) and raw not in names:
@@ -178,6 +179,13 @@ def _plain(parameter: Parameter, raw: int, scale: Decimal | None) -> str:
     if scale is None:
         return f"raw {raw}"
     return f"{engineering(raw, scale):f} {parameter.unit}".rstrip()
+
+
+def _doubt(parameter: Parameter) -> str:
+    """That no document of the family tells the limits, where only the row itself is sure."""
+    grounds = parameter.limit_grounds
+    weak = grounds is not None and grounds.confidence in ("analogy", "unverified")
+    return " (limits that no document of this family tells)" if weak else ""
 
 
 def _scale_source(parameter: Parameter) -> str:

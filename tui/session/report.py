@@ -102,7 +102,7 @@ class _Report:
         before: dict[str, str] = {}
         for entry in self.entries:
             before.setdefault(entry.code, entry.old)
-        sides = factory_side(self.profile), side_of("now", self.values)
+        sides = factory_side(self.profile, self.values), side_of("now", self.values)
         rows = [
             (row.code, row.name, row.a, row.b, before.get(row.code, ""))
             for row in compare_settings(self.profile, *sides)
@@ -111,8 +111,8 @@ class _Report:
         return [
             "## Settings changed from the factory",
             "",
-            f"The factory settings of {known} parameters are known. Before: the first old value in"
-            " the journal.",
+            f"The factory settings of {known} parameters are known; ? marks those that no document"
+            " of this family tells. Before: the first old value in the journal.",
             "",
             *_table(("code", "name", "factory", "now", "before"), rows),
         ]

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator
 from ..errors import ProfileError
 from ..values import raw_range, type_range, word_count
 from .decode import source_line
-from .schema import Parameter, ProfileData
+from .schema import Multiple, Parameter, ProfileData
 
 SchemaPath = list[str | int]
 Finding = tuple[SchemaPath, str]
@@ -71,8 +71,9 @@ def _faults_of(parameter: Parameter, sources: set[str], enumerations: set[str]) 
         yield "scale is 0."
     if parameter.enumeration and parameter.enumeration not in enumerations:
         yield f"there is no enumeration {parameter.enumeration!r}."
-    if parameter.source.split()[0].rstrip(",;:") not in sources:
-        yield f"source {parameter.source!r} does not begin with the id of a source."
+    for source in _sources_of(parameter):
+        if source.split()[0].rstrip(",;:") not in sources:
+            yield f"source {source!r} does not begin with the id of a source."
     for raw in parameter.values:
         if not raw.lstrip("-").isdecimal():
             yield f"value {raw!r} is not a raw value in decimal."
@@ -81,6 +82,12 @@ def _faults_of(parameter: Parameter, sources: set[str], enumerations: set[str]) 
         yield "a bit is named twice."
     if parameter.address + word_count(parameter) > 0x10000:
         yield "runs past address 65535."
+
+
+def _sources_of(parameter: Parameter) -> tuple[str, ...]:
+    """What the row, its limits and its factory setting rest on."""
+    grounds = (parameter.limit_grounds, parameter.factory_grounds)
+    return (parameter.source, *(one.source for one in grounds if one is not None))
 
 
 def _enumeration_keys(data: ProfileData) -> Iterator[Finding]:
@@ -139,7 +146,15 @@ def _named_by(parameter: Parameter) -> tuple[str, ...]:
         parameter.rating,
         parameter.scale_by.parameter if parameter.scale_by else "",
         parameter.unit_by.parameter if parameter.unit_by else "",
+        parameter.factory_by.parameter if parameter.factory_by else "",
+        *(of.parameter for of in _multiples(parameter)),
     )
+
+
+def _multiples(parameter: Parameter) -> tuple[Multiple, ...]:
+    """All that is so many times another parameter."""
+    found = (parameter.min_of, parameter.max_of, parameter.factory_of)
+    return tuple(one for one in found if one is not None)
 
 
 def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
@@ -167,6 +182,7 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
             if order is not None
             for code in (order.parameter, order.groups)
         ],
+        "start_up": [code for step in data.start_up for code in step.parameters],
         "control_sources": [s.parameter for c in data.control_sources for s in c.settings],
         "identification": [
             data.identification.model_parameter,
@@ -222,6 +238,37 @@ def _scales(data: ProfileData) -> Iterator[Finding]:
             yield ["parameters", index], f"parameter {parameter.code}: scale_by has no scales."
 
 
+def _factory_settings(data: ProfileData) -> Iterator[Finding]:
+    """Factory settings that follow another parameter, against that one's own factory setting."""
+    factory = {p.code: p.factory for p in data.parameters}
+    for index, parameter in enumerate(data.parameters):
+        by = parameter.factory_by
+        place: SchemaPath = ["parameters", index, "factory_by"]
+        if by is None:
+            continue
+        for raw in by.raws:
+            if not raw.lstrip("-").isdecimal():
+                yield place, f"parameter {parameter.code}: {raw!r} is not a raw value in decimal."
+        if by.raws.get(str(factory.get(by.parameter))) != parameter.factory:
+            yield (
+                place,
+                f"parameter {parameter.code}: factory is not what factory_by gives for the"
+                f" factory setting of {by.parameter}.",
+            )
+
+
+def _start_up(data: ProfileData) -> Iterator[Finding]:
+    seen: dict[str, str] = {}
+    for index, step in enumerate(data.start_up):
+        for code in step.parameters:
+            if code in seen:
+                yield (
+                    ["start_up", index],
+                    f"step {step.step}: {code} stands in step {seen[code]} already.",
+                )
+            seen.setdefault(code, step.step)
+
+
 RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     _unique_codes,
     _unique_quantities,
@@ -232,4 +279,6 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     _functions,
     _fault_help,
     _scales,
+    _factory_settings,
+    _start_up,
 )

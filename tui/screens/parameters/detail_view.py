@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter
-from tui.drive.settings.selection import not_factory
+from tui.drive.settings.factory import factory_is_sure
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
 from tui.session.settings.editor import Editor
@@ -15,6 +15,7 @@ from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE
 from .value_text import (
     CONFIDENCE_WORDS,
     factory_text,
+    is_changed,
     limits_now,
     old_text,
     range_text,
@@ -29,23 +30,28 @@ TALL_FROM = 32
 """Rows of a terminal that has."""
 
 
-def parameter_lines(editor: Editor, code: str, width: int, height: int) -> list[Text]:
-    """What one parameter is, on so many lines, the last for what happened to it."""
+def parameter_lines(
+    editor: Editor, code: str, width: int, height: int, step: str = ""
+) -> list[Text]:
+    """What one parameter is, on so many lines, the last for what happened to it.
+
+    `step` is what a first commissioning does with it, where that is what is looked at.
+    """
     parameter = editor.session.profile[code]
     news = _news(editor, parameter)
     # what warns is told whole, at the cost of help
     most = 3 if height > SHORT else 1 if news.style == PLAIN else 2
     told = wrapped(news.plain, max(20, width - 3), most)
-    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)))
+    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)), step)
     lines += [_limits(editor, parameter, width), _place(editor, parameter, width)]
     lines += [Text(f" {line}", news.style, no_wrap=True) for line in told]
     return [*lines, *([Text("")] * (height - len(lines)))]
 
 
-def _help(editor: Editor, parameter: Parameter, width: int, room: int) -> list[Text]:
+def _help(editor: Editor, parameter: Parameter, width: int, room: int, step: str) -> list[Text]:
     """Code, whole name, what it does; as many lines as there is room for."""
     head = f"{parameter.code}  {parameter.name}"
-    told = _help_parts(editor, parameter)
+    told = [*([step] if step else []), *_help_parts(editor, parameter)]
     words = " ".join(part if part.endswith(".") else f"{part}." for part in told)
     parts = wrapped(f"{head}. {words}" if words else head, max(20, width - 3), room)
     lines = [Text(f" {part}", FAINT, no_wrap=True) for part in parts]
@@ -159,9 +165,18 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
         return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
     if refused is not None and refused.reason != "read-only":
         return Text(refused.text, FAINT)
-    if not_factory(editor.session.profile, parameter, editor.values.raws[code]):
-        return Text(f"Not the factory value, {factory_text(editor, parameter)}.", FAINT)
+    if is_changed(editor, parameter):
+        return Text(_not_factory_text(editor, parameter), FAINT)
     return Text("")
+
+
+def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
+    """What a changed setting was, and how surely that is known."""
+    said = f"Not the factory value, {factory_text(editor, parameter)}"
+    grounds = parameter.factory_grounds
+    if grounds is None or factory_is_sure(parameter):
+        return f"{said}."
+    return f"{said}: from {CONFIDENCE_WORDS[grounds.confidence]}, unverified."
 
 
 def status_line(editor: Editor, where: str, width: int) -> Text:

@@ -78,6 +78,7 @@ class Editor:
             self.marks.favourites,
             self.marks.recent,
             self.other,
+            self.session.image.lacking,
         )
 
     @property

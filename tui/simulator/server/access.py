@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Block, Function, Parameter
+from tui.drive.profile.schema import Block, Function, Multiple, Parameter
+from tui.drive.settings.multiple import counts_of
+from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_enumeration, raw_range, to_words, word_count
 
 from ..registers import Registers
@@ -169,7 +171,16 @@ class DriveWords:
             limit = self._registers.named(code) if code else None
             if limit and (limit.unit, limit.scale) == (parameter.unit, parameter.scale):
                 raw = bound(raw, self._registers.present(limit))
+        for of, bound in ((parameter.min_of, max), (parameter.max_of, min)):
+            if of is not None and (counts := self._counts(parameter, of)) is not None:
+                raw = bound(raw, counts)
         return raw
+
+    def _counts(self, parameter: Parameter, of: Multiple) -> int | None:
+        source = self._profile[of.parameter]
+        codes = [of.parameter, *depends_on(parameter), *depends_on(source)]
+        raws = {code: self._registers.present(self._profile[code]) for code in codes}
+        return counts_of(self._profile, parameter, of, raws)
 
     def _apply(self, address: int, word: int) -> None:
         parameter = self._registers.owner(address)

@@ -15,6 +15,7 @@ from .base import (
     Effective,
     Identifier,
     RawWord,
+    SignedDecimalText,
     Table,
     When,
     WordAddress,
@@ -75,6 +76,9 @@ from .parameter import (
     Access,
     Bit,
     Enumeration,
+    FactoryBy,
+    Grounds,
+    Multiple,
     Parameter,
     Quantity,
     ScaleBy,
@@ -82,6 +86,7 @@ from .parameter import (
     UnitBy,
     WordType,
 )
+from .start_up import StartUpStep
 from .whole import ProfileData
 
 __all__ = [
@@ -106,11 +111,13 @@ __all__ = [
     "Enumeration",
     "Erratum",
     "ExceptionCode",
+    "FactoryBy",
     "FaultCode",
     "FaultHelp",
     "Faults",
     "Function",
     "FurtherServer",
+    "Grounds",
     "Identification",
     "IdentificationObject",
     "Identifier",
@@ -125,6 +132,7 @@ __all__ = [
     "Model",
     "Monitoring",
     "MonitoringValue",
+    "Multiple",
     "OptionChoice",
     "Order",
     "OrderId",
@@ -140,8 +148,10 @@ __all__ = [
     "ReferenceWay",
     "ScaleBy",
     "Setting",
+    "SignedDecimalText",
     "Source",
     "SpeedFormula",
+    "StartUpStep",
     "State",
     "StateKind",
     "StatusBit",

@@ -10,6 +10,7 @@ WordAddress = Annotated[int, Meta(ge=0, le=0xFFFF)]
 RawWord = Annotated[int, Meta(ge=-0x8000, le=0xFFFF)]
 DeviceAddress = Annotated[int, Meta(ge=0, le=255)]
 DecimalText = Annotated[str, Meta(pattern=r"^[0-9]+(\.[0-9]+)?$")]
+SignedDecimalText = Annotated[str, Meta(pattern=r"^-?[0-9]+(\.[0-9]+)?$")]
 Identifier = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")]
 BitNumber = Annotated[int, Meta(ge=0, le=15)]
 

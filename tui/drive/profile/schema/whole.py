@@ -11,6 +11,7 @@ from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkS
 from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter
+from .start_up import StartUpStep
 
 
 class ProfileData(Table, frozen=True, kw_only=True):
@@ -34,6 +35,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     control_sources: list[ControlSource] = []
     communication_fault: CommunicationFault | None = None
     memory: MemoryOrders = MemoryOrders()
+    start_up: list[StartUpStep] = []
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
     enumerations: list[Enumeration] = []
