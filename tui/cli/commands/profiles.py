@@ -32,6 +32,7 @@ def profiles(profile_id: str | None, file: Path | None, as_json: bool) -> None:
 
     if file is not None:
         checked = library.load_file(file)
+        _ = checked.guide.data  # the help of its faults, with what is wrong there
         say(f"{file}: {checked.name}, {len(checked.parameters)} parameters, no fault found.")
     elif profile_id is not None:
         _show(library.load(profile_id), as_json)

@@ -37,6 +37,15 @@ from .chart import (
     Transition,
 )
 from .control_source import ControlSource, Setting, Way
+from .fault_help import (
+    AlarmHelp,
+    FaultHelp,
+    HelpConfidence,
+    HelpData,
+    Hint,
+    LookAt,
+    ResetWay,
+)
 from .identification import (
     Erratum,
     Identification,
@@ -63,9 +72,7 @@ from .memory import MemoryOrder, MemoryOrders
 from .monitoring import (
     CommunicationFault,
     FaultCode,
-    FaultHelp,
     Faults,
-    LookAt,
     Monitoring,
     MonitoringValue,
     Reaction,
@@ -87,6 +94,7 @@ from .whole import ProfileData
 __all__ = [
     "Access",
     "Addresses",
+    "AlarmHelp",
     "Bit",
     "BitNumber",
     "Block",
@@ -111,6 +119,9 @@ __all__ = [
     "Faults",
     "Function",
     "FurtherServer",
+    "HelpConfidence",
+    "HelpData",
+    "Hint",
     "Identification",
     "IdentificationObject",
     "Identifier",
@@ -138,6 +149,7 @@ __all__ = [
     "Reaction",
     "ReadShapes",
     "ReferenceWay",
+    "ResetWay",
     "ScaleBy",
     "Setting",
     "Source",
