@@ -64,6 +64,12 @@ def codes_to_read(profile: Profile, hint: Hint | None) -> list[str]:
     return list(dict.fromkeys([*codes, *([told.parameter] if told else [])]))
 
 
+def alarm_words(profile: Profile) -> list[str]:
+    """Words of the monitoring set that carry alarm bits."""
+    watched = [value.parameter for value in profile.data.monitoring.values]
+    return [code for code in watched if any(bit.alarm for bit in profile[code].bits)]
+
+
 def alarms_on(profile: Profile, raws: Mapping[str, int]) -> list[tuple[str, int, str]]:
     """Alarm bits that are set: word, bit and name."""
     return [

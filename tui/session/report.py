@@ -10,6 +10,7 @@ from pathlib import Path
 from tui.drive.blocks.assignment import slot_target
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
+from tui.drive.hints import hint_markdown, reset_text
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
@@ -183,6 +184,19 @@ class _Report:
             kept = [(one, self.profile[one].name, self.text(one)) for one in stored]
             head = f"What the drive stored with {code}, {self._fault(code)}:"
             lines += ["", head, "", *_table(("code", "name", "value"), kept)]
+        return [*lines, *self._pointed_at(codes)]
+
+    def _pointed_at(self, codes: Sequence[str]) -> list[str]:
+        """What the faults that these words tell point at, each once."""
+        lines: list[str] = []
+        raws = (self.values.raws.get(code) for code in codes)
+        for raw in dict.fromkeys(raw for raw in raws if raw is not None):
+            fault, help_ = self.profile.fault(raw), self.profile.guide.fault(raw)
+            if fault is None or help_ is None:
+                continue
+            reset = reset_text(help_, None, "a fault reset").text
+            told = hint_markdown(self.profile, help_, self.text, reset)
+            lines += ["", f"What {fault.code} {fault.name} points at:", "", *told]
         return lines
 
     def _fault(self, code: str) -> str:

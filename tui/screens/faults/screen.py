@@ -248,9 +248,10 @@ class FaultsScreen(OrderKeys):
             for code in (stored[0] if stored else [])
             if (reading := self._readings.get(code)) is not None
         ]
+        values = {c: f"{r.text} {r.unit}".rstrip() for c, r in self._readings.items()}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(record_text(self.session, record, rows), encoding="utf-8")
+            path.write_text(record_text(self.session, record, rows, values), encoding="utf-8")
         except OSError as error:
             self.app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
         else:
