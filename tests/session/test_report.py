@@ -34,6 +34,7 @@ async def test_every_family_has_its_report(family: str) -> None:
     assert text.startswith(f"# {made.profile.name} at serial:")
     for setting in made.profile.data.link.settings:
         assert f"| {setting.parameter} |" in text
+    assert ("- Model by its own code: ATV21H" in text) is (family == "atv21")
     tables = [line.count(" | ") for line in text.splitlines() if line.startswith("| ")]
     assert tables
 

@@ -11,6 +11,7 @@ from tui.drive.blocks.assignment import slot_target
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
 from tui.drive.hints import hint_markdown, reset_text
+from tui.drive.model import model_told
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
@@ -81,6 +82,8 @@ class _Report:
         """What the drive is, and when and where it was read."""
         head = self.values.head
         known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
+        model = model_told(self.profile, self.values.raws)
+        known += [f"- Model by its own code: {_cell(model)}"] if model else []
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
             "",

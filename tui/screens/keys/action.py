@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
-BLOCKS, MESSAGES = "scanner", "messages"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS, MESSAGES)
+BLOCKS, MESSAGES, WIRING = "scanner", "messages", "wiring"
+EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS, MESSAGES, WIRING)
 
 KEY_NAMES = {
     "escape": "Esc",

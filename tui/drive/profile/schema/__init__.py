@@ -90,6 +90,7 @@ from .parameter import (
     WordType,
 )
 from .whole import ProfileData
+from .wiring import FamilyWarning, Lamp, Opening, SignalName, Wiring
 
 __all__ = [
     "Access",
@@ -114,6 +115,7 @@ __all__ = [
     "Enumeration",
     "Erratum",
     "ExceptionCode",
+    "FamilyWarning",
     "FaultCode",
     "FaultHelp",
     "Faults",
@@ -126,6 +128,7 @@ __all__ = [
     "IdentificationObject",
     "Identifier",
     "Interlock",
+    "Lamp",
     "LineRule",
     "LinkChoice",
     "LinkSetting",
@@ -136,6 +139,7 @@ __all__ = [
     "Model",
     "Monitoring",
     "MonitoringValue",
+    "Opening",
     "OptionChoice",
     "Order",
     "OrderId",
@@ -152,6 +156,7 @@ __all__ = [
     "ResetWay",
     "ScaleBy",
     "Setting",
+    "SignalName",
     "Source",
     "SpeedFormula",
     "State",
@@ -163,6 +168,7 @@ __all__ = [
     "UnitBy",
     "Way",
     "When",
+    "Wiring",
     "WordAddress",
     "WordType",
 ]

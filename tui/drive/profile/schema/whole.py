@@ -11,6 +11,7 @@ from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkS
 from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter
+from .wiring import Wiring
 
 
 class ProfileData(Table, frozen=True, kw_only=True):
@@ -36,5 +37,6 @@ class ProfileData(Table, frozen=True, kw_only=True):
     memory: MemoryOrders = MemoryOrders()
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
+    wiring: Wiring = Wiring()
     enumerations: list[Enumeration] = []
     parameters: list[Parameter]
