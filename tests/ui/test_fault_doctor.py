@@ -7,6 +7,7 @@ from dataclasses import replace
 import pytest
 
 from tests.ui.fakes import NOW, readings_of
+from tui.drive.hints import reset_text
 from tui.drive.profile import library
 from tui.screens.faults.doctor import doctor_lines
 from tui.screens.faults.doctor_view import DoctorView
@@ -60,6 +61,19 @@ def test_the_drive_says_whether_a_reset_works() -> None:
         for code, reading in readings_of(ATV71, {"ETI": 4}, NOW).items()
     }
     assert "x does nothing" in told(view(9, readings=old))
+
+
+@pytest.mark.parametrize(("width", "height"), [(60, 16), (40, 12), (80, 20), (60, 8)])
+@pytest.mark.parametrize("raw", [9, 18, 22])
+def test_how_it_ends_is_never_cut_off(raw: int, width: int, height: int) -> None:
+    for eti in (None, 0, 4):
+        readings = {} if eti is None else readings_of(ATV71, {"ETI": eti}, NOW)
+        shown = view(raw, readings=readings)
+        text = told(shown, width, height)
+        whole = reset_text(shown.help, shown.ready, "x").text
+        ends = " ".join(text.partition("Reset")[2].partition("History")[0].split())
+        assert whole in ends.replace(" practice", ""), text
+        assert len(text.splitlines()) <= height
 
 
 def test_an_alarm_points_at_something_too() -> None:

@@ -53,8 +53,9 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
         _checks(view, width),
         _reset(view, width),
     ]
-    parts = [part for part in parts if part]
     least = min(3, max(1, _told(view)))
+    _shorten(parts, sum(map(len, parts)) + least - height)
+    parts = [part for part in parts if part]
     spare = height - sum(len(part) for part in parts) - max(least, _told(view))
     lines: list[Text] = [Text("")] if spare > len(parts) else []
     spare -= len(lines)
@@ -65,6 +66,17 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
             spare -= 1
     lines = lines[: max(1, height - least)]
     return lines + _history(view, width, height - len(lines))
+
+
+def _shorten(parts: list[list[Text]], lines: int) -> None:
+    """Take so many lines away where room is short: checks, then causes, then parameters.
+
+    How the fault ends stays: it says what may start the motor.
+    """
+    for part in (parts[3], parts[1], parts[2]):
+        away = max(0, min(lines, len(part) - 1))
+        del part[len(part) - away :]
+        lines -= away
 
 
 def _told(view: DoctorView) -> int:
@@ -128,6 +140,12 @@ def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
     ]
 
 
+def _told_in(texts: Sequence[str], width: int) -> list[Text]:
+    """A text a line, the first with room behind it for how surely it is known."""
+    rooms = [max(10, width - LABEL - (TRUST_WIDTH if not n else 1)) for n in range(len(texts))]
+    return [Text(cut(text, room), PLAIN) for text, room in zip(texts, rooms, strict=True)]
+
+
 def _probable(view: DoctorView, width: int) -> list[Text]:
     fault, help_ = view.fault, view.hint
     room = max(10, width - LABEL - TRUST_WIDTH)
@@ -137,7 +155,7 @@ def _probable(view: DoctorView, width: int) -> list[Text]:
         cause = fault.cause if fault else ""
         cause = cause or view.profile.guide.trouble or "The manual in hand gives no cause."
         return _labelled("Probably", [Text(part, PLAIN) for part in wrapped(cause, room, 3)])
-    lines = [Text(cut(cause, room), PLAIN) for cause in help_.probable]
+    lines = _told_in(help_.probable, width)
     lines[0].append(f" {TRUST_MARKS[help_.confidence]:>8}", FAINT)
     if isinstance(help_, FaultHelp) and help_.name:
         lines.insert(0, Text(cut(help_.name, width - LABEL), PLAIN))
@@ -178,7 +196,7 @@ def _checks(view: DoctorView, width: int) -> list[Text]:
     fault, help_ = view.fault, view.hint
     room = max(10, width - LABEL - TRUST_WIDTH)
     if help_ is not None and help_.check:
-        lines = [Text(cut(check, room), PLAIN) for check in help_.check]
+        lines = _told_in(help_.check, width)
         if help_.confidence != "practice":  # checks are practice whatever the cause rests on
             lines[0].append(f" {TRUST_MARKS['practice']:>8}", FAINT)
         return _labelled("Check", lines)
@@ -192,11 +210,12 @@ def _reset(view: DoctorView, width: int) -> list[Text]:
         return []
     said = reset_text(view.help, view.ready, "x")
     room = max(10, width - LABEL - TRUST_WIDTH)
-    line = Text(cut(said.text, room), PLAIN)
-    if line.plain.startswith("x "):
-        line.stylize(KEY, 0, 1)
-    line.append("" if said.told_by_drive else f" {TRUST_MARKS['practice']:>8}", FAINT)
-    return _labelled("Reset", [line])
+    # in as many lines as it takes: what may start the motor is never cut off
+    lines = [Text(cut(part, room), PLAIN) for part in wrapped(said.text, room, 4)]
+    if lines[0].plain.startswith("x "):
+        lines[0].stylize(KEY, 0, 1)
+    lines[0].append("" if said.told_by_drive else f" {TRUST_MARKS['practice']:>8}", FAINT)
+    return _labelled("Reset", lines)
 
 
 def _history(view: DoctorView, width: int, height: int) -> list[Text]:
