@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import AsyncIterator
 from contextlib import asynccontextmanager
+from pathlib import Path
 
 import pytest
 
@@ -12,6 +13,9 @@ from tui.cli.commands.status import Status, status_json, status_of_drive, status
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession
+
+from ..drive.test_fault_help import own_drive
+from .commands import refused, run
 
 
 @asynccontextmanager
@@ -121,3 +125,11 @@ async def test_nothing_is_read_or_told_where_there_is_no_fault(family: str) -> N
     assert status.finding is None
     assert status_json("demo", status)["fault"] is None
     assert "probably" not in text_of(status)
+
+
+def test_a_profile_is_checked_with_its_help(tmp_path: Path) -> None:
+    profile = own_drive(tmp_path, '[[faults]]\nraw = 900\nprobable = ["A jam"]\n')
+    said = refused(2, "profiles", "--check", profile)
+    assert "help/mine.toml:1: help of fault 900: there is no such fault." in said
+    own_drive(tmp_path, '[[faults]]\nraw = 9\nprobable = ["A jam"]\n')
+    assert "no fault found" in run(0, "profiles", "--check", profile)

@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.drive.plain import plain
+
 from ..shared.errors import told
 from ..shared.options import json_option
 from ..shared.say import say
@@ -82,7 +84,7 @@ def _show_wiring(profile: Profile, as_json: bool) -> None:
         told = [msgspec.to_builtins(section) for section in sections]
         print_json({"id": profile.id, "name": profile.name, "sections": told})
         return
-    say(f"{profile.vendor} {profile.name}")
+    say(plain(f"{profile.vendor} {profile.name}"))
     for line in page_lines(sections, min(100, get_terminal_size().columns)):
         say(f"{line.head}{line.text}".rstrip())
 
