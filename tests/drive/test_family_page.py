@@ -147,8 +147,9 @@ def test_control_characters_of_a_profile_are_not_sent_to_the_terminal() -> None:
     data = library.load("atv71").data
     bad = msgspec.structs.replace(data.wiring.warnings[0], text="a\x1b[2Jb")
     wiring = msgspec.structs.replace(data.wiring, warnings=[bad])
-    profile = Profile(msgspec.structs.replace(data, wiring=wiring))
-    assert all("\x1b" not in line.text for line in page_lines(family_page(profile), 80))
+    pins = msgspec.structs.replace(data.connectors[0], name="a\x1b[2Jb")
+    profile = Profile(msgspec.structs.replace(data, wiring=wiring, connectors=[pins]))
+    assert all("\x1b" not in line.head + line.text for line in page_lines(family_page(profile), 80))
 
 
 # Models

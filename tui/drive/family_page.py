@@ -83,7 +83,7 @@ def page_lines(sections: Sequence[PageSection], width: int) -> list[PageLine]:
     for section in sections:
         if lines:
             lines.append(PageLine("gap", ""))
-        lines.append(PageLine("title", section.title))
+        lines.append(PageLine("title", plain(section.title)))
         for row in section.rows:
             lines += _flowed(row, width)
     return lines

@@ -9,6 +9,7 @@ from rich.style import Style
 from rich.text import Text
 
 from tui.drive.hints import reset_text
+from tui.drive.plain import plain
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import FaultHelp, Quantity
 from tui.drive.values import NOT_AVAILABLE
@@ -96,7 +97,7 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
             text.append(f" ■ FAULT, {unknown} ", FAULT_BLOCK)
             text.append(f"   {_tripped(view)}", PLAIN)
         elif view.alarm is not None:
-            text.append(f" ▲ {view.alarm[2].upper()} ", ALARM_BLOCK)
+            text.append(f" ▲ {plain(view.alarm[2]).upper()} ", ALARM_BLOCK)
             text.append("   alarm, no fault", PLAIN)
             more = len(view.alarms) - 1
             text.append(f"   and {more} more" if more else "", PLAIN)

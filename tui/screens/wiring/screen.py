@@ -9,6 +9,7 @@ from textual.app import ComposeResult
 from tui.bus.errors import LineError
 from tui.drive.family_page import PageLine, family_page, page_lines
 from tui.drive.model import model_codes, model_told
+from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
 from tui.widgets.drawing import rule
@@ -67,7 +68,8 @@ class WiringScreen(PanelScreen):
         self._top = max(0, min(self._top, len(self._page) - room))
         named = f"{self._profile.vendor} {self._profile.name}"
         here = f"{self._top + 1} to {min(len(self._page), self._top + room)} of {len(self._page)}"
-        self.put("title", [rule(f"{named}: {self._model}" if self._model else named, width, here)])
+        title = plain(f"{named}: {self._model}" if self._model else named)
+        self.put("title", [rule(title, width, here)])
         self.put("page", wiring_lines(self._page[self._top : self._top + room]))
 
     def _room(self) -> int:
