@@ -6,10 +6,11 @@ from collections.abc import Callable, Iterator
 
 from ..errors import ProfileError
 from ..values import raw_range, type_range, word_count
-from .decode import SchemaPath, source_line
+from .decode import source_line
 from .help_file import help_findings
 from .schema import HelpData, Parameter, ProfileData
 
+SchemaPath = list[str | int]
 Finding = tuple[SchemaPath, str]
 
 

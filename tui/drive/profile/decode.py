@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 import tomli
@@ -25,24 +25,14 @@ _IN_WORDS: tuple[tuple[re.Pattern[str], str], ...] = (
 _STEP = re.compile(r"\.([^.\[\]]+)|\[(\d+|\.\.\.)\]")
 
 
-T = TypeVar("T")
-SchemaPath = list[str | int]
-"""A place in a file: keys and indices from its top."""
-
-
 def decode_profile(text: str, file: str) -> ProfileData:
     """The data of a profile's text; raises ProfileError with file, line, place and fault."""
-    return decode_tables(text, file, ProfileData)
-
-
-def decode_tables(text: str, file: str, form: type[T]) -> T:
-    """The data of a TOML text in a form; raises ProfileError with file, line, place and fault."""
     try:
         tables = tomli.loads(text)
     except tomli.TOMLDecodeError as error:
         raise ProfileError(f"{file}: not valid TOML: {error}.") from error
     try:
-        return msgspec.convert(tables, form)
+        return msgspec.convert(tables, ProfileData)
     except msgspec.ValidationError as error:
         raise ProfileError(_describe(str(error), tables, text, file)) from error
 

@@ -6,14 +6,20 @@ picture of a drive waits for none of it.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import msgspec
+import tomli
+
 from ..errors import ProfileError
-from .decode import SchemaPath, decode_tables, source_line
 from .schema import AlarmHelp, FaultHelp, HelpData, Hint, ProfileData
 
 FOLDER = "help"
+HelpPlace = tuple[str, int]
+"""A row of a help file: the table, and which of it."""
+_PLACE = re.compile(r" - at `\$(?:\.(\w+)\[(\d+)\])?.*`$")
 
 
 def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
@@ -29,12 +35,12 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
     if found is None:
         return HelpData(faults=list(data.faults.help))
     text = _text(found)
-    told = decode_tables(text, str(found), HelpData)
+    told = _decoded(text, found)
     findings = list(help_findings(data, told))
     if findings and found.parent.parent == folders[0]:
-        lines = [f"{found}:{source_line(text, place)}: {fault}" for place, fault in findings]
+        lines = [f"{found}:{_line(text, place)}: {fault}" for place, fault in findings]
         raise ProfileError("\n".join(lines))
-    wrong = {(place[0], place[1]) for place, _ in findings}
+    wrong = {place for place, _ in findings}
     own = {one.raw for one in data.faults.help}
     faults = [
         one
@@ -54,7 +60,25 @@ def _text(path: Path) -> str:
         raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
 
 
-def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[SchemaPath, str]]:
+def _decoded(text: str, path: Path) -> HelpData:
+    """The data of a help file; raises ProfileError with file, line and fault."""
+    try:
+        return msgspec.convert(tomli.loads(text), HelpData)
+    except tomli.TOMLDecodeError as error:
+        raise ProfileError(f"{path}: not valid TOML: {error}.") from error
+    except msgspec.ValidationError as error:
+        place = _PLACE.search(str(error))
+        line = _line(text, (place[1], int(place[2]))) if place and place[1] else 1
+        raise ProfileError(f"{path}:{line}: {error}.") from error
+
+
+def _line(text: str, place: HelpPlace) -> int:
+    """The line, from 1, at which a row begins; 1 where it is not found."""
+    heads = list(re.finditer(rf"^\[\[{re.escape(place[0])}\]\]", text, re.MULTILINE))
+    return text.count("\n", 0, heads[place[1]].start()) + 1 if place[1] < len(heads) else 1
+
+
+def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
     """Places of a help file that do not fit the profile, each with what is wrong."""
     codes = {parameter.code for parameter in data.parameters}
     for place, label, hint in _hints(told):
@@ -65,12 +89,12 @@ def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[SchemaPat
     yield from _alarms(data, told)
 
 
-def _hints(told: HelpData) -> Iterator[tuple[SchemaPath, str, Hint]]:
+def _hints(told: HelpData) -> Iterator[tuple[HelpPlace, str, Hint]]:
     """Everything a help file tells, with its place and its name."""
     for index, fault in enumerate(told.faults):
-        yield ["faults", index], _label(fault), fault
+        yield ("faults", index), _label(fault), fault
     for index, alarm in enumerate(told.alarms):
-        yield ["alarms", index], _label(alarm), alarm
+        yield ("alarms", index), _label(alarm), alarm
 
 
 def _label(hint: FaultHelp | AlarmHelp) -> str:
@@ -79,11 +103,11 @@ def _label(hint: FaultHelp | AlarmHelp) -> str:
     return f"help of fault {hint.raw} {hint.code}".rstrip()
 
 
-def _faults(data: ProfileData, told: HelpData) -> Iterator[tuple[SchemaPath, str]]:
+def _faults(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
     known = {fault.raw: fault.code for fault in data.faults.codes}
     seen: set[int | None] = set()
     for index, fault in enumerate(told.faults):
-        place: SchemaPath = ["faults", index]
+        place: HelpPlace = ("faults", index)
         if fault.raw in seen:
             yield place, f"{_label(fault)}: there are two."
         seen.add(fault.raw)
@@ -96,11 +120,11 @@ def _faults(data: ProfileData, told: HelpData) -> Iterator[tuple[SchemaPath, str
             yield place, f"{_label(fault)}: the profile calls it {code}."
 
 
-def _alarms(data: ProfileData, told: HelpData) -> Iterator[tuple[SchemaPath, str]]:
+def _alarms(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
     bits = {p.code: {bit.bit for bit in p.bits} for p in data.parameters}
     seen: set[tuple[str, int]] = set()
     for index, alarm in enumerate(told.alarms):
-        place: SchemaPath = ["alarms", index]
+        place: HelpPlace = ("alarms", index)
         if (alarm.word, alarm.bit) in seen:
             yield place, f"{_label(alarm)}: there are two."
         seen.add((alarm.word, alarm.bit))

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import Confidence, RawWord, Table
+from .base import Confidence, Identifier, RawWord, Table
 from .chart import StatusBit
 from .fault_help import FaultHelp
 
@@ -63,7 +63,7 @@ class Faults(Table, frozen=True, kw_only=True):
     codes: list[FaultCode] = []
     help: list[FaultHelp] = []
     """What faults point at; a file of the folder `help` says it where a family has many."""
-    help_file: str = ""
+    help_file: Identifier | None = None
     """Name of that file, without .toml, where it is not the profile's id."""
     reset_ready: StatusBit | None = None
     """The bit by which the drive tells that a reset can work now."""
