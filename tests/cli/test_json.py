@@ -81,7 +81,7 @@ def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
 
 def test_identify() -> None:
     who = told("identify", *LINE)
-    assert set(who) == {"device", "vendor", "reference", "version", "name", "profile"}
+    assert set(who) == {"device", "vendor", "reference", "version", "name", "profile", "model"}
     assert (who["device"], who["profile"]) == (2, "atv71")
     assert who["reference"].startswith("ATV71")
 

@@ -124,6 +124,8 @@ def test_where_a_key_has_a_meaning() -> None:
 
 
 KEY_OF = {name: key for name, key, _ in PLACES}
+OVER = {"messages": "m", "wiring": "I"}
+"""Screens that are none of the seven places, and their keys."""
 
 
 @pytest.mark.parametrize("screen", KEY_OF)
@@ -252,7 +254,7 @@ async def back_to(made: Bench, screen: str) -> None:
         await made.pilot.press("1")
         app.connection.drives.focus()
     elif screen != "monitor":
-        await made.pilot.press(KEY_OF.get(screen, "m"))
+        await made.pilot.press({**KEY_OF, **OVER}[screen])
     await until(made.pilot, lambda: app.place == screen)
 
 

@@ -10,6 +10,8 @@ from pathlib import Path
 from tui.drive.blocks.assignment import slot_target
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
+from tui.drive.hints import hint_markdown, reset_text
+from tui.drive.model import model_told
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
@@ -80,6 +82,8 @@ class _Report:
         """What the drive is, and when and where it was read."""
         head = self.values.head
         known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
+        model = model_told(self.profile, self.values.raws)
+        known += [f"- Model by its own code: {_cell(model)}"] if model else []
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
             "",
@@ -183,6 +187,19 @@ class _Report:
             kept = [(one, self.profile[one].name, self.text(one)) for one in stored]
             head = f"What the drive stored with {code}, {self._fault(code)}:"
             lines += ["", head, "", *_table(("code", "name", "value"), kept)]
+        return [*lines, *self._pointed_at(codes)]
+
+    def _pointed_at(self, codes: Sequence[str]) -> list[str]:
+        """What the faults that these words tell point at, each once."""
+        lines: list[str] = []
+        raws = (self.values.raws.get(code) for code in codes)
+        for raw in dict.fromkeys(raw for raw in raws if raw is not None):
+            fault, help_ = self.profile.fault(raw), self.profile.guide.fault(raw)
+            if fault is None or help_ is None:
+                continue
+            reset = reset_text(help_, None, "a fault reset").text
+            told = hint_markdown(self.profile, help_, self.text, reset)
+            lines += ["", f"What {fault.code} {fault.name} points at:", "", *told]
         return lines
 
     def _fault(self, code: str) -> str:

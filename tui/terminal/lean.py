@@ -32,8 +32,9 @@ CURSOR_MOVE = 8
 ERASE = 5
 """Bytes that erasing cells takes."""
 
-LAST_ROWS = 4
-"""Rows at the bottom that are drawn before those above them: message, keys, what is typed."""
+FIRST_ROWS, LAST_ROWS = 2, 2
+"""Rows at the top and at the bottom that are drawn first: what the motor does and where the keys
+lead, message and keys."""
 
 
 class Picture:
@@ -78,7 +79,7 @@ class Picture:
         """What goes to the terminal, which shows it from then on.
 
         It ends with the row in which it gets longer than `room` bytes. Rows come in the order in
-        which a person needs them: the first, the last ones, then from the top.
+        which a person needs them: the first ones, the last ones, then from the top.
         """
         pen = Pen(erases=self._erases)
         for y in self._in_order():
@@ -89,7 +90,7 @@ class Picture:
 
     def _in_order(self) -> list[int]:
         bottom = max(self._wanted, default=0) - LAST_ROWS
-        return sorted(self._changed, key=lambda y: (y > 0 and y <= bottom, y))
+        return sorted(self._changed, key=lambda y: (FIRST_ROWS <= y <= bottom, y))
 
     def _draw(self, pen: Pen, y: int) -> None:
         """Write what differs in a row."""

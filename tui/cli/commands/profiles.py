@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.drive.plain import plain
+
 from ..shared.errors import told
 from ..shared.options import json_option
 from ..shared.say import say
@@ -24,15 +26,26 @@ if TYPE_CHECKING:
     metavar="FILE",
     help="Check a profile file of your own.",
 )
+@click.option(
+    "--wiring",
+    is_flag=True,
+    help="Of the profile: warnings, waiting time, pins, rules of the line, addresses, lamps,"
+    " command words, and where the manuals are wrong.",
+)
 @json_option
 @told
-def profiles(profile_id: str | None, file: Path | None, as_json: bool) -> None:
+def profiles(profile_id: str | None, file: Path | None, wiring: bool, as_json: bool) -> None:
     """List the profiles, show one, or check a file."""
+    if wiring and profile_id is None:
+        raise click.UsageError("--wiring is of one profile: name its ID.")
     from tui.drive.profile import library
 
     if file is not None:
         checked = library.load_file(file)
+        _ = checked.guide.data  # the help of its faults, with what is wrong there
         say(f"{file}: {checked.name}, {len(checked.parameters)} parameters, no fault found.")
+    elif profile_id is not None and wiring:
+        _show_wiring(library.load(profile_id), as_json)
     elif profile_id is not None:
         _show(library.load(profile_id), as_json)
     else:
@@ -55,6 +68,25 @@ def _list(as_json: bool) -> None:
             f"{listing.id:<12} {listing.vendor:<20} {listing.name:<22}"
             f" {listing.parameters:>4} parameters{own}"
         )
+
+
+def _show_wiring(profile: Profile, as_json: bool) -> None:
+    from shutil import get_terminal_size
+
+    from tui.drive.family_page import family_page, page_lines
+
+    from ..shared.output import print_json
+
+    sections = family_page(profile)
+    if as_json:
+        import msgspec
+
+        told = [msgspec.to_builtins(section) for section in sections]
+        print_json({"id": profile.id, "name": profile.name, "sections": told})
+        return
+    say(plain(f"{profile.vendor} {profile.name}"))
+    for line in page_lines(sections, min(100, get_terminal_size().columns)):
+        say(f"{line.head}{line.text}".rstrip())
 
 
 def _show(profile: Profile, as_json: bool) -> None:

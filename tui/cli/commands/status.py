@@ -11,6 +11,7 @@ import click
 from tui.drive.plain import plain
 
 from ..shared.errors import told
+from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
 from ..shared.options import (
     Target,
     connect_drive,
@@ -54,6 +55,8 @@ class Status:
     refused: str
     """Why a run order from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
+    finding: FaultFinding | None = None
+    """What its fault or its alarm points at; None where it has neither."""
 
 
 def shown_codes(profile: Profile) -> list[str]:
@@ -97,20 +100,23 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     try:
         readings = await console.read(_codes(profile))
         watch = await watch_of(fleet, console)
+        state = drive_state(profile, readings)
+        finding = await find_out(console, state, readings)
     finally:
         fleet.forget()
-    state = drive_state(profile, readings)
     channels = _channels(profile, readings, state)
-    return Status(session, state, readings, channels, _refused(session), watch)
+    return Status(session, state, readings, channels, _refused(session), watch, finding)
 
 
 def _codes(profile: Profile) -> list[str]:
     from tui.drive.chart import watched_codes
+    from tui.drive.hints import alarm_words
     from tui.drive.orders import deciding_codes, interlock_codes
 
     channels = [profile.quantity(quantity) for quantity in CHANNEL_NAMES]
     codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
     codes += [parameter.code for parameter in channels if parameter is not None]
+    codes += alarm_words(profile)
     codes += deciding_codes(profile)
     for chart in profile.data.charts:
         codes += interlock_codes(chart)
@@ -148,14 +154,13 @@ def _refused(session: DriveSession) -> str:
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
     """The object that `status --json` prints."""
     state, watch = status.state, status.watch
-    fault = state.fault
     return {
         "line": line_text,
         "device": status.session.device,
         "profile": status.session.profile.id,
         "state": {"id": state.id, "name": state.name, "kind": state.kind},
         "direction": state.direction,
-        "fault": {"raw": fault.raw, "code": fault.code, "name": fault.name} if fault else None,
+        "fault": fault_json(state, status.finding),
         "alarms": [bit.name for bit in state.alarms],
         "commanded_by": status.channels["Commanded by"] or None,
         "reference_from": status.channels["Reference from"] or None,
@@ -193,12 +198,16 @@ def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, 
 def status_table(status: Status) -> list[tuple[str, str]]:
     """Titles and texts of `status` for a person."""
     state, profile = status.state, status.session.profile
+    found = fault_rows(status.finding)
+    of_alarm = status.finding is not None and bool(status.finding.alarm)
     return [
         ("Device", f"{status.session.device}, {profile.name}"),
         ("State", f"{state.headline} ({state.name})"),
         ("Direction", state.direction or ""),
         ("Fault", fault_text(state) or "none"),
+        *([] if of_alarm else found),
         ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
+        *(found if of_alarm else []),
         *status.channels.items(),
         ("From here", status.refused or "orders can have an effect"),
         ("Line watch", _watch_text(status)),

@@ -7,7 +7,8 @@ from collections.abc import Callable, Iterator
 from ..errors import ProfileError
 from ..values import raw_range, type_range, word_count
 from .decode import source_line
-from .schema import Multiple, Parameter, ProfileData
+from .help_file import help_findings
+from .schema import HelpData, Multiple, Parameter, ProfileData
 
 SchemaPath = list[str | int]
 Finding = tuple[SchemaPath, str]
@@ -172,7 +173,7 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
             data.faults.parameter,
             *data.faults.history,
             *(code for stored in data.faults.stored for code in stored),
-            *(look.code for one in data.faults.help for look in one.look_at),
+            data.faults.reset_ready.parameter if data.faults.reset_ready else "",
         ],
         "link": [setting.parameter for setting in data.link.settings],
         "communication_fault": [watch.timeout, watch.reaction] if watch else [],
@@ -223,13 +224,9 @@ def _functions(data: ProfileData) -> Iterator[Finding]:
 
 
 def _fault_help(data: ProfileData) -> Iterator[Finding]:
-    known = {fault.raw for fault in data.faults.codes}
-    helped = [one.raw for one in data.faults.help]
-    for index, raw in enumerate(helped):
-        if raw not in known:
-            yield ["faults", "help", index], f"help: there is no fault {raw}."
-        if raw in helped[:index]:
-            yield ["faults", "help", index], f"help: fault {raw} has two."
+    rows = data.faults.help
+    for place, fault in help_findings(data, HelpData(faults=rows)) if rows else ():
+        yield ["faults", "help", place[1]], fault
 
 
 def _scales(data: ProfileData) -> Iterator[Finding]:

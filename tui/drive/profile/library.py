@@ -15,6 +15,7 @@ from pathlib import Path
 
 from ..errors import ProfileError, UnknownProfile
 from .profile import Profile
+from .schema import HelpData
 
 _HEAD_KEY = re.compile(r'^(id|name|vendor|version|summary)\s*=\s*"((?:[^"\\]|\\.)*)"', re.MULTILINE)
 _NEXT_TABLE = re.compile(r"^\[(?!profile\])", re.MULTILINE)
@@ -121,7 +122,13 @@ def load_file(path: Path) -> Profile:
         raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
     data = decode_profile(text, str(path))
     check(data, str(path), text)
-    return Profile(data)
+
+    def read_help() -> HelpData:
+        from .help_file import read_help
+
+        return read_help(data, (path.resolve().parent, packaged_folder()))
+
+    return Profile(data, read_help)
 
 
 def matching_profiles(reference: str) -> list[str]:

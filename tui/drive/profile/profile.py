@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from functools import cached_property
 
 from ..errors import UnknownParameter
-from .schema import Chart, FaultCode, FaultHelp, Function, Parameter, ProfileData, Quantity
+from .guide import FaultGuide
+from .schema import Chart, FaultCode, Function, HelpData, Parameter, ProfileData, Quantity
 
 _HEX = re.compile(r"^(?:16#|0x)([0-9a-f]+)$", re.IGNORECASE)
 _WORD = re.compile(r"^w ?([0-9 ]+)$", re.IGNORECASE)
@@ -25,8 +26,9 @@ def is_verified(parameter: Parameter) -> bool:
 class Profile:
     """A drive family's description, with the look-ups that the rest of the panel needs."""
 
-    def __init__(self, data: ProfileData) -> None:
+    def __init__(self, data: ProfileData, read_help: Callable[[], HelpData] | None = None) -> None:
         self.data = data
+        self.guide = FaultGuide(data, read_help)
         self.parameters = tuple(data.parameters)
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)
@@ -84,14 +86,6 @@ class Profile:
     def fault(self, raw: int) -> FaultCode | None:
         """The fault a raw fault code stands for, or None if the profile does not know it."""
         return self._faults.get(raw)
-
-    @cached_property
-    def _help(self) -> Mapping[int, FaultHelp]:
-        return {one.raw: one for one in self.data.faults.help}
-
-    def fault_help(self, raw: int) -> FaultHelp | None:
-        """What a fault points at, by its raw code; None where nothing is known."""
-        return self._help.get(raw)
 
     @cached_property
     def groups(self) -> tuple[str, ...]:

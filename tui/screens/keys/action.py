@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
-BLOCKS, MESSAGES = "scanner", "messages"
+BLOCKS, MESSAGES, WIRING = "scanner", "messages", "wiring"
 OPENING = "opening"
 """Monitor while its drive is not known yet."""
 EVERYWHERE = (
@@ -18,6 +18,7 @@ EVERYWHERE = (
     PARAMETERS,
     BLOCKS,
     MESSAGES,
+    WIRING,
     OPENING,
 )
 

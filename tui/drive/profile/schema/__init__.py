@@ -38,6 +38,15 @@ from .chart import (
     Transition,
 )
 from .control_source import ControlSource, Setting, Way
+from .fault_help import (
+    AlarmHelp,
+    FaultHelp,
+    HelpConfidence,
+    HelpData,
+    Hint,
+    LookAt,
+    ResetWay,
+)
 from .identification import (
     Erratum,
     Identification,
@@ -64,9 +73,7 @@ from .memory import MemoryOrder, MemoryOrders
 from .monitoring import (
     CommunicationFault,
     FaultCode,
-    FaultHelp,
     Faults,
-    LookAt,
     Monitoring,
     MonitoringValue,
     Reaction,
@@ -88,10 +95,12 @@ from .parameter import (
 )
 from .start_up import StartUpStep
 from .whole import ProfileData
+from .wiring import FamilyWarning, Lamp, Opening, SignalName, Wiring
 
 __all__ = [
     "Access",
     "Addresses",
+    "AlarmHelp",
     "Bit",
     "BitNumber",
     "Block",
@@ -112,16 +121,21 @@ __all__ = [
     "Erratum",
     "ExceptionCode",
     "FactoryBy",
+    "FamilyWarning",
     "FaultCode",
     "FaultHelp",
     "Faults",
     "Function",
     "FurtherServer",
     "Grounds",
+    "HelpConfidence",
+    "HelpData",
+    "Hint",
     "Identification",
     "IdentificationObject",
     "Identifier",
     "Interlock",
+    "Lamp",
     "LineRule",
     "LinkChoice",
     "LinkSetting",
@@ -133,6 +147,7 @@ __all__ = [
     "Monitoring",
     "MonitoringValue",
     "Multiple",
+    "Opening",
     "OptionChoice",
     "Order",
     "OrderId",
@@ -146,8 +161,10 @@ __all__ = [
     "Reaction",
     "ReadShapes",
     "ReferenceWay",
+    "ResetWay",
     "ScaleBy",
     "Setting",
+    "SignalName",
     "SignedDecimalText",
     "Source",
     "SpeedFormula",
@@ -161,6 +178,7 @@ __all__ = [
     "UnitBy",
     "Way",
     "When",
+    "Wiring",
     "WordAddress",
     "WordType",
 ]

@@ -12,6 +12,7 @@ from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter
 from .start_up import StartUpStep
+from .wiring import Wiring
 
 
 class ProfileData(Table, frozen=True, kw_only=True):
@@ -38,5 +39,6 @@ class ProfileData(Table, frozen=True, kw_only=True):
     start_up: list[StartUpStep] = []
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
+    wiring: Wiring = Wiring()
     enumerations: list[Enumeration] = []
     parameters: list[Parameter]
