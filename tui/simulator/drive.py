@@ -11,12 +11,10 @@ from random import Random
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
-from tui.drive.values import type_range
 
 from .body import ActiveFault, Body
 from .charts.altivar21 import EMERGENCY_FAULT, Altivar21Chart
 from .charts.families import CHARTS
-from .errors import SimulatorError
 from .plant.fault_history import FaultHistory, fault_raw
 from .plant.first_values import first_values
 from .plant.load import Load, Wanderer
@@ -24,8 +22,9 @@ from .plant.memory import SettingsMemory
 from .plant.models import model_words
 from .plant.monitoring import show_motor
 from .plant.motor import MotorDemand, MotorState, Stop, rating_of, step
+from .plant.terminals import BY_KIND, COMPACT, Terminals
 from .plant.watch import Consequence, SilenceWatch
-from .registers import Registers
+from .registers import Registers, typed_raw
 from .rules import traits_of
 from .server.access import DriveWords
 from .server.answering import Answering
@@ -67,6 +66,7 @@ class SimulatedDrive:
             traits,
             self.registers,
             rating,
+            terminals=Terminals(COMPACT if traits.access_levels else BY_KIND[traits.kind]),
             motor=MotorState(run_hours=hours, on_hours=1.6 * hours, energy=hours * rating.power),
         )
         self._chart = CHARTS[traits.kind](self._body)
@@ -107,7 +107,7 @@ class SimulatedDrive:
             if not self.registers.named(code) and self.line_side.put_card_word(code, raw):
                 return
             parameter = self.profile.find(code)
-            self.registers.settle(parameter, _typed(parameter, raw))
+            self.registers.settle(parameter, typed_raw(parameter, raw))
             if parameter.access == "r":
                 self.registers.hold(parameter)
 
@@ -127,6 +127,7 @@ class SimulatedDrive:
             body.line_orders.forget()
             body.saving = 0.0
             body.fallback = None
+            body.earlier_hz = None
             if body.fault is not None and not body.fault.persists:
                 body.fault = None
             self.server.counters.reset()
@@ -135,7 +136,6 @@ class SimulatedDrive:
             self._chart.power_up()
             if body.fault is not None:
                 self._chart.trip(Stop.FREEWHEEL)
-            body.terminal_hz = None
             body.motor = replace(body.motor, mains=self._mains())
             if self.spec.run_hz and body.fault is None:
                 self.run(self.spec.run_hz, wander=self.spec.wander)
@@ -164,24 +164,44 @@ class SimulatedDrive:
         return self._body.fault
 
     def run(self, hz: float, *, wander: bool = False) -> None:
-        """Run the motor as if an order came from the terminals, at a reference in Hz.
+        """Run the motor at a reference in Hz without anything that is sent from now on.
 
-        With `wander` the reference changes now and then. The line takes over with its next
-        command where the drive's channels let it.
+        Its run input is closed where the terminals command; where the line does, it runs as
+        another master left it. With `wander` the reference changes now and then, until the line
+        gives one.
         """
         with self._lock:
             if self._body.fault is None:
-                self._body.terminal_hz = hz
                 self._wanderer.begin(hz if wander else None)
-                self._chart.terminal_order()
+                self._chart.run(hz)
                 self._refresh()
 
     def halt(self) -> None:
-        """End the run order at the terminals."""
+        """Open the run inputs, and end what another master left."""
         with self._lock:
-            self._body.terminal_hz = None
+            self._chart.halt()
             self._wanderer.begin(None)
             self._refresh()
+
+    def set_input(self, name: str, text: str) -> str:
+        """Set an input by name, to what a person types: `1`, `0`, `5V`, `12mA`, `50%`.
+
+        Returns what it is now. It stays so, through trips, resets and power-downs. Raises
+        SimulatorError for an input that the drive does not have, or a value that it cannot take.
+        """
+        with self._lock:
+            told = self._body.terminals.set(name, text)
+            self._wanderer.begin(None)
+            if self._body.powered:
+                self._chart.follow()
+                self._refresh()
+            return told
+
+    @property
+    def inputs(self) -> str:
+        """All inputs as they are, in a line for a person."""
+        with self._lock:
+            return self._body.terminals.told()
 
     def provoke(self, fault: str | int, *, persists: bool = False) -> None:
         """Trip the drive with a fault given by code or raw value.
@@ -211,7 +231,6 @@ class SimulatedDrive:
         if body.fault is not None:
             return
         self._history.enter(raw, persists=persists)
-        body.terminal_hz = None
         self._wanderer.begin(None)
         self._chart.trip(stop)
 
@@ -227,8 +246,9 @@ class SimulatedDrive:
             body.saving = max(0.0, body.saving - dt)
             if consequence := self._watch.step(dt):
                 self._suffer(consequence)
-            if (hz := self._wanderer.step(dt)) is not None and body.terminal_hz is not None:
-                body.terminal_hz = hz
+            if (hz := self._wanderer.step(dt)) is not None:
+                self._chart.refer(hz)
+            self._chart.follow()
             self._load.step(dt)
             if isinstance(self._chart, Altivar21Chart) and self._chart.emergency:
                 self._trip(EMERGENCY_FAULT, self._watch.consequence().trip or Stop.FREEWHEEL)
@@ -281,14 +301,3 @@ class SimulatedDrive:
         self._memory.written(parameter)
         self._chart.written(parameter)
         self._refresh()
-
-
-def _typed(parameter: Parameter, raw: int) -> int:
-    """A raw value as the parameter's type has it, whether given signed or as a word."""
-    low, high = type_range(parameter)
-    span = high - low + 1
-    if not -span // 2 <= raw < span:
-        raise SimulatorError(f"{parameter.code}: {raw} does not fit {parameter.type}.")
-    if raw > high:
-        return raw - span
-    return raw + span if raw < low else raw

@@ -8,6 +8,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import from_words, to_words, type_range, word_count
 
+from .errors import SimulatorError
+
 UNKEPT_QUANTITIES = frozenset(
     {
         "command_word",
@@ -116,6 +118,11 @@ class Registers:
         self._words.update(self._saved)
         self._in_force.update(self._saved)
 
+    def restore_volatile(self) -> None:
+        """Give the words that live in memory only what they have at power-up."""
+        for address in self._volatile - self._own:
+            self._words[address] = self._in_force[address] = self._saved[address]
+
     def recall(self, keep: frozenset[str]) -> None:
         """Take the saved words as the present ones, except those whose code is kept."""
         for address, word in self._saved.items():
@@ -148,6 +155,20 @@ def is_volatile(parameter: Parameter) -> bool:
         or parameter.access == "w"
         or parameter.quantity in UNKEPT_QUANTITIES
     )
+
+
+def typed_raw(parameter: Parameter, raw: int) -> int:
+    """A raw value as the parameter's type has it, whether given signed or as a word.
+
+    Raises SimulatorError where it does not fit.
+    """
+    low, high = type_range(parameter)
+    span = high - low + 1
+    if not -span // 2 <= raw < span:
+        raise SimulatorError(f"{parameter.code}: {raw} does not fit {parameter.type}.")
+    if raw > high:
+        return raw - span
+    return raw + span if raw < low else raw
 
 
 def _addresses(parameter: Parameter) -> range:

@@ -12,7 +12,7 @@ from typing import Literal
 
 from tui.drive.profile.profile import Profile
 
-ChartKind = Literal["drivecom", "altivar21", "leroy-somer"]
+ChartKind = Literal["drivecom", "altivar21", "leroy-somer", "own"]
 
 MODBUS_REFERENCE = 164
 MODBUS_COMMAND = 10
@@ -59,11 +59,13 @@ class Traits:
     """Status bit 9 tells only that no forced local is on (ATV31/312)."""
     max_hz_high_resolution: float | None = None
     """Frequency of 32767 with CMI bit 9 set; None: the maximum frequency TFR (ATV71)."""
+    limits: Mapping[str, str] = field(default_factory=dict)
+    """Words that the drive itself limits by another, in the same counts, by their codes."""
     first_values: Mapping[str, int] = field(default_factory=dict)
     """Settings of a simulated drive that was commissioned for the line, by code."""
 
 
-_LINE_CONTROL = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND, "CHCF": 1}
+_LINE_CONTROL = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND, "CHCF": 1, "TCT": 0}
 
 _COMPACT = Traits(
     "drivecom",
@@ -88,7 +90,12 @@ TRAITS: Mapping[str, Traits] = {
     ),
     "atv31": _COMPACT,
     "atv312": _COMPACT,
-    "atv21": Traits("altivar21", ALTIVAR_21),
+    "atv21": Traits(
+        "altivar21",
+        ALTIVAR_21,
+        limits={"FA01": "FH"},
+        first_values={"FH": 8000, "F111": 2, "F112": 6, "F113": 10, "F130": 4},
+    ),
     "powerdrive": Traits("leroy-somer", SILENT),
     "proxidrive": Traits("leroy-somer", SILENT),
     "varmeca": Traits("leroy-somer", SILENT),

@@ -36,6 +36,7 @@ class DriveWords:
     ) -> None:
         self._profile = profile
         self._refusals = traits.refusals
+        self._limits = traits.limits
         self._limits_follow = traits.limits_follow
         self._registers = registers
         self._blocked = blocked
@@ -169,7 +170,8 @@ class DriveWords:
             limit = self._registers.named(code) if code else None
             if limit and (limit.unit, limit.scale) == (parameter.unit, parameter.scale):
                 raw = bound(raw, self._registers.present(limit))
-        return raw
+        own = self._registers.named(self._limits.get(parameter.code, ""))
+        return raw if own is None else min(raw, self._registers.in_force(own))
 
     def _apply(self, address: int, word: int) -> None:
         parameter = self._registers.owner(address)
