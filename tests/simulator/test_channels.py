@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from tui.simulator.charts.channels import Place, channels_in_force, switch_is_on
+from tui.simulator.charts.channels import ChannelPlace, channels_in_force, switch_is_on
 
 from .exchange import Exchange
 
@@ -326,4 +326,7 @@ def test_what_an_assignment_means(raw: int, closed: tuple[str, ...], word: int, 
 
 def test_channels_of_a_drive_without_any_setting_are_those_of_the_terminals() -> None:
     channels = channels_in_force(lambda code, default: default, lambda raw: raw in (97, 99))
-    assert (channels.command, channels.reference) == (Place.TERMINALS, Place.TERMINALS)
+    assert (channels.command, channels.reference) == (
+        ChannelPlace.TERMINALS,
+        ChannelPlace.TERMINALS,
+    )

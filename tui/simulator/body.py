@@ -9,7 +9,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 
 from .plant.motor import MotorState, RatingPlate, Stop
-from .plant.terminals import PLAIN, Terminals
+from .plant.terminals import PLAIN_TERMINALS, Terminals
 from .registers import Registers
 from .rules import Traits
 
@@ -74,7 +74,7 @@ class Body:
     motor: MotorState = field(default_factory=MotorState)
     powered: bool = True
     """Whether the drive's supply is on; without it the drive is silent."""
-    terminals: Terminals = field(default_factory=lambda: Terminals(PLAIN))
+    terminals: Terminals = field(default_factory=lambda: Terminals(PLAIN_TERMINALS))
     """Its inputs; no trip, reset or power-down changes them."""
     earlier_hz: float | None = None
     """Reference in Hz that another master gave before the line wrote one; None: none."""

@@ -13,9 +13,9 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 
 from .body import ActiveFault, Body
-from .charts.altivar21 import EMERGENCY_FAULT, Altivar21Chart
+from .charts.altivar21 import Altivar21Chart
 from .charts.families import CHARTS
-from .plant.fault_history import FaultHistory, fault_raw
+from .plant.fault_history import fault_raw
 from .plant.first_values import first_values
 from .plant.load import Load, Wanderer
 from .plant.memory import SettingsMemory
@@ -23,7 +23,7 @@ from .plant.models import model_words
 from .plant.monitoring import show_motor
 from .plant.motor import MotorDemand, MotorState, Stop, rating_of, step
 from .plant.terminals import BY_KIND, COMPACT, Terminals
-from .plant.watch import Consequence, SilenceWatch
+from .plant.watch import SilenceWatch
 from .registers import Registers, typed_raw
 from .rules import traits_of
 from .server.access import DriveWords
@@ -31,6 +31,7 @@ from .server.answering import Answering
 from .server.functions import Server, identity_of
 from .server.station import Station
 from .spec import DriveSpec, LineTiming
+from .tripping import Tripping
 
 WATCH_STARTERS = frozenset({"command_word", "command_frequency", "command_speed"})
 """Orders that start the watch where it needs one."""
@@ -69,9 +70,10 @@ class SimulatedDrive:
             terminals=Terminals(COMPACT if traits.access_levels else BY_KIND[traits.kind]),
             motor=MotorState(run_hours=hours, on_hours=1.6 * hours, energy=hours * rating.power),
         )
+        self.terminals = self._body.terminals
         self._chart = CHARTS[traits.kind](self._body)
         self._watch = SilenceWatch(self._body)
-        self._history = FaultHistory(self._body)
+        self._tripping = Tripping(self._body, self._chart, self._watch)
         self._memory = SettingsMemory(self._body)
         self._load = Load(random)
         self._wanderer = Wanderer(random)
@@ -197,12 +199,6 @@ class SimulatedDrive:
                 self._refresh()
             return told
 
-    @property
-    def inputs(self) -> str:
-        """All inputs as they are, in a line for a person."""
-        with self._lock:
-            return self._body.terminals.told()
-
     def provoke(self, fault: str | int, *, persists: bool = False) -> None:
         """Trip the drive with a fault given by code or raw value.
 
@@ -210,7 +206,8 @@ class SimulatedDrive:
         SimulatorError for a code that the profile does not know.
         """
         with self._lock:
-            self._trip(fault_raw(self.profile, fault), Stop.FREEWHEEL, persists)
+            raw = fault_raw(self.profile, fault)
+            self._tripping.trip(raw, Stop.FREEWHEEL, persists=persists)
             self._refresh()
 
     def clear_cause(self) -> None:
@@ -226,14 +223,6 @@ class SimulatedDrive:
             self._body.alarms = word
             self._refresh()
 
-    def _trip(self, raw: int, stop: Stop, persists: bool = False) -> None:
-        body = self._body
-        if body.fault is not None:
-            return
-        self._history.enter(raw, persists=persists)
-        self._wanderer.begin(None)
-        self._chart.trip(stop)
-
     # Time
 
     def step(self, dt: float) -> None:
@@ -244,14 +233,11 @@ class SimulatedDrive:
                 body.motor = step(body.motor, body.rating, MotorDemand(), 0.0, 0.0, dt)
                 return
             body.saving = max(0.0, body.saving - dt)
-            if consequence := self._watch.step(dt):
-                self._suffer(consequence)
             if (hz := self._wanderer.step(dt)) is not None:
                 self._chart.refer(hz)
             self._chart.follow()
             self._load.step(dt)
-            if isinstance(self._chart, Altivar21Chart) and self._chart.emergency:
-                self._trip(EMERGENCY_FAULT, self._watch.consequence().trip or Stop.FREEWHEEL)
+            self._tripping.step(dt)
             order = self._chart.order()
             load = self._load.torque
             body.motor = step(body.motor, body.rating, order, load, self._mains(), dt)
@@ -262,22 +248,18 @@ class SimulatedDrive:
     def _mains(self) -> float:
         return self._body.rating.voltage * self._load.mains
 
-    def _suffer(self, consequence: Consequence) -> None:
-        if consequence.trip is not None:
-            self._trip(self._watch.fault or 0, consequence.trip)
-        else:
-            self._body.fallback = consequence.fallback
-
     def _refresh(self) -> None:
         """Bring motor and shown words up to date without letting time pass."""
         body = self._body
+        if body.powered:
+            self._tripping.look()
         order = self._chart.order()
         mains = self._mains() if body.powered else 0.0
         body.motor = step(body.motor, body.rating, order, self._load.torque, mains, 0.0)
         self._show()
 
     def _show(self) -> None:
-        self._history.show()
+        self._tripping.show()
         self._chart.show()
         frozen = self._body.traits.kind == "altivar21" and self._body.fault is not None
         if not frozen:

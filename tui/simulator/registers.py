@@ -113,15 +113,11 @@ class Registers:
             if address not in self._volatile and address not in self._own:
                 self._saved[address] = word
 
-    def restore(self) -> None:
-        """Take the saved words as the present ones, as at power-up."""
-        self._words.update(self._saved)
-        self._in_force.update(self._saved)
-
-    def restore_volatile(self) -> None:
-        """Give the words that live in memory only what they have at power-up."""
-        for address in self._volatile - self._own:
-            self._words[address] = self._in_force[address] = self._saved[address]
+    def restore(self, *, volatile_only: bool = False) -> None:
+        """Take the saved words as the present ones, as at power-up; or only those not kept."""
+        saved = {a: w for a, w in self._saved.items() if a in self._volatile or not volatile_only}
+        self._words.update(saved)
+        self._in_force.update(saved)
 
     def recall(self, keep: frozenset[str]) -> None:
         """Take the saved words as the present ones, except those whose code is kept."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from tui.drive.profile.schema import Parameter, Quantity
 
 from ..body import Body, Fallback
+from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
 from .altivar21_inputs import FORCED_LOCAL, PRESET_INPUT, SECOND_REFERENCE, Altivar21Inputs
 from .altivar21_words import outputs, show_altivar21_words
@@ -103,10 +104,9 @@ class Altivar21Chart:
         if rising & RESET and self._sources().command:
             self.reset_fault()
 
-    @property
-    def emergency(self) -> bool:
-        """Whether an emergency stop was ordered that has not tripped the drive yet."""
-        return self._latched and self._body.fault is None
+    def raises(self) -> OwnFault | None:
+        """The fault of an emergency stop, which F603 makes stop as a silent line does."""
+        return OwnFault(EMERGENCY_FAULT, None) if self._latched else None
 
     @property
     def _word(self) -> int:
@@ -136,7 +136,7 @@ class Altivar21Chart:
         fault = self._body.fault
         if fault is not None and not fault.persists:
             self._body.fault = None
-            self._body.registers.restore_volatile()
+            self._body.registers.restore(volatile_only=True)
             self._body.line_orders.forget()
             self._last = 0
             self._latched = False

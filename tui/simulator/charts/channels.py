@@ -19,7 +19,7 @@ AI_1, FACTORY_COMMAND_2 = 1, 10
 COPIES_REFERENCE, COPIES_COMMAND = (1, 3), (2, 3)
 
 
-class Place(Enum):
+class ChannelPlace(Enum):
     """Where a command or a reference comes from; the value is its bit in CCC and CRC."""
 
     TERMINALS = 0
@@ -34,29 +34,34 @@ class Place(Enum):
     @property
     def network(self) -> bool:
         """Whether it is a network, Modbus or another."""
-        return self in (Place.LINE, Place.CANOPEN, Place.CARD, Place.INSIDE)
+        return self in (
+            ChannelPlace.LINE,
+            ChannelPlace.CANOPEN,
+            ChannelPlace.CARD,
+            ChannelPlace.INSIDE,
+        )
 
 
-REFERENCES: Mapping[int, Place] = {
-    **dict.fromkeys((1, 2, 3, 4, 160, 181, 182), Place.TERMINALS),
-    **dict.fromkeys((16, 161), Place.KEYPAD),
-    163: Place.DISPLAY,
-    164: Place.LINE,
-    167: Place.CANOPEN,
-    169: Place.CARD,
-    170: Place.INSIDE,
+REFERENCE_PLACES: Mapping[int, ChannelPlace] = {
+    **dict.fromkeys((1, 2, 3, 4, 160, 181, 182), ChannelPlace.TERMINALS),
+    **dict.fromkeys((16, 161), ChannelPlace.KEYPAD),
+    163: ChannelPlace.DISPLAY,
+    164: ChannelPlace.LINE,
+    167: ChannelPlace.CANOPEN,
+    169: ChannelPlace.CARD,
+    170: ChannelPlace.INSIDE,
 }
-COMMANDS: Mapping[int, Place] = {
-    1: Place.TERMINALS,
-    2: Place.KEYPAD,
-    3: Place.DISPLAY,
-    10: Place.LINE,
-    20: Place.CANOPEN,
-    30: Place.CARD,
-    31: Place.INSIDE,
+COMMAND_PLACES: Mapping[int, ChannelPlace] = {
+    1: ChannelPlace.TERMINALS,
+    2: ChannelPlace.KEYPAD,
+    3: ChannelPlace.DISPLAY,
+    10: ChannelPlace.LINE,
+    20: ChannelPlace.CANOPEN,
+    30: ChannelPlace.CARD,
+    31: ChannelPlace.INSIDE,
 }
 
-Setting = Callable[[str, int], int]
+ReadSetting = Callable[[str, int], int]
 Active = Callable[[int], bool]
 
 
@@ -64,8 +69,8 @@ Active = Callable[[int], bool]
 class Channels:
     """The channels in force."""
 
-    command: Place
-    reference: Place
+    command: ChannelPlace
+    reference: ChannelPlace
     input: int = AI_1
     """Raw value of the reference channel: 1 for AI1, 2 for AI2 and so on."""
     command_2: bool = False
@@ -87,7 +92,7 @@ def switch_is_on(raw: int, closed: Callable[[str], bool], word: int) -> bool:
     return False
 
 
-def channels_in_force(setting: Setting, active: Active) -> Channels:
+def channels_in_force(setting: ReadSetting, active: Active) -> Channels:
     """The channels that the settings give, with the switches as they are now."""
     second = active(setting("RFC", 96))
     first_b = not second and setting("FR1B", 0) != 0 and active(setting("RCB", 96))
@@ -95,33 +100,35 @@ def channels_in_force(setting: Setting, active: Active) -> Channels:
     raw = setting("FR2", 0) if second else setting("FR1B", 0) if first_b else own
     if setting("CHCF", 1) < SEPARATE:
         command_2 = second
-        command = REFERENCES.get(raw if second else own, Place.NOWHERE)
+        command = REFERENCE_PLACES.get(raw if second else own, ChannelPlace.NOWHERE)
     else:
         command_2 = active(setting("CCS", 98))
         given = setting("CD2", FACTORY_COMMAND_2) if command_2 else setting("CD1", 1)
-        command = COMMANDS.get(given, Place.NOWHERE)
-    reference = REFERENCES.get(raw, Place.NOWHERE)
+        command = COMMAND_PLACES.get(given, ChannelPlace.NOWHERE)
+    reference = REFERENCE_PLACES.get(raw, ChannelPlace.NOWHERE)
     forced = setting("FLO", 0)
     if forced and active(forced):
         raw = setting("FLOC", AI_1)
-        reference = REFERENCES.get(raw, Place.NOWHERE)
-        command = Place.DISPLAY if reference is Place.DISPLAY else Place.TERMINALS
+        reference = REFERENCE_PLACES.get(raw, ChannelPlace.NOWHERE)
+        command = (
+            ChannelPlace.DISPLAY if reference is ChannelPlace.DISPLAY else ChannelPlace.TERMINALS
+        )
         return Channels(command, reference, raw, command_2, second, first_b, local=True)
     return Channels(command, reference, raw, command_2, second, first_b)
 
 
-def channel_bit(place: Place) -> int:
+def channel_bit(place: ChannelPlace) -> int:
     """A place as CCC and CRC show it; the keypad has no bit of its own."""
-    return 1 << place.value if place not in (Place.NOWHERE, Place.KEYPAD) else 0
+    return 1 << place.value if place not in (ChannelPlace.NOWHERE, ChannelPlace.KEYPAD) else 0
 
 
-def extended_status_bits(place: Place) -> tuple[bool, bool]:
+def extended_status_bits(place: ChannelPlace) -> tuple[bool, bool]:
     """Bits 13 and 14 of ETI: who commands."""
-    if place in (Place.TERMINALS, Place.KEYPAD, Place.NOWHERE):
+    if place in (ChannelPlace.TERMINALS, ChannelPlace.KEYPAD, ChannelPlace.NOWHERE):
         return False, False
-    if place is Place.DISPLAY:
+    if place is ChannelPlace.DISPLAY:
         return True, False
-    return place is not Place.LINE, True
+    return place is not ChannelPlace.LINE, True
 
 
 def channel_marks(channels: Channels, *, second_ramp: bool) -> tuple[int, int]:

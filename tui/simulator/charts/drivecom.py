@@ -11,14 +11,15 @@ from dataclasses import replace
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
+from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
-from .channels import COPIES_COMMAND, COPIES_REFERENCE, Channels, Place
+from .channels import COPIES_COMMAND, COPIES_REFERENCE, ChannelPlace, Channels
 from .drivecom_channels import DrivecomChannels
 from .drivecom_machine import DrivecomMachine
 from .drivecom_reference import DrivecomReference
 from .drivecom_states import DrivecomCommand, DrivecomState, command_of
 from .drivecom_status import Appearance, show_drivecom
-from .drivecom_stops import commanded_stop, extended_command, locked, stop_type
+from .drivecom_stops import commanded_stop, extended_command, external_fault, locked, stop_type
 from .io_profile import io_status
 from .line_command import LineCommand
 from .wiring import Wiring
@@ -54,7 +55,7 @@ class DrivecomChart:
 
     def run(self, hz: float) -> None:
         """Run by the inputs where they command, else as another master ordered before."""
-        if self._channels.now.command is Place.TERMINALS:
+        if self._channels.now.command is ChannelPlace.TERMINALS:
             self._body.terminals.close("LI2" if hz < 0 else "LI1")
         else:
             self._command.enable(reverse=hz < 0)
@@ -64,11 +65,11 @@ class DrivecomChart:
 
     def refer(self, hz: float) -> None:
         """Change the reference from outside, unless the line has given one since."""
-        if self._channels.now.reference is Place.TERMINALS or self._reference.is_earlier:
+        if self._channels.now.reference is ChannelPlace.TERMINALS or self._reference.is_earlier:
             self._refer(hz)
 
     def _refer(self, hz: float) -> None:
-        if self._channels.now.reference is Place.TERMINALS:
+        if self._channels.now.reference is ChannelPlace.TERMINALS:
             self._reference.wire(self._channels.now, abs(hz))
         else:
             self._reference.leave(abs(hz))
@@ -102,7 +103,7 @@ class DrivecomChart:
 
     def _copy_reference(self, before: Channels, now: Channels) -> None:
         copies = self._body.setting("COP", 0) in COPIES_REFERENCE
-        if copies and self._copies(to_2=now.reference_2) and now.reference is Place.LINE:
+        if copies and self._copies(to_2=now.reference_2) and now.reference is ChannelPlace.LINE:
             self._reference.leave(abs(self._wanted(before)))
 
     def _copies(self, *, to_2: bool) -> bool:
@@ -114,10 +115,10 @@ class DrivecomChart:
         running = self._ordered(before)
         self._machine.leaving = False
         self._command.let_go()
-        if now.command is Place.TERMINALS:
+        if now.command is ChannelPlace.TERMINALS:
             self._wiring.renew()
             self._wiring.follow()
-        if now.command is not Place.LINE:
+        if now.command is not ChannelPlace.LINE:
             return
         copies = self._body.setting("COP", 0) in COPIES_COMMAND
         if copies and running and self._copies(to_2=now.command_2):
@@ -130,7 +131,7 @@ class DrivecomChart:
 
     def _ordered(self, channels: Channels) -> bool:
         """Whether the motor was ordered to run under these channels."""
-        if channels.command is Place.TERMINALS:
+        if channels.command is ChannelPlace.TERMINALS:
             return self._wiring.order.run
         return self._machine.state is DrivecomState.ENABLED and not self._stopping()
 
@@ -162,7 +163,11 @@ class DrivecomChart:
     @property
     def _by_line(self) -> bool:
         """Whether the command channel is the line."""
-        return self._channels.now.command is Place.LINE
+        return self._channels.now.command is ChannelPlace.LINE
+
+    def raises(self) -> OwnFault | None:
+        """The external fault, for as long as CMI bit 3 or the input of ETF reports it."""
+        return external_fault(self._body, self._channels.is_on)
 
     def trip(self, stop: Stop) -> None:
         """Go to Fault; the inputs stay as they are."""
@@ -207,7 +212,7 @@ class DrivecomChart:
         return self._by_line or self._channels.low_access or self._wired_run()
 
     def _wired_run(self) -> bool:
-        terminals = self._channels.now.command is Place.TERMINALS
+        terminals = self._channels.now.command is ChannelPlace.TERMINALS
         return terminals and self._wiring.order.run
 
     @property
@@ -248,7 +253,7 @@ class DrivecomChart:
         """The signed reference in Hz before LSP and HSP, under the channels in force or others."""
         channels = channels or self._channels.now
         hz = self._reference.size(channels)
-        if channels.command is Place.LINE:
+        if channels.command is ChannelPlace.LINE:
             reverse = self._command.reverse != self._reference.turned_over(self._command.is_io)
         else:
             reverse = self._wiring.order.reverse

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from ..body import Body
 from ..rules import MODBUS_COMMAND, MODBUS_REFERENCE
-from .channels import Channels, Place, channels_in_force, switch_is_on
+from .channels import ChannelPlace, Channels, channels_in_force, switch_is_on
 
 COMMISSIONED = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND}
 """Channels of a drive whose profile has no words for them."""
-LEVEL_3 = 2
+FULL_ACCESS = 2
 
 
 class DrivecomChannels:
@@ -18,7 +18,7 @@ class DrivecomChannels:
         self._body = body
         self.line_spoke = False
         """Whether the line gave a command; below access level L3 it commands from then on."""
-        self.now = Channels(Place.LINE, Place.LINE)
+        self.now = Channels(ChannelPlace.LINE, ChannelPlace.LINE)
 
     def power_up(self) -> None:
         """The line has not spoken yet."""
@@ -38,7 +38,7 @@ class DrivecomChannels:
     def _look(self) -> Channels:
         channels = channels_in_force(self._setting, self.is_on)
         if self.low_access and not channels.local:
-            place = Place.LINE if self.line_spoke else Place.TERMINALS
+            place = ChannelPlace.LINE if self.line_spoke else ChannelPlace.TERMINALS
             return Channels(place, place)
         return channels
 
@@ -49,4 +49,4 @@ class DrivecomChannels:
     def low_access(self) -> bool:
         """Whether LAC is below L3: the drive is enabled by itself (ATV31/312)."""
         levels = self._body.traits.access_levels
-        return levels and self._body.setting("LAC", LEVEL_3) < LEVEL_3
+        return levels and self._body.setting("LAC", FULL_ACCESS) < FULL_ACCESS

@@ -9,7 +9,7 @@ from __future__ import annotations
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
-from .channels import Channels, Place
+from .channels import ChannelPlace, Channels
 
 CMI_HIGH_RESOLUTION, CMI_REVERSE = 1 << 9, 1 << 12
 FULL_COUNT = 32767
@@ -37,10 +37,10 @@ class DrivecomReference:
 
         From the line it may be negative; 0 from a channel that nothing is simulated of.
         """
-        if channels.reference is Place.LINE:
+        if channels.reference is ChannelPlace.LINE:
             hz = self._written()
             return (self._body.earlier_hz or 0.0) if hz is None else hz
-        if channels.reference is Place.TERMINALS:
+        if channels.reference is ChannelPlace.TERMINALS:
             low, high = self.limits()
             return low + self._body.terminals.level(f"AI{channels.input}") * (high - low)
         return 0.0

@@ -5,15 +5,17 @@ Sources: ATV71 communication parameters guide; ATV312 communication variables (C
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 from ..body import Body
+from ..plant.fault_history import OwnFault
 from ..plant.motor import Stop
 
 HALT, STOP_STT, INJECTION, FAST = (1 << bit for bit in (8, 12, 13, 14))
 CMI_FAST, CMI_INJECTION, CMI_STANDSTILL, CMI_LOCKED = (1 << bit for bit in (10, 11, 13, 15))
 CMI_EXTERNAL_FAULT = 1 << 3
 STT = {0: Stop.RAMP, 1: Stop.FAST, 2: Stop.FREEWHEEL, 3: Stop.INJECTION}
+EXTERNAL_FAULTS = ("EPF", "EPF1")
 EXTERNAL_REACTIONS: Mapping[int, Stop | None] = {
     0: None,
     1: Stop.FREEWHEEL,
@@ -61,6 +63,18 @@ def locked(body: Body, *, stands: bool) -> bool:
     return bool(cmi & CMI_LOCKED) or bool(at_rest and stands)
 
 
-def external_fault(body: Body) -> bool:
-    """Whether CMI bit 3 reports an external fault (ATV31/312: reserved on the ATV71)."""
-    return body.traits.access_levels and bool(extended_command(body) & CMI_EXTERNAL_FAULT)
+def external_fault(body: Body, is_on: Callable[[int], bool]) -> OwnFault | None:
+    """The external fault where CMI bit 3 (ATV31/312) or the assignment of ETF reports it.
+
+    LET = 0 turns an input round: it reports while it is open. EPL says how the drive stops, or
+    that it goes on.
+    """
+    assigned = body.setting("ETF", 0)
+    by_input = assigned != 0 and is_on(assigned) == bool(body.setting("LET", 1))
+    by_word = body.traits.access_levels and bool(extended_command(body) & CMI_EXTERNAL_FAULT)
+    stop = EXTERNAL_REACTIONS.get(body.setting("EPL", 1), Stop.FREEWHEEL)
+    codes = (f for f in body.profile.data.faults.codes if f.code.upper() in EXTERNAL_FAULTS)
+    known = next(codes, None)
+    if stop is None or known is None or not (by_input or by_word):
+        return None
+    return OwnFault(known.raw, stop, persists=True)

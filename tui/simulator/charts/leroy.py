@@ -12,6 +12,7 @@ from dataclasses import replace
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
+from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
 
 CONTROL_WORD, CONTROL_ON, STATUS_WORD = "6.42", "6.43", "10.40"
@@ -29,7 +30,7 @@ UNLOCKED, FORWARD, JOG, BACKWARD, CHANGE_WAY, RUN, RESET = (1 << b for b in (0, 
 RUNNING_ORDERS = FORWARD | JOG | BACKWARD | RUN
 DEFAULT_HZ = 30.0
 """Analogue reference of a drive whose inputs nobody has set, in Hz."""
-ANALOGUE_HZ = 50.0
+LEROY_FULL_HZ = 50.0
 """Full scale of the analogue reference, in Hz; the manual gives none."""
 JOG_HZ = 5.0
 LEROY_REACHED_HZ = 0.1
@@ -46,7 +47,7 @@ class LeroySomerChart:
         self._target_hz = 0.0
         self._pressed = False
         """Whether RESET was closed at the last look."""
-        body.terminals.apply("AI1", DEFAULT_HZ / ANALOGUE_HZ)
+        body.terminals.apply("AI1", DEFAULT_HZ / LEROY_FULL_HZ)
 
     def power_up(self) -> None:
         """Nothing is ordered by the line."""
@@ -59,7 +60,7 @@ class LeroySomerChart:
 
     def refer(self, hz: float) -> None:
         """Change the analogue reference at the terminals, in Hz."""
-        self._body.terminals.apply("AI1", abs(hz) / ANALOGUE_HZ)
+        self._body.terminals.apply("AI1", abs(hz) / LEROY_FULL_HZ)
 
     def halt(self) -> None:
         """Open the run inputs."""
@@ -115,6 +116,10 @@ class LeroySomerChart:
         if fault is not None and not fault.persists:
             self._body.fault = None
 
+    def raises(self) -> OwnFault | None:
+        """No word and no input of this family makes a fault."""
+        return None
+
     def order(self) -> MotorDemand:
         """What the motor has to do now."""
         body = self._body
@@ -130,7 +135,7 @@ class LeroySomerChart:
         return replace(base, energised=energised, target=self._target_hz)
 
     def _wanted(self, bits: int) -> float:
-        hz = ANALOGUE_HZ * self._body.terminals.level("AI1")
+        hz = LEROY_FULL_HZ * self._body.terminals.level("AI1")
         hz = min(hz, self._body.value("max_frequency", 1e9) or 1e9)
         if bits & JOG and not bits & (FORWARD | BACKWARD | RUN):
             return JOG_HZ

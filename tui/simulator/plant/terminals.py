@@ -38,13 +38,13 @@ def _altivar(logic: int, analogue: int) -> TerminalNames:
     )
 
 
-PLAIN = TerminalNames(("RUN", "REV", "RESET"), ("AI1",), "RUN", "REV", "RESET")
+PLAIN_TERMINALS = TerminalNames(("RUN", "REV", "RESET"), ("AI1",), "RUN", "REV", "RESET")
 """Terminals of a drive whose own names are not known."""
 BY_KIND: Mapping[ChartKind, TerminalNames] = {
     "drivecom": _altivar(14, 4),
     "altivar21": TerminalNames(("F", "R", "RES"), ("VIA", "VIB"), "F", "R", "RES"),
-    "leroy-somer": PLAIN,
-    "own": PLAIN,
+    "leroy-somer": PLAIN_TERMINALS,
+    "own": PLAIN_TERMINALS,
 }
 COMPACT = _altivar(6, 3)
 """Terminals of the Altivar 31 and 312."""
