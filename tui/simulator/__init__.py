@@ -2,12 +2,14 @@
 
 from .drive import SimulatedDrive
 from .errors import SimulatorError
+from .server.client_settings import ClientSettings
 from .server.endpoints import ByteStream
 from .simulation import Simulation
 from .spec import DriveSpec, FaultRates, LineTiming, parse_drives
 
 __all__ = [
     "ByteStream",
+    "ClientSettings",
     "DriveSpec",
     "FaultRates",
     "LineTiming",

@@ -27,6 +27,11 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
 @click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="RTU over TCP.")
 @click.option("--baud", type=click.IntRange(min=300), default=19200, show_default=True)
 @click.option("--format", "form", default="8E1", show_default=True, metavar="8E1|8N2|...")
+@click.option(
+    "--any-settings",
+    is_flag=True,
+    help="Answer whatever baud and stop bits a client sets on the pseudo-terminal.",
+)
 @click.option("--real-time", is_flag=True, help="Keep the time of the line's characters.")
 @click.option(
     "--set",
@@ -67,6 +72,7 @@ def simulate(
     rtu_tcp: str | None,
     baud: int,
     form: str,
+    any_settings: bool,
     real_time: bool,
     sets: tuple[str, ...],
     protects: tuple[str, ...],
@@ -88,6 +94,7 @@ def simulate(
         timing=LineTiming(baud, form.upper(), real_time),
         faults=_rates(faults),
         seed=seed,
+        any_settings=any_settings,
     )
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
