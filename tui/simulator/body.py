@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -21,6 +22,9 @@ class ActiveFault:
     raw: int
     code: str
     persists: bool = False
+
+
+CHART_WORDS: Mapping[Quantity, str] = {"status_word": "status", "command_word": "command"}
 
 
 class Fallback(Enum):
@@ -91,8 +95,15 @@ class Body:
     # Parameters by meaning
 
     def parameter(self, quantity: Quantity) -> Parameter | None:
-        """The parameter that carries a quantity, or None."""
-        return self.profile.quantity(quantity)
+        """The parameter that carries a quantity, or None.
+
+        Status and command word are those of the chart where no parameter is called so.
+        """
+        if found := self.profile.quantity(quantity):
+            return found
+        if quantity in CHART_WORDS and self.profile.data.charts:
+            return self.registers.named(getattr(self.profile.data.charts[0], CHART_WORDS[quantity]))
+        return None
 
     def raw(self, quantity: Quantity, default: int = 0) -> int:
         """Raw value in force of a quantity; the default where the family has none."""

@@ -77,6 +77,9 @@ class SimulatedDrive:
         self._memory = SettingsMemory(self._body)
         self._load = Load(random)
         self._wanderer = Wanderer(random)
+        self._starters = {way.parameter for way in profile.data.references} | {
+            chart.command for chart in profile.data.charts
+        }
         functions = {f.code: f for f in profile.data.functions}
         words = DriveWords(
             profile, traits, self.registers, blocked=self._blocked, written=self._written
@@ -278,7 +281,7 @@ class SimulatedDrive:
         return parameter.access == "rw-stopped" and self._chart.running
 
     def _written(self, parameter: Parameter) -> None:
-        if parameter.quantity in WATCH_STARTERS:
+        if parameter.quantity in WATCH_STARTERS or parameter.code in self._starters:
             self._body.line_orders.note(parameter)
         self._memory.written(parameter)
         self._chart.written(parameter)

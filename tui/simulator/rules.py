@@ -7,7 +7,7 @@ responses; PX-MODBUS manual 5.9 (no exception is documented: silence).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from tui.drive.profile.profile import Profile
@@ -104,7 +104,16 @@ _BY_KIND: Mapping[ChartKind, Traits] = {
     "drivecom": Traits("drivecom", ALTIVAR, limits_follow=True, first_values=_LINE_CONTROL),
     "altivar21": TRAITS["atv21"],
     "leroy-somer": TRAITS["powerdrive"],
+    "own": Traits("own", Refusals(1, 2, 2, 3, 4, 3)),
 }
+PLAYED_BY: Mapping[ChartKind, tuple[str, ...]] = {
+    "drivecom": (),
+    "altivar21": ("FA00", "FD01"),
+    "leroy-somer": ("6.42", "6.43", "10.40"),
+}
+"""Words that a drive must have to be played as one of a family; others go by their own chart."""
+LINE_WORDS = ("modbus", "line", "serial", "rs485", "rs-485")
+"""What the sources of a profile call the line."""
 
 
 def traits_of(profile: Profile) -> Traits:
@@ -112,7 +121,27 @@ def traits_of(profile: Profile) -> Traits:
     if known := TRAITS.get(profile.id):
         return known
     kinds = {chart.kind for chart in profile.data.charts}
-    for kind in ("altivar21", "leroy-somer"):
-        if kind in kinds:
+    codes = {parameter.code for parameter in profile.parameters}
+    for kind, words in PLAYED_BY.items():
+        if kind in kinds and codes.issuperset(words):
             return _BY_KIND[kind]
-    return _BY_KIND["drivecom"]
+    return replace(_BY_KIND["own"], first_values=commissioned(profile))
+
+
+def commissioned(profile: Profile) -> Mapping[str, int]:
+    """Settings by code with which the line commands a drive, as far as its profile tells them.
+
+    The first configuration whose only source of commands is the line, and what the interlocks
+    want of words that can be set.
+    """
+    values: dict[str, int] = {}
+    for source in profile.data.control_sources:
+        name = source.command.sources[0].casefold()
+        if len(source.command.sources) == 1 and any(word in name for word in LINE_WORDS):
+            values |= {setting.parameter: setting.value for setting in source.settings}
+            break
+    for lock in (lock for chart in profile.data.charts for lock in chart.interlocks):
+        wanted = profile.find(lock.parameter)
+        if wanted.access.startswith("rw") and wanted.code not in values and not lock.when:
+            values[wanted.code] = lock.values[0]
+    return values

@@ -94,7 +94,7 @@ class Altivar21Chart:
 
     def written(self, parameter: Parameter) -> None:
         """Follow a word that the line wrote."""
-        if parameter.quantity != "command_word":
+        if parameter is not self._body.parameter("command_word"):
             return
         word = self._word
         rising = word & ~self._last

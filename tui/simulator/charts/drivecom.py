@@ -137,7 +137,7 @@ class DrivecomChart:
 
     def written(self, parameter: Parameter) -> None:
         """Follow a word that the line wrote."""
-        if parameter.quantity == "command_word":
+        if parameter is self._body.parameter("command_word"):
             self._take(self._body.registers.present(parameter) & 0xFFFF)
         elif parameter.access == "rw-stopped":
             self._machine.reconfigured()

@@ -14,6 +14,7 @@ from ..rules import ChartKind
 from .altivar21 import Altivar21Chart
 from .drivecom import DrivecomChart
 from .leroy import LeroySomerChart
+from .own import OwnChart
 
 
 class PlayedChart(Protocol):
@@ -38,4 +39,5 @@ CHARTS: Mapping[ChartKind, Callable[[Body], PlayedChart]] = {
     "drivecom": DrivecomChart,
     "altivar21": Altivar21Chart,
     "leroy-somer": LeroySomerChart,
+    "own": OwnChart,
 }
