@@ -2,6 +2,7 @@
 
 from .drive import SimulatedDrive
 from .errors import SimulatorError
+from .input_lines import set_inputs
 from .server.client_settings import ClientSettings
 from .server.endpoints import ByteStream
 from .simulation import Simulation
@@ -17,4 +18,5 @@ __all__ = [
     "Simulation",
     "SimulatorError",
     "parse_drives",
+    "set_inputs",
 ]

@@ -161,6 +161,16 @@ class Simulation:
         return self.line.drive(address)
 
     @property
+    def only_drive(self) -> SimulatedDrive:
+        """The drive of a line that has one; raises SimulatorError where it has several."""
+        if len(self.drives) != 1:
+            known = ", ".join(str(drive.address) for drive in self.drives)
+            raise SimulatorError(
+                f"Say which drive: its address and a colon first. It has: {known}."
+            )
+        return self.drives[0]
+
+    @property
     def drives(self) -> tuple[SimulatedDrive, ...]:
         """All drives of the line."""
         return self.line.drives

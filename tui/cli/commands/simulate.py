@@ -12,6 +12,7 @@ import click
 
 from ..shared.errors import told
 from ..shared.say import say
+from ..shared.standard_input import stay_in_background, typed_lines
 
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, FaultRates, Simulation
@@ -80,7 +81,11 @@ def simulate(
     seed: int,
     run_hz: float,
 ) -> None:
-    """Serve simulated drives until Ctrl-C or SIGTERM."""
+    """Serve simulated drives until Ctrl-C or SIGTERM.
+
+    Lines such as "2: LI1=1, AI1=5V" on standard input set the inputs of the drive at address 2;
+    "2:" tells them.
+    """
     from tui.simulator import LineTiming, Simulation, parse_drives
 
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
@@ -103,7 +108,21 @@ def simulate(
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
         say(f"Ready: {names} on {where}. Ctrl-C ends it.")
+        stay_in_background()
+        threading.Thread(target=_follow, args=(simulation,), name="inputs", daemon=True).start()
         stop.wait()
+
+
+def _follow(simulation: Simulation) -> None:
+    """Set inputs as the lines of standard input say; a line that is wrong is told of."""
+    from tui.simulator import SimulatorError, set_inputs
+
+    for line in typed_lines():
+        if line.strip():
+            try:
+                say(set_inputs(simulation, line))
+            except SimulatorError as error:
+                say(str(error), err=True)
 
 
 def _serve(

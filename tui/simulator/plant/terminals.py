@@ -79,13 +79,20 @@ class Terminals:
 
         Returns what it is now, for a person. Raises SimulatorError.
         """
+        wanted, value = self.check(name, text)
+        if isinstance(value, bool):
+            self.close(wanted, value)
+            return f"{wanted} = {int(value)}"
+        self.apply(wanted, value)
+        return f"{wanted} = {100 * value:g} %"
+
+    def check(self, name: str, text: str) -> tuple[str, bool | float]:
+        """The input that is meant and what it would be set to; raises SimulatorError."""
         wanted = name.strip().upper()
         if wanted in self.names.logic:
-            self.close(wanted, _switch(wanted, text))
-            return f"{wanted} = {int(self.closed(wanted))}"
+            return wanted, _switch(wanted, text)
         if wanted in self.names.analogue:
-            self.apply(wanted, _part(wanted, text))
-            return f"{wanted} = {100 * self.level(wanted):g} %"
+            return wanted, _part(wanted, text)
         known = ", ".join((*self.names.logic, *self.names.analogue))
         raise SimulatorError(f"No input is called {name.strip()!r} here. Inputs: {known}.")
 
