@@ -25,7 +25,7 @@ def test_a_line_sets_inputs_of_the_drive_that_it_names() -> None:
 def test_without_inputs_they_are_told() -> None:
     made = simulation("atv21")
     set_inputs(made, "2: F=1, VIA=4V")
-    assert set_inputs(made, "2:") == "2: F=1 R=0 RES=0 VIA=40% VIB=0%"
+    assert set_inputs(made, "2:") == "2: closed of F, R, RES: F; VIA 40 %, VIB 0 %"
 
 
 def test_the_address_may_be_left_out_where_there_is_one_drive() -> None:

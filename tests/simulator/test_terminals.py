@@ -298,4 +298,4 @@ def test_inputs_that_are_refused(name: str, text: str, why: str) -> None:
 def test_all_inputs_in_a_line() -> None:
     terminals = Terminals(BY_KIND["altivar21"])
     terminals.set("F", "1")
-    assert terminals.told() == "F=1 R=0 RES=0 VIA=0% VIB=0%"
+    assert terminals.told() == "closed of F, R, RES: F; VIA 0 %, VIB 0 %"

@@ -2,7 +2,7 @@
 
 from .drive import SimulatedDrive
 from .errors import SimulatorError
-from .input_lines import set_inputs
+from .input_lines import check_inputs, set_inputs
 from .server.client_settings import ClientSettings
 from .server.endpoints import ByteStream
 from .simulation import Simulation
@@ -17,6 +17,7 @@ __all__ = [
     "SimulatedDrive",
     "Simulation",
     "SimulatorError",
+    "check_inputs",
     "parse_drives",
     "set_inputs",
 ]

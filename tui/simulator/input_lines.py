@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from .drive import SimulatedDrive
 from .errors import SimulatorError
 from .simulation import Simulation
 
@@ -13,6 +14,16 @@ def set_inputs(simulation: Simulation, text: str) -> str:
 
     The address may be left out where there is one drive; without inputs they are only told.
     Nothing is set where a part of the line is wrong. Raises SimulatorError.
+    """
+    drive, assignments = check_inputs(simulation, text)
+    told = [drive.set_input(name, value) for name, value in assignments]
+    return f"{drive.address}: {', '.join(told) if told else drive.terminals.told()}"
+
+
+def check_inputs(simulation: Simulation, text: str) -> tuple[SimulatedDrive, list[tuple[str, str]]]:
+    """The drive that a line means, with its inputs and what they are set to; sets nothing.
+
+    Raises SimulatorError where a part of the line is wrong.
     """
     head, colon, rest = text.partition(":")
     address = head.strip() if colon else ""
@@ -28,5 +39,4 @@ def set_inputs(simulation: Simulation, text: str) -> str:
         assignments.append((name, value))
     for name, value in assignments:
         drive.terminals.check(name, value)
-    told = [drive.set_input(name, value) for name, value in assignments]
-    return f"{drive.address}: {', '.join(told) if told else drive.terminals.told()}"
+    return drive, assignments

@@ -8,7 +8,7 @@ import signal
 import time
 from collections.abc import Iterator
 
-CHUNK = 4096
+BYTES_AT_ONCE = 4096
 BACKGROUND_PAUSE = 1.0
 """Seconds between two tries while the terminal belongs to another program."""
 
@@ -31,7 +31,7 @@ def typed_lines(handle: int = 0) -> Iterator[str]:
 def _read(handle: int) -> bytes:
     while True:
         try:
-            return os.read(handle, CHUNK)
+            return os.read(handle, BYTES_AT_ONCE)
         except OSError:
             if not os.isatty(handle):
                 return b""

@@ -14,6 +14,8 @@ from ..errors import SimulatorError
 from ..rules import ChartKind
 
 FULL_VOLTS, FULL_MILLIAMPERES = 10.0, 20.0
+SHORT_LIST = 3
+"""Names of inputs that are told one by one."""
 _LEVEL = re.compile(r"(\d+(?:\.\d+)?)\s*(v|ma|%)?", re.IGNORECASE)
 _OPEN, _CLOSED = frozenset({"0", "off", "open"}), frozenset({"1", "on", "closed"})
 
@@ -102,10 +104,11 @@ class Terminals:
 
     def told(self) -> str:
         """All inputs in a line, for a person."""
-        logic = [f"{name}={int(self.closed(name))}" for name in self.names.logic]
-        return " ".join(
-            logic + [f"{name}={100 * self.level(name):g}%" for name in self.names.analogue]
-        )
+        logic = self.names.logic
+        group = f"{logic[0]} to {logic[-1]}" if len(logic) > SHORT_LIST else ", ".join(logic)
+        closed = ", ".join(name for name in logic if self.closed(name)) or "none"
+        levels = ", ".join(f"{name} {100 * self.level(name):g} %" for name in self.names.analogue)
+        return f"closed of {group}: {closed}; {levels}"
 
 
 def _switch(name: str, text: str) -> bool:

@@ -90,7 +90,9 @@ class SilenceWatch:
             cmi = self._body.raw("extended_command_word")
             if cmi & NO_MONITORING:
                 return False
-        return self._spoken and (self._body.line_orders.any_given or not self._data.needs_write)
+        earlier = self._body.earlier_hz is not None
+        given = self._body.line_orders.any_given or earlier
+        return self._spoken and (given or not self._data.needs_write)
 
     def step(self, dt: float) -> Consequence | None:
         """Let time pass; what has to happen if the time-out has just run out."""
