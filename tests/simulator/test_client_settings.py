@@ -65,6 +65,14 @@ def test_a_client_that_sets_nothing_is_heard(baud: int, form: str) -> None:
         assert heard(port)
 
 
+def test_a_client_that_sets_nothing_is_heard_by_a_drive_that_was_set_otherwise() -> None:
+    with (
+        served(LineTiming(19200, "8E1"), sets={"TBR": 28, "TFO": 5}) as running,
+        terminal(running.serve_pty()) as port,
+    ):
+        assert heard(port)
+
+
 @pytest.mark.parametrize(
     ("form", "baud", "stop_bits", "answers"),
     [

@@ -107,10 +107,12 @@ class Simulation:
     def serve_pty(self, link: str | None = None) -> str:
         """Serve the line on a pseudo-terminal; returns the path to open.
 
-        That path is a symbolic link, made at `link` if given, taken away at the end. Raises
+        That path is a symbolic link, made at `link` if given, taken away at the end. It begins
+        with the settings of the first drive. Raises
         SimulatorError where the system has no pseudo-terminals or the path is taken.
         """
-        endpoint = PtyEndpoint(self._rtu, link, self.timing, any_settings=self._any_settings)
+        first = self.drives[0].station.own(self.timing) if self.drives else self.timing
+        endpoint = PtyEndpoint(self._rtu, link, first, any_settings=self._any_settings)
         self._add(endpoint)
         return endpoint.path
 

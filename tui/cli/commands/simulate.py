@@ -62,7 +62,7 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
     type=float,
     default=0.0,
     metavar="HZ",
-    help="Motors run at this frequency, as if ordered at the terminals.",
+    help="Motors run at this frequency: by their inputs, or as another master left them.",
 )
 @told
 def simulate(

@@ -192,7 +192,9 @@ class OwnChart:
 
     @property
     def _chart(self) -> Chart | None:
-        return self._body.profile.chart(self._raws())
+        registers, profile = self._body.registers, self._body.profile
+        deciding = [profile[one.when.parameter] for one in profile.data.charts if one.when]
+        return profile.chart({word.code: registers.in_force(word) for word in deciding})
 
     def _state(self, chart: Chart) -> State:
         found = None

@@ -89,6 +89,11 @@ class Station:
             return client.fits(*_own(choices, timing))
         return all(_fits(choice, timing) for choice in choices)
 
+    def own(self, timing: LineTiming) -> LineTiming:
+        """The line as the drive itself is set; what no word of it says is that of the line."""
+        baud, form = _own(self._chosen(), timing)
+        return LineTiming(baud, form, timing.real_time)
+
     def _chosen(self) -> list[LinkChoice]:
         """What the drive's words for baud and format say, as far as it has any."""
         chosen = []
