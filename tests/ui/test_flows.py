@@ -179,7 +179,7 @@ async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
         await to_monitor(app, pilot, 2)
         assert app.fleet is not None
         line_watch = app.fleet.line_watch
-        await until(pilot, lambda: alone(line_watch) == {1: 3.0})
+        await until(pilot, lambda: alone(line_watch) == {1: 3.0, 2: 10.0})
         await pilot.press("q")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
         await pilot.press("escape")

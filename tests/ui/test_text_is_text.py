@@ -95,6 +95,12 @@ async def rating(made: Bench) -> None:
     await dialog(made, "(rating)")
 
 
+async def inputs(made: Bench) -> None:
+    assert made.app.opened is not None
+    made.app.opened.simulation = made.simulation
+    await dialog(made, "D")
+
+
 async def parameters(made: Bench) -> None:
     await made.pilot.press("3")
     await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
@@ -171,6 +177,7 @@ async def connection(made: Bench) -> None:
 WAYS: dict[str, tuple[str, Way]] = {
     "monitor": ("atv71", monitor),
     "rating": ("atv21", rating),
+    "inputs": ("atv21", inputs),
     "parameters": ("atv71", parameters),
     "scanner": ("atv71", blocks),
     "faults": ("atv71", faults),
@@ -178,6 +185,7 @@ WAYS: dict[str, tuple[str, Way]] = {
 }
 ASKED = {
     "rating",
+    "inputs",
     "Ctrl+S and report of Parameters",
     "Ctrl+S of Blocks",
     "words",

@@ -16,6 +16,8 @@ TAKE = "Take the control from the terminals (Leroy-Somer 6.43); armed, locked on
 HAND_BACK = "Give the control back to the terminals; a run command waiting there counts then; asks."
 TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
 
+INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V. Never on a real line."
+
 COMMAND_ACTIONS = (
     *on(
         (MONITOR,),
@@ -38,6 +40,7 @@ COMMAND_ACTIONS = (
         ("take_control", "t", "", TAKE),
         ("hand_back", "g", "", HAND_BACK),
         ("take_over", "T", "", TAKE_OVER),
+        ("inputs", "D", "", INPUTS),
     ),
 )
 WATCH_ACTIONS = on(

@@ -38,6 +38,7 @@ class DriveWords:
     ) -> None:
         self._profile = profile
         self._refusals = traits.refusals
+        self._limits = traits.limits
         self._limits_follow = traits.limits_follow
         self._registers = registers
         self._blocked = blocked
@@ -174,7 +175,8 @@ class DriveWords:
         for of, bound in ((parameter.min_of, max), (parameter.max_of, min)):
             if of is not None and (counts := self._counts(parameter, of)) is not None:
                 raw = bound(raw, counts)
-        return raw
+        own = self._registers.named(self._limits.get(parameter.code, ""))
+        return raw if own is None else min(raw, self._registers.in_force(own))
 
     def _counts(self, parameter: Parameter, of: Multiple) -> int | None:
         source = self._profile[of.parameter]
