@@ -9,6 +9,7 @@ from decimal import Decimal
 from functools import cached_property
 
 from ..errors import UnknownParameter
+from ..teaching import TaughtScale
 from .schema import Chart, FaultCode, FaultHelp, Function, Parameter, ProfileData, Quantity
 
 _HEX = re.compile(r"^(?:16#|0x)([0-9a-f]+)$", re.IGNORECASE)
@@ -25,8 +26,10 @@ def is_verified(parameter: Parameter) -> bool:
 class Profile:
     """A drive family's description, with the look-ups that the rest of the panel needs."""
 
-    def __init__(self, data: ProfileData) -> None:
+    def __init__(self, data: ProfileData, taught: Mapping[str, TaughtScale] | None = None) -> None:
         self.data = data
+        self.taught: Mapping[str, TaughtScale] = taught or {}
+        """By code, what a person has taught of this one drive; no file of a family says it."""
         self.parameters = tuple(data.parameters)
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)

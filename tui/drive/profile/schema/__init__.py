@@ -34,6 +34,7 @@ from .chart import (
     State,
     StateKind,
     StatusBit,
+    TeachableReference,
     Transition,
 )
 from .control_source import ControlSource, Setting, Way
@@ -147,6 +148,7 @@ __all__ = [
     "StatusBit",
     "Storage",
     "Table",
+    "TeachableReference",
     "Transition",
     "UnitBy",
     "Way",
