@@ -77,6 +77,12 @@ _COMPACT = Traits(
     max_hz_high_resolution=600.0,
     first_values={**_LINE_CONTROL, "LAC": 2},
 )
+_LEROY_SOMER = Traits(
+    "leroy-somer",
+    SILENT,
+    # 1.06 as in the example frame of the manual
+    first_values={"1.06": 1500, "1.21": 900},
+)
 TRAITS: Mapping[str, Traits] = {
     "atv71": Traits(
         "drivecom",
@@ -89,9 +95,9 @@ TRAITS: Mapping[str, Traits] = {
     "atv31": _COMPACT,
     "atv312": _COMPACT,
     "atv21": Traits("altivar21", ALTIVAR_21),
-    "powerdrive": Traits("leroy-somer", SILENT),
-    "proxidrive": Traits("leroy-somer", SILENT),
-    "varmeca": Traits("leroy-somer", SILENT),
+    "powerdrive": _LEROY_SOMER,
+    "proxidrive": _LEROY_SOMER,
+    "varmeca": _LEROY_SOMER,
 }
 _BY_KIND: Mapping[ChartKind, Traits] = {
     "drivecom": Traits("drivecom", ALTIVAR, limits_follow=True, first_values=_LINE_CONTROL),
