@@ -10,6 +10,7 @@ import pytest
 
 from tui.drive.errors import ValueRefused
 from tui.drive.teaching import LessonKind
+from tui.session.command.reference import Reference, parse_reference, reference_codes
 from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.read.reader import Reader
@@ -23,8 +24,9 @@ PROFILE = profile_of(
     parameter("HZ", 500, **RAW),
     parameter("AMPS", 400, **RAW),
     parameter("PRESET", 120, **RAW),
+    parameter("MOST", 121, **RAW),
     parameter("KNOWN", 600, unit="V"),
-    teachable_references=[{"parameter": "PRESET"}],
+    teachable_references=[{"parameter": "PRESET", "most": "MOST"}],
 )
 NAMED = DriveIdentity(1, "Maker", "A-1", "1.0", "", None, ())
 OTHER = DriveIdentity(1, "Maker", "B-2", "1.0", "", None, ())
@@ -223,6 +225,65 @@ async def test_a_look_that_ends_the_scale_ends_the_reference_and_its_confirmatio
     assert teacher.session.profile.quantity("command_frequency") is None
     again = await preset()
     assert again.reference == "", "confirmed anew, or not at all"
+
+
+async def presets(limit_unit: str) -> tuple[OneDrive, Teacher]:
+    """A drive whose preset takes the reference in rpm, and whose highest reference is 1500."""
+    line, teacher = drive(PRESET=300, MOST=1500)
+    await teacher.look("PRESET", "300", "rpm")
+    line.registers[120] = 400
+    await teacher.look("PRESET", "400")
+    teacher.confirm_reference("PRESET")
+    await teacher.look("MOST", "1500", limit_unit)
+    line.registers[121] = 900
+    await teacher.look("MOST", "900")
+    return line, teacher
+
+
+async def parsed(teacher: Teacher, text: str) -> Reference:
+    """A reference as typed, checked against what the drive holds."""
+    profile = teacher.session.profile
+    readings = await Reader(teacher.session).read(reference_codes(profile))
+    return parse_reference(profile, text, readings)
+
+
+async def test_a_reference_in_the_taught_unit() -> None:
+    teacher = await preset("Hz")
+    teacher.confirm_reference("PRESET")
+    found = await parsed(teacher, "25.5")
+    assert (found.parameter.code, found.raw, found.text) == ("PRESET", 255, "25.5 Hz")
+    with pytest.raises(ValueRefused, match="taught in Hz"):
+        await parsed(teacher, "700rpm")
+
+
+async def test_the_highest_reference_holds_once_it_was_taught_in_the_same_unit() -> None:
+    _, teacher = await presets("rpm")
+    assert (await parsed(teacher, "900rpm")).raw == 900
+    with pytest.raises(ValueRefused, match="above MOST = 900 rpm"):
+        await parsed(teacher, "901rpm")
+    teacher.forget("MOST")
+    assert (await parsed(teacher, "901rpm")).raw == 901
+    _, other = await presets("Hz")
+    assert (await parsed(other, "901rpm")).raw == 901, "another unit says nothing"
+
+
+async def test_a_reference_whose_word_could_mean_a_negative_one_is_refused() -> None:
+    teacher = await preset("Hz")
+    teacher.confirm_reference("PRESET")
+    assert (await parsed(teacher, "3276.7")).raw == 0x7FFF
+    with pytest.raises(ValueRefused, match="sign is open"):
+        await parsed(teacher, "3276.8")
+
+
+@pytest.mark.parametrize(
+    ("taught", "says"),
+    [(False, "teach PRESET: L in the panel"), (True, "R in the panel, or drivepanel teach PRESET")],
+)
+async def test_where_no_reference_goes_yet_the_way_is_told(taught: bool, says: str) -> None:
+    teacher = await preset() if taught else drive()[1]
+    with pytest.raises(ValueRefused, match="no manual at hand") as told:
+        await parsed(teacher, "20")
+    assert says in str(told.value)
 
 
 # Files
