@@ -36,7 +36,7 @@ def preset_taught(line: str) -> None:
 
 def test_two_looks_teach_and_every_reading_has_the_unit_and_the_mark(line: str) -> None:
     assert teach(line) == "Nothing is taught.\n"
-    assert "look once more" in teach(line, "1.21", "900 rpm")
+    assert "Look again at another value" in teach(line, "1.21", "900 rpm")
     assert "taught" not in run(0, "read", line, *DRIVE, "1.21")
     put(line, PRESET, 600)
     told = teach(line, "1.21", "600")

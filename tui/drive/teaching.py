@@ -168,11 +168,11 @@ def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson
         return Lesson(kind, looks, f"{code}: {scale.text} ({seen}).{_sign_text(scale)}", scale)
     if len({one.word for one in looks}) < 2:
         kind = LessonKind.SAME if before else LessonKind.FIRST
-        again = "Still the same value" if before else "One look is kept"
-        text = f"{code}: {look.text}. {again}: let it change, then look once more."
+        again = " again" if before else ""
+        text = f"{code}: {look.text}{again}. Look again at another value."
         return Lesson(kind, looks, text)
     fits = " or ".join(dict.fromkeys(f"{one.scale:f}" for one in scales_that_fit(looks)))
-    text = f"{code}: {look.text}. 1 count is {fits}: look once more where the value is larger."
+    text = f"{code}: 1 count is {fits}. Look again at a larger value ({look.text})."
     return Lesson(LessonKind.UNSURE, looks, text)
 
 
@@ -188,9 +188,9 @@ def _contradiction(
         why = f"no usual scale fits {' and '.join(one.text for one in (*before[-2:], look))}"
     check = "Was it the same parameter, and did the value stand still?"
     if known is not None:
-        text = f"{code}: {why}. It is no longer taught ({known.text} before) and shown raw. {check}"
+        text = f"{code} is no longer taught ({known.text} before): {why}. It is shown raw. {check}"
         return Lesson(LessonKind.ENDED, kept, text)
-    text = f"{code}: nothing is taught: {why}. {check}"
+    text = f"{code}: nothing is taught, {why}. {check}"
     return Lesson(LessonKind.DISAGREES, kept, text)
 
 

@@ -165,6 +165,13 @@ class Profile:
         return told.units.get(str(word >> told.shift & told.mask), "raw")
 
 
+def mark_of(profile: Profile, parameter: Parameter) -> str:
+    """What stands beside a value that no document tells for sure: `taught` or `?`."""
+    if parameter.code in profile.taught:
+        return "taught"
+    return "" if is_verified(parameter) else "?"
+
+
 def parse_address(text: str) -> int | None:
     """A wire address from `W9001`, `16#2329`, `0x2329` or `9001`; None if it is none of these."""
     if match := _HEX.match(text):

@@ -7,6 +7,7 @@ from rich.text import Text
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.selection import not_factory
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
+from tui.drive.taught_profile import why_not_taught
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import wrapped
@@ -64,6 +65,7 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
     if parameter.bits and raw is not None:
         names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, raw))
         found.append(f"Now: {names or 'no bit set'}")
+    found += _taught(editor, parameter)
     if parameter.note:
         found.append(parameter.note)
     if parameter.base:
@@ -74,6 +76,16 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
         choices = dict.fromkeys(editor.session.profile.names(parameter).values())
         found.append(f"One of: {', '.join(choices)}")
     return found
+
+
+def _taught(editor: Editor, parameter: Parameter) -> list[str]:
+    """What a person has taught of it, or that it can be taught."""
+    session = editor.session
+    if (scale := session.profile.taught.get(parameter.code)) is not None:
+        return [f"Taught: {scale.text}; L looks again"]
+    if why_not_taught(session.family, parameter.code):
+        return []
+    return ["Shown raw; L teaches its scale by the drive's display"]
 
 
 def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:
