@@ -41,6 +41,8 @@ COMMAND_ACTIONS = (
         ("hand_back", "g", "", HAND_BACK),
         ("take_over", "T", "", TAKE_OVER),
     ),
+)
+TEACH_ACTIONS = (
     *on((MONITOR, PARAMETERS), ("teach", "L", "", TEACH)),
     *on((MONITOR,), ("reference_by", "R", "", GIVE_BY)),
 )

@@ -65,9 +65,10 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
     if parameter.bits and raw is not None:
         names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, raw))
         found.append(f"Now: {names or 'no bit set'}")
-    found += _taught(editor, parameter)
-    if parameter.note:
+    # a profile's note on a word without a scale says that it is shown raw
+    if parameter.note and parameter.code not in editor.session.profile.taught:
         found.append(parameter.note)
+    found += _taught(editor, parameter)
     if parameter.base:
         found.append(f"In percent of {parameter.base}")
     if parameter.scale_by is not None and parameter.scale_by.parameter not in parameter.note:
@@ -83,9 +84,9 @@ def _taught(editor: Editor, parameter: Parameter) -> list[str]:
     session = editor.session
     if (scale := session.profile.taught.get(parameter.code)) is not None:
         return [f"Taught: {scale.text}; L looks again"]
-    if why_not_taught(session.family, parameter.code):
+    if parameter.access != "r" or why_not_taught(session.family, parameter.code):
         return []
-    return ["Shown raw; L teaches its scale by the drive's display"]
+    return ["L or Enter teaches its scale by the drive's display"]
 
 
 def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:
