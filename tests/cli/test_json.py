@@ -15,7 +15,7 @@ from tui.session.monitor.rates import monitoring_codes
 from .commands import tcp_line
 
 LINE = ("sim:atv71@2", "-d", "2")
-VALUE_KEYS = {"address", "raw", "value", "unit", "text", "quality"}
+VALUE_KEYS = {"address", "raw", "value", "unit", "text", "taught", "quality"}
 
 
 def told(*arguments: str, status: int = 0) -> Any:

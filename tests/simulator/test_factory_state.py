@@ -11,9 +11,9 @@ from tui.simulator import DriveSpec, SimulatedDrive
 COMMISSIONED = {
     # family: what a drive set up for its line holds otherwise
     "atv21": set[str](),
-    "atv31": {"Fr1", "Cd1", "LAC"},
-    "atv312": {"Fr1", "Cd1", "LAC"},
-    "atv71": {"FR1", "CD1"},
+    "atv31": {"Fr1", "Cd1", "tCt", "LAC"},
+    "atv312": {"Fr1", "Cd1", "tCt", "LAC"},
+    "atv71": {"FR1", "CD1", "TCT"},
 }
 
 

@@ -25,6 +25,8 @@ class Value:
     unit: str
     text: str
     """What a person reads, without the unit."""
+    taught: bool = False
+    """Whether a person has taught its scale; no document has it."""
 
     @property
     def display(self) -> str:

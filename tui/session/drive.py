@@ -35,7 +35,10 @@ class DriveSession:
     ) -> None:
         self.line = line
         self.device = device
+        self.family = profile
+        """What is known of every drive of its family."""
         self.profile = profile
+        """The same, with what a person has taught of this drive."""
         self.identity = identity
         self.clock = clock
         """What everything that is done with the drive counts by."""
@@ -69,6 +72,11 @@ class DriveSession:
     def commanded(self) -> bool:
         """Whether a command or reference was sent to the drive from here."""
         return self.commanded_at is not None
+
+    def learn(self, profile: Profile) -> None:
+        """Go by the family's profile with what was taught of this drive."""
+        self.profile = profile
+        self.stir()
 
     def note_command(self) -> None:
         """A command or reference was sent."""

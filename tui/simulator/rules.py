@@ -79,6 +79,12 @@ _COMPACT = Traits(
     max_hz_high_resolution=600.0,
     first_values={**_LINE_CONTROL, "LAC": 2},
 )
+_LEROY_SOMER = Traits(
+    "leroy-somer",
+    SILENT,
+    # 1.06 as in the example frame of the manual
+    first_values={"1.06": 1500, "1.21": 900},
+)
 TRAITS: Mapping[str, Traits] = {
     "atv71": Traits(
         "drivecom",
@@ -96,9 +102,9 @@ TRAITS: Mapping[str, Traits] = {
         limits={"FA01": "FH"},
         first_values={"FH": 8000, "F111": 2, "F112": 6, "F113": 10, "F130": 4},
     ),
-    "powerdrive": Traits("leroy-somer", SILENT),
-    "proxidrive": Traits("leroy-somer", SILENT),
-    "varmeca": Traits("leroy-somer", SILENT),
+    "powerdrive": _LEROY_SOMER,
+    "proxidrive": _LEROY_SOMER,
+    "varmeca": _LEROY_SOMER,
 }
 _BY_KIND: Mapping[ChartKind, Traits] = {
     "drivecom": Traits("drivecom", ALTIVAR, limits_follow=True, first_values=_LINE_CONTROL),

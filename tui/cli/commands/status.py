@@ -10,6 +10,7 @@ import click
 
 from tui.drive.plain import plain
 
+from ..shared.control import control_json, control_row
 from ..shared.errors import told
 from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
 from ..shared.options import (
@@ -60,9 +61,10 @@ class Status:
 
 
 def shown_codes(profile: Profile) -> list[str]:
-    """Codes of what is SHOWN, as far as the profile has them."""
+    """Codes of what is SHOWN, as far as the profile has them, and of what was taught."""
     found = (profile.quantity(quantity) for quantity in SHOWN_QUANTITIES)
-    return [parameter.code for parameter in found if parameter is not None]
+    codes = [parameter.code for parameter in found if parameter is not None]
+    return [*codes, *(code for code in profile.taught if code not in codes)]
 
 
 def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, str]:
@@ -72,13 +74,16 @@ def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str,
         parameter = profile.quantity(quantity)
         if parameter is not None:
             values[name] = _text(readings.get(parameter.code))
+    for code in profile.taught:
+        values[code] = f"{profile[code].name} {_text(readings.get(code))}"
     return values
 
 
 def _text(reading: Reading | None) -> str:
     if reading is None or reading.raw is None or reading.quality != "good":
         return "-----"
-    return f"{reading.text} {reading.unit}".strip()
+    mark = " taught" if reading.value is not None and reading.value.taught else ""
+    return f"{reading.text} {reading.unit}".strip() + mark
 
 
 def fault_text(state: DriveState) -> str:
@@ -166,6 +171,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
         "reference_from": status.channels["Reference from"] or None,
         "commandable": not status.refused,
         "why_not": status.refused or None,
+        "control": control_json(status.session),
         "watch": watch_json(watch),
         "values": values_json(status.session.profile, status.readings),
     }
@@ -184,7 +190,10 @@ def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
 
 
 def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
-    """What is SHOWN, by quantity; null where the family does not tell it or it was not read."""
+    """What is SHOWN, by quantity; null where the family does not tell it or it was not read.
+
+    What was taught stands there by its code.
+    """
     from ..shared.output import reading_json
 
     values: dict[str, Any] = {}
@@ -192,6 +201,8 @@ def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, 
         parameter = profile.quantity(quantity)
         reading = readings.get(parameter.code) if parameter else None
         values[quantity] = reading_json(reading) if reading is not None else None
+    for code in profile.taught:
+        values[code] = reading_json(readings[code]) if code in readings else None
     return values
 
 
@@ -211,6 +222,7 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         *status.channels.items(),
         ("From here", status.refused or "orders can have an effect"),
         ("Line watch", _watch_text(status)),
+        *control_row(status.session),
         *shown_values(profile, status.readings).items(),
     ]
 

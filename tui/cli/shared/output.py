@@ -77,6 +77,7 @@ def reading_json(reading: Reading) -> dict[str, Any]:
         "value": value,
         "unit": reading.unit,
         "text": reading.text,
+        "taught": reading.value.taught if reading.value else False,
         "quality": str(reading.quality),
     }
 
@@ -175,4 +176,6 @@ def _remark(reading: Reading) -> str:
         return "no value"
     if reading.quality != "good":
         return str(reading.quality)
+    if reading.value is not None and reading.value.taught:
+        return "taught"
     return reading.physical.display if reading.physical else ""

@@ -135,6 +135,9 @@ def _referred(data: ProfileData) -> Iterator[tuple[SchemaPath, str]]:
     for index, reference in enumerate(data.references):
         yield ["references", index], reference.parameter
         yield ["references", index], reference.feedback
+    for index, teachable in enumerate(data.teachable_references):
+        yield ["teachable_references", index], teachable.parameter
+        yield ["teachable_references", index], teachable.most
     for table, codes in _named_in_tables(data).items():
         for code in codes:
             yield [table], code

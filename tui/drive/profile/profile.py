@@ -9,6 +9,7 @@ from decimal import Decimal
 from functools import cached_property
 
 from ..errors import UnknownParameter
+from ..teaching import TaughtScale
 from .guide import FaultGuide
 from .schema import Chart, FaultCode, Function, HelpData, Parameter, ProfileData, Quantity
 
@@ -26,9 +27,18 @@ def is_verified(parameter: Parameter) -> bool:
 class Profile:
     """A drive family's description, with the look-ups that the rest of the panel needs."""
 
-    def __init__(self, data: ProfileData, read_help: Callable[[], HelpData] | None = None) -> None:
+    def __init__(
+        self,
+        data: ProfileData,
+        read_help: Callable[[], HelpData] | None = None,
+        *,
+        taught: Mapping[str, TaughtScale] | None = None,
+    ) -> None:
         self.data = data
+        self.read_help = read_help
         self.guide = FaultGuide(data, read_help)
+        self.taught: Mapping[str, TaughtScale] = taught or {}
+        """By code, what a person has taught of this one drive; no file of a family says it."""
         self.parameters = tuple(data.parameters)
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)
@@ -154,6 +164,13 @@ class Profile:
         if word is None:
             return "raw"
         return told.units.get(str(word >> told.shift & told.mask), "raw")
+
+
+def mark_of(profile: Profile, parameter: Parameter) -> str:
+    """What stands beside a value that no document tells for sure: `taught` or `?`."""
+    if parameter.code in profile.taught:
+        return "taught"
+    return "" if is_verified(parameter) else "?"
 
 
 def parse_address(text: str) -> int | None:

@@ -10,8 +10,8 @@ from tui.drive.orders import OrderRefused, chart_in_force
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
 
-from .arming import ArmingKeys
 from .control import Control, hindrance
+from .teaching import PickWord, TeachKeys, words_to_teach
 
 SHOWN_DONE = 8.0
 SHOWN_REFUSED = 20.0
@@ -33,7 +33,7 @@ STOPS_THAT_ASK = {
 """Question, what follows and the yes of the stops that need no arming but ask."""
 
 
-class OrderKeys(ArmingKeys):
+class OrderKeys(TeachKeys):
     """The actions of the keys; everything else is the commander's."""
 
     _asked: Outcome | None = None
@@ -140,6 +140,34 @@ class OrderKeys(ArmingKeys):
         question, follows, yes = STOPS_THAT_ASK[id]
         stop = partial(self.app.stop_drive, self.console, id)
         self._ask(question, follows, yes, "does not", lambda _stamp: stop())
+
+    def action_teach(self) -> None:
+        """Choose a raw value of this screen, and say what the drive's display shows for it."""
+        profile = self.session.profile
+        watched = [value.parameter for value in profile.data.monitoring.values]
+        codes = words_to_teach(profile, watched)
+        if not codes:
+            self._refuse("Nothing here is shown raw: every value has its scale from a document.")
+            return
+
+        def chosen(code: str | None) -> None:
+            if code is not None:
+                self.ask_look(code)
+
+        self.app.push_screen(PickWord(self.console, codes, self.motor_now()), chosen)
+
+    def action_reference_by(self) -> None:
+        """Let a taught preset take the reference, or no more, after saying what that means."""
+        from tui.session.command.reference import no_place
+
+        if code := self.teacher.reference:
+            self.ask_no_reference(code)
+        elif code := self.teacher.proposal():
+            self.ask_reference(code)
+        elif self.session.profile.data.teachable_references:
+            self._refuse(no_place(self.session.profile, "Hz"))
+        else:
+            self._refuse(f"{self.session.profile.name} takes no reference that has to be taught.")
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""

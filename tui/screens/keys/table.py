@@ -27,7 +27,7 @@ from .action import (
     on,
 )
 from .block_actions import BLOCK_ACTIONS
-from .monitor_actions import COMMAND_ACTIONS, WATCH_ACTIONS
+from .monitor_actions import COMMAND_ACTIONS, TEACH_ACTIONS, WATCH_ACTIONS
 from .parameter_actions import PARAMETER_ACTIONS
 
 of_app = partial(Action, app=True)
@@ -88,6 +88,7 @@ ACTIONS: tuple[Action, ...] = (
     ),
     *on((SOURCES,), ("leave", "escape", "back", "Go back to Monitor.")),
     *PARAMETER_ACTIONS,
+    *TEACH_ACTIONS,
     *BLOCK_ACTIONS,
     *WATCH_ACTIONS,
     *on(

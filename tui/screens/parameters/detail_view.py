@@ -7,6 +7,7 @@ from rich.text import Text
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.factory import factory_is_sure
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
+from tui.drive.taught_profile import why_not_taught
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import wrapped
@@ -70,8 +71,10 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
     if parameter.bits and raw is not None:
         names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, raw))
         found.append(f"Now: {names or 'no bit set'}")
-    if parameter.note:
+    # a profile's note on a word without a scale says that it is shown raw
+    if parameter.note and parameter.code not in editor.session.profile.taught:
         found.append(parameter.note)
+    found += _taught(editor, parameter)
     if parameter.base:
         found.append(f"In percent of {parameter.base}")
     if parameter.scale_by is not None and parameter.scale_by.parameter not in parameter.note:
@@ -80,6 +83,16 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
         choices = dict.fromkeys(editor.session.profile.names(parameter).values())
         found.append(f"One of: {', '.join(choices)}")
     return found
+
+
+def _taught(editor: Editor, parameter: Parameter) -> list[str]:
+    """What a person has taught of it, or that it can be taught."""
+    session = editor.session
+    if (scale := session.profile.taught.get(parameter.code)) is not None:
+        return [f"Taught: {scale.text}; L looks again"]
+    if parameter.access != "r" or why_not_taught(session.family, parameter.code):
+        return []
+    return ["L or Enter teaches its scale by the drive's display"]
 
 
 def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:

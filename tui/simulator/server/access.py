@@ -44,6 +44,8 @@ class DriveWords:
         self._blocked = blocked
         self._written = written
         self._reading = profile.data.reading
+        self._taught = {one.parameter for one in profile.data.teachable_references}
+        """Words that take a reference though no document says that they can be written."""
         self._scanner: dict[int, tuple[Block, int]] = {}
         """Words that stand for another parameter: their block and place in it."""
         for block in profile.data.blocks:
@@ -155,7 +157,7 @@ class DriveWords:
         parameter = self._registers.owner(address) if address <= 0xFFFF else None
         if parameter is None:
             raise Refused(self._refusals.unknown_address)
-        if parameter.access == "r" or word_count(parameter) == 2:
+        if not self._may_be_written(parameter) or word_count(parameter) == 2:
             return
         raw = from_words(parameter, [word])
         low, high = raw_range(parameter)
@@ -187,7 +189,7 @@ class DriveWords:
     def _apply(self, address: int, word: int) -> None:
         parameter = self._registers.owner(address)
         assert parameter is not None
-        if parameter.access == "r":
+        if not self._may_be_written(parameter):
             raise Refused(self._refusals.read_only)
         if self._blocked(parameter):
             raise Refused(self._refusals.not_now)
@@ -195,6 +197,9 @@ class DriveWords:
             word = to_words(parameter, self._within(parameter, from_words(parameter, [word])))[0]
         self._registers.write_word(address, word)
         self._written(parameter)
+
+    def _may_be_written(self, parameter: Parameter) -> bool:
+        return parameter.access != "r" or parameter.code in self._taught
 
     def _check_count(self, count: int, limit: int | None, function: Function) -> None:
         if count < 1:

@@ -35,6 +35,7 @@ from .chart import (
     State,
     StateKind,
     StatusBit,
+    TeachableReference,
     Transition,
 )
 from .control_source import ControlSource, Setting, Way
@@ -174,6 +175,7 @@ __all__ = [
     "StatusBit",
     "Storage",
     "Table",
+    "TeachableReference",
     "Transition",
     "UnitBy",
     "Way",

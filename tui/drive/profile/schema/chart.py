@@ -174,3 +174,16 @@ class ReferenceWay(Table, frozen=True, kw_only=True):
     signed: bool = False
     feedback: str = ""
     note: str = ""
+
+
+class TeachableReference(Table, frozen=True, kw_only=True):
+    """A word of unknown scale that takes the reference once that scale was taught and confirmed."""
+
+    parameter: str
+    bits: WordAddress = 0
+    """Bits of the chart's command word that choose it; set with each command to run."""
+    most: str = ""
+    """Parameter that holds the highest reference, once it was taught in the same unit."""
+    note: str = ""
+    source: str = ""
+    confidence: Confidence = "unverified"

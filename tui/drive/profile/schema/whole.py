@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from .base import Table
 from .block import Block
-from .chart import Chart, CommandExample, ReferenceWay
+from .chart import Chart, CommandExample, ReferenceWay, TeachableReference
 from .control_source import ControlSource
 from .identification import Erratum, Identification, ProfileHead, Source
 from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkSettings, ReadShapes
@@ -31,6 +31,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     charts: list[Chart] = []
     command_examples: list[CommandExample] = []
     references: list[ReferenceWay] = []
+    teachable_references: list[TeachableReference] = []
     faults: Faults = Faults()
     monitoring: Monitoring
     control_sources: list[ControlSource] = []
