@@ -78,6 +78,22 @@ DEFECTS = (
         ("tests/drive/test_profiles_atv71.py", "tests/session/test_drive_state.py"),
     ),
     Defect(
+        "fault-word-not-looked-at",
+        "tui/drive/chart.py",
+        "return None if faults.shows_last or raw == faults.none else raw",
+        "return None",
+        "A tripped drive whose status word knows no fault is shown ready, and is run.",
+        ("tests/session/test_fault_word.py",),
+    ),
+    Defect(
+        "fault-word-taken-for-standstill",
+        "tui/drive/chart.py",
+        "return self.own.kind if self.own.kind in ENABLED_KINDS else self.state.kind",
+        "return self.state.kind",
+        "Settings that need standstill are written to a motor that runs on with a fault.",
+        ("tests/session/test_fault_word.py",),
+    ),
+    Defect(
         "unread-interlock-passes",
         "tui/drive/orders.py",
         'return f"{lock.parameter} is not known, and it decides: {lock.text}"',

@@ -10,6 +10,10 @@ from .profile.profile import Profile
 from .profile.schema import ChannelBits, Chart, DirectionBit, State, StateKind, StatusBit
 
 UNKNOWN = State(id="unknown", name="Unknown", kind="unknown", mask=0, value=0)
+TOLD_FAULT = State(id="fault", name="Fault", kind="fault", mask=0, value=0)
+"""What a fault word tells where the chart has no state for it."""
+ENABLED_KINDS: frozenset[StateKind] = frozenset({"running", "stopping"})
+"""Kinds of state in which the drive may turn its motor."""
 Direction = Literal["forward", "reverse"]
 
 
@@ -18,6 +22,9 @@ class ChartState:
     """What the status words say; a part is None where its word was not read."""
 
     state: State
+    """The state in force: a fault where the fault word tells one, whatever the status word."""
+    own: State = UNKNOWN
+    """The state by the status word alone."""
     direction: Direction | None = None
     reached: bool | None = None
     alarm: bool | None = None
@@ -30,15 +37,21 @@ class ChartState:
         """The kind of the state, the same words on every family."""
         return self.state.kind
 
+    @property
+    def motion(self) -> StateKind:
+        """The kind for whoever needs a motor at rest: a fault word stops no motor by itself."""
+        return self.own.kind if self.own.kind in ENABLED_KINDS else self.state.kind
+
 
 def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
     """The state of a drive, given raw values by code; UNKNOWN where none fits."""
     chart = profile.chart(raws)
     word = raws.get(chart.status) if chart else None
     if chart is None or word is None:
-        return ChartState(UNKNOWN)
+        return ChartState(TOLD_FAULT if told_fault(profile, raws) is not None else UNKNOWN)
     return ChartState(
-        state=state_of(chart, word),
+        state=state_now(profile, chart, raws),
+        own=state_of(chart, word),
         direction=_direction(chart.direction, raws),
         reached=_status_bit(chart.reached, raws),
         alarm=_status_bit(chart.alarm, raws),
@@ -52,8 +65,38 @@ def state_of(chart: Chart, word: int) -> State:
     return next((s for s in chart.states if word & s.mask == s.value), UNKNOWN)
 
 
+def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
+    """The state in force in a chart; a fault word goes before the status word.
+
+    UNKNOWN where the status word was not read and no fault is told.
+    """
+    word = raws.get(chart.status)
+    own = state_of(chart, word) if word is not None else UNKNOWN
+    if own.kind == "fault" or told_fault(profile, raws) is None:
+        return own
+    return next((state for state in chart.states if state.kind == "fault"), TOLD_FAULT)
+
+
+def told_fault(profile: Profile, raws: Mapping[str, int]) -> int | None:
+    """The fault of now by the fault word; None where it tells none, or keeps the last one."""
+    faults = profile.data.faults
+    raw = raws.get(faults.parameter)
+    return None if faults.shows_last or raw == faults.none else raw
+
+
+def fault_code(profile: Profile) -> str:
+    """The code of the word that tells a present fault by itself; empty where none does."""
+    faults = profile.data.faults
+    return "" if faults.shows_last else faults.parameter
+
+
+def state_codes(profile: Profile, chart: Chart) -> list[str]:
+    """Codes of the words that tell the state in a chart."""
+    return [code for code in (chart.status, fault_code(profile)) if code]
+
+
 def watched_codes(profile: Profile) -> list[str]:
-    """Codes of every word that the charts of a profile look at."""
+    """Codes of every word that the charts of a profile look at, and of a present fault."""
     codes: list[str] = []
     for chart in profile.data.charts:
         marks = (
@@ -65,6 +108,8 @@ def watched_codes(profile: Profile) -> list[str]:
             chart.when,
         )
         codes += [chart.status, *(mark.parameter for mark in marks if mark)]
+    if codes and (code := fault_code(profile)):
+        codes.append(code)
     return list(dict.fromkeys(codes))
 
 

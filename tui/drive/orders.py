@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from .chart import state_of
 from .errors import DriveError
 from .profile.profile import Profile
-from .profile.schema import Chart, Interlock, Order, OrderId, Parameter, When
+from .profile.schema import Chart, Interlock, Order, OrderId, Parameter, State, When
 
 GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
 """Ways to stop that trip no drive, the gentlest first."""
@@ -38,13 +38,14 @@ def deciding_codes(profile: Profile) -> list[str]:
     return list(dict.fromkeys(codes))
 
 
-def choose(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Order:
-    """The order that holds in the state that the raw values tell; raises OrderRefused."""
+def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | None = None) -> Order:
+    """The order that holds in a state, by default that of the status word; raises OrderRefused."""
     same = [order for order in chart.orders if order.id == id]
     if not same:
         raise OrderRefused(f"The {chart.name} has no order {id.replace('-', ' ')!r}.")
     word = raws.get(chart.status)
-    state = state_of(chart, word) if word is not None else None
+    if state is None and word is not None:
+        state = state_of(chart, word)
     fitting = [o for o in same if not o.states or (state is not None and state.id in o.states)]
     for order in fitting:
         if all(raws.get(when.parameter) in when.values for when in order.when):

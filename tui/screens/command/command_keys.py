@@ -60,7 +60,7 @@ class OrderKeys(ArmingKeys):
         starts, latest = self.session.starts, self.console.latest
         if starts is None or latest is None or latest.error:
             return ""
-        said = starts.offered(self.session, runs=latest.state.kind == "running")
+        said = starts.offered(self.session, runs=latest.state.motion == "running")
         return f"{said[0].upper()}{said[1:]}. T takes over." if said else ""
 
     def action_take_over(self) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from tui.bus.api import Priority
-from tui.drive.chart import state_of
+from tui.drive.chart import state_codes, state_now
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
@@ -64,7 +64,7 @@ class CommandAccess:
         session = self.session
         codes = deciding_codes(session.profile)
         for chart in session.profile.data.charts:
-            codes += [chart.status, chart.command, *interlock_codes(chart)]
+            codes += [*state_codes(session.profile, chart), chart.command, *interlock_codes(chart)]
         await self.read([code for code in dict.fromkeys(codes) if code])
         found = chart_in_force(session.profile, self.raws)
         if found is None or not found.orders:
@@ -75,9 +75,9 @@ class CommandAccess:
         return found
 
     async def state(self, chart: Chart) -> State:
-        """The drive's state, read now."""
-        await self.read([chart.status])
-        return state_of(chart, self.raws[chart.status])
+        """The drive's state, read now with the word of its present fault."""
+        await self.read(state_codes(self.session.profile, chart))
+        return state_now(self.session.profile, chart, self.raws)
 
     async def wait_for(self, chart: Chart, goals: Collection[str]) -> State:
         """The state, as soon as it is one of those, or when its time is up."""

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from tui.drive.orders import OrderRefused, choose
+from tui.drive.chart import ENABLED_KINDS, state_of
+from tui.drive.orders import STOP_ORDERS, OrderRefused, choose
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.drive.values import from_words
 
@@ -18,7 +19,9 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
     chart = await access.chart(id)
     if id in ("forward", "reverse"):
         return await MotorStart(access).carry_out(chart, id)
-    order = choose(chart, id, access.raws)
+    state = await access.state(chart)
+    # a fault holds no stop back: its word follows the status word alone
+    order = choose(chart, id, access.raws, None if id in STOP_ORDERS else state)
     await access.send(chart, order)
     return f"{order.name}: {(await access.state(chart)).name}"
 
@@ -67,8 +70,8 @@ async def set_option(access: CommandAccess, option: CommandOption, bits: int) ->
     reading = (await access.read([parameter.code]))[parameter.code]
     if reading.raw is None:
         raise OrderRefused(f"{parameter.code} cannot be read: {reading.error}")
-    running = {state.id for state in chart.states if state.kind in ("running", "stopping")}
-    if option.stopped_only and (await access.state(chart)).id in running:
+    await access.read([chart.status])
+    if option.stopped_only and state_of(chart, access.raws[chart.status]).kind in ENABLED_KINDS:
         raise OrderRefused(f"{option.name} is changed with the motor stopped only.")
     word = reading.raw & 0xFFFF & ~option.mask | bits
     await access.writer.write_parameter(

@@ -100,7 +100,7 @@ class LineWatch:
     def _runs_by_the_line(self, kept: _Kept) -> bool:
         """Whether the motor runs by somebody's command over the line, whoever gave it."""
         state, _ = self._last_seen(kept)
-        return state is not None and state.kind == "running" and not state.local
+        return state is not None and state.motion == "running" and not state.local
 
     def left_alone(self) -> dict[int, TimeoutWatch]:
         """Drives that act on their communication time-out once nobody asks them, at rest too."""
@@ -130,7 +130,7 @@ class LineWatch:
     def runs(self, device: int) -> bool:
         """Whether a motor runs, as far as anybody saw it last."""
         state, _ = self._last_seen(self._kept[device])
-        return state is not None and state.kind == "running"
+        return state is not None and state.motion == "running"
 
     def _may_turn(self, kept: _Kept) -> bool:
         """Whether a motor runs, or may: not seen since the last order, or not understood."""
@@ -138,7 +138,7 @@ class LineWatch:
         ordered = kept.session.commanded_at
         if state is None or (ordered is not None and seen <= ordered):
             return True
-        return state.kind in MAY_TURN
+        return state.motion in MAY_TURN
 
     def _last_seen(self, kept: _Kept) -> tuple[DriveState | None, float]:
         """The newest state of a drive, by its own monitor or by a look; and when that was."""
