@@ -25,6 +25,8 @@ class Value:
     unit: str
     text: str
     """What a person reads, without the unit."""
+    unsure: bool = False
+    """Whether no document says what so high a raw value means; its text ends with `?`."""
 
     @property
     def display(self) -> str:
@@ -107,7 +109,8 @@ def decode(
     if scale is None:
         return Value(raw, Decimal(raw), "raw", str(raw))
     number = engineering(raw, scale)
-    return Value(raw, number, parameter.unit, f"{number:f}")
+    unsure = parameter.sure_up_to is not None and raw > parameter.sure_up_to
+    return Value(raw, number, parameter.unit, f"{number:f}{'?' * unsure}", unsure)
 
 
 def is_enumeration(parameter: Parameter) -> bool:
@@ -137,6 +140,8 @@ def encode(
     value is out of the profile's range or sets a reserved bit.
     """
     typed = text.strip()
+    if parameter.sure_up_to is not None:
+        typed = typed.replace("?", "")  # the mark of such a value, as it is shown
     raw = _named(typed, names)
     rounded = False
     if raw is None and typed.lower().startswith(("16#", "0x")):

@@ -67,7 +67,8 @@ def readings_json(
 def reading_json(reading: Reading) -> dict[str, Any]:
     """One value; `raw` and `value` are null where there is none.
 
-    The value of a name or a bit word is its raw number.
+    The value of a name or a bit word is its raw number. `unsure` is there where no document says
+    what so high a raw value means.
     """
     number = reading.value.number if reading.value else None
     value = reading.raw if number is None else _plain(number)
@@ -78,6 +79,7 @@ def reading_json(reading: Reading) -> dict[str, Any]:
         "unit": reading.unit,
         "text": reading.text,
         "quality": str(reading.quality),
+        **({"unsure": True} if reading.value is not None and reading.value.unsure else {}),
     }
 
 
