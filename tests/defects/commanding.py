@@ -124,8 +124,9 @@ DEFECTS = (
     Defect(
         "interlock-ignored",
         "tui/session/command",
-        "(refused := interlock(found, wanted, self.raws))",
-        '(refused := "")',
+        "if held is not None:\n            raise OrderRefused(told_anywhere(held))",
+        "if held is not None and not held.text:\n"
+        "            raise OrderRefused(told_anywhere(held))",
         "A motor is started although its enable or its channel forbids it.",
         ("tests/session/test_command.py::test_refusals",),
     ),

@@ -94,6 +94,22 @@ DEFECTS = (
         ("tests/session/test_fault_word.py",),
     ),
     Defect(
+        "first-channel-taken-for-the-one-in-force",
+        "tui/drive/channel.py",
+        'if unread == "":\n            continue',
+        'if unread == "" and row.when[-1].holds(raws) is None:\n            continue',
+        "A drive that its terminals command is said to be commanded by the line.",
+        ("tests/drive/test_channels.py",),
+    ),
+    Defect(
+        "unread-channel-word-passes",
+        "tui/drive/held_back.py",
+        "if found is not None and not found.by_line:",
+        "if found is not None and found.by_line is False:",
+        "A run command is sent to a drive of which nobody knows who commands it.",
+        ("tests/drive/test_channels.py",),
+    ),
+    Defect(
         "unread-interlock-passes",
         "tui/drive/orders.py",
         'return f"{lock.parameter} is not known, and it decides: {lock.text}"',

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from .channel import command_channel, reference_channel
 from .profile.profile import Profile
 from .profile.schema import ChannelBits, Chart, DirectionBit, State, StateKind, StatusBit
 
@@ -30,7 +31,9 @@ class ChartState:
     alarm: bool | None = None
     local: bool | None = None
     channel: str = ""
-    """Who commands the drive, where the chart tells it."""
+    """Who commands the drive, where its words tell it."""
+    reference: str = ""
+    """Who gives its reference, where its words tell it."""
 
     @property
     def kind(self) -> StateKind:
@@ -56,7 +59,8 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
         reached=_status_bit(chart.reached, raws),
         alarm=_status_bit(chart.alarm, raws),
         local=_status_bit(chart.local, raws),
-        channel=_channel(chart.channel, raws),
+        channel=_commanded_by(profile, chart, raws),
+        reference=found.text if (found := reference_channel(profile, raws)) else "",
     )
 
 
@@ -117,6 +121,12 @@ def _direction(mark: DirectionBit | None, raws: Mapping[str, int]) -> Direction 
     if mark is None or (word := raws.get(mark.parameter)) is None:
         return None
     return "reverse" if word >> mark.bit & 1 == mark.reverse else "forward"
+
+
+def _commanded_by(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> str:
+    """Who commands: by the channels of the profile, else by bits of the chart."""
+    found = command_channel(profile, raws)
+    return found.text if found is not None else _channel(chart.channel, raws)
 
 
 def _channel(bits: ChannelBits | None, raws: Mapping[str, int]) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 
+from .channel import channel_codes
 from .chart import state_of
 from .errors import DriveError
 from .profile.profile import Profile
@@ -31,11 +32,11 @@ def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
 
 
 def deciding_codes(profile: Profile) -> list[str]:
-    """Codes of the words on which it depends how an order is carried out."""
+    """Codes of the words on which it depends how an order is carried out, and by whom."""
     codes = [chart.when.parameter for chart in profile.data.charts if chart.when]
     for chart in profile.data.charts:
         codes += [when.parameter for order in chart.orders for when in order.when]
-    return list(dict.fromkeys(codes))
+    return list(dict.fromkeys((*codes, *channel_codes(profile))))
 
 
 def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | None = None) -> Order:
@@ -48,7 +49,7 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | No
         state = state_of(chart, word)
     fitting = [o for o in same if not o.states or (state is not None and state.id in o.states)]
     for order in fitting:
-        if all(raws.get(when.parameter) in when.values for when in order.when):
+        if all(when.holds(raws) for when in order.when):
             return order
     if fitting:
         needed = " or ".join(_conditions(order) for order in fitting)
@@ -101,8 +102,7 @@ def _may_hold(chart: Chart, raws: Mapping[str, int]) -> bool:
     """Whether a chart may be the one in force."""
     if chart.when is None:
         return True
-    raw = raws.get(chart.when.parameter)
-    return raw is None or raw in chart.when.values
+    return chart.when.holds(raws) is not False
 
 
 def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int]) -> bool:
@@ -175,7 +175,7 @@ def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock |
     for lock in chart.interlocks:
         if id not in (lock.orders or MOVING_ORDERS):
             continue
-        if not all(raws.get(when.parameter) in when.values for when in lock.when):
+        if any(when.holds(raws) is False for when in lock.when):
             continue
         raw = raws.get(lock.parameter)
         if raw is None or raw & lock.mask not in lock.values:
@@ -189,8 +189,7 @@ def unmet(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> When | None:
     for order in chart.orders:
         if order.id != id:
             continue
-        known = [when for when in order.when if when.parameter in raws]
-        wrong = next((w for w in known if raws[w.parameter] not in w.values), None)
+        wrong = next((when for when in order.when if when.holds(raws) is False), None)
         if wrong is None:
             return None
         first = first or wrong

@@ -30,7 +30,9 @@ class DriveState:
     alarm: bool | None
     local: bool | None
     channel: str
-    """Who commands the drive, where its chart tells it."""
+    """Who commands the drive, where its words tell it."""
+    reference: str
+    """Who gives its reference, where its words tell it."""
     fault: FaultCode | None
     """The fault that the drive is in now."""
     fault_raw: int | None
@@ -60,6 +62,7 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
         alarm=chart.alarm,
         local=chart.local,
         channel=chart.channel,
+        reference=chart.reference,
         fault=fault,
         fault_raw=fault_raw,
         alarms=_alarms(profile, raws),

@@ -15,6 +15,7 @@ from tui.drive.profile.profile import Profile
 ChartKind = Literal["drivecom", "altivar21", "leroy-somer"]
 
 MODBUS_REFERENCE = 164
+FIRST_CHANNEL = 96
 MODBUS_COMMAND = 10
 
 
@@ -63,7 +64,7 @@ class Traits:
     """Settings of a simulated drive that was commissioned for the line, by code."""
 
 
-_LINE_CONTROL = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND, "CHCF": 1}
+_LINE_CONTROL = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND, "CHCF": 1, "RFC": FIRST_CHANNEL}
 
 _COMPACT = Traits(
     "drivecom",

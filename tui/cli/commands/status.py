@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -51,8 +51,10 @@ class Status:
     state: DriveState
     readings: Mapping[str, Reading]
     channels: Mapping[str, str]
+    switches: Sequence[str]
+    """What can bring another channel into force, as sentences."""
     refused: str
-    """Why a run order from here would have no effect; empty where it would have one."""
+    """Why a run command from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
 
 
@@ -85,6 +87,7 @@ def fault_text(state: DriveState) -> str:
 
 async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     """Read all that `status` tells. Raises the line's errors."""
+    from tui.drive.channel import switch_texts
     from tui.session.drive_state import drive_state
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
@@ -101,7 +104,8 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
         fleet.forget()
     state = drive_state(profile, readings)
     channels = _channels(profile, readings, state)
-    return Status(session, state, readings, channels, _refused(session), watch)
+    switches = switch_texts(profile, session.image.raws)
+    return Status(session, state, readings, channels, switches, _refused(session), watch)
 
 
 def _codes(profile: Profile) -> list[str]:
@@ -126,13 +130,16 @@ def _channels(
     for quantity, name in CHANNEL_NAMES.items():
         parameter = profile.quantity(quantity)
         found[name] = channel_text(parameter, readings.get(parameter.code)) if parameter else ""
-    # some families tell who commands in their status word
+    # some families tell who commands by several words
     found["Commanded by"] = state.channel or found["Commanded by"]
+    found["Reference from"] = state.reference or found["Reference from"]
     return found
 
 
 def _refused(session: DriveSession) -> str:
-    from tui.drive.orders import chart_in_force, interlock
+    from tui.drive.held_back import held_back
+    from tui.drive.orders import chart_in_force
+    from tui.session.command.way_out import told_anywhere
 
     raws = session.image.raws
     chart = chart_in_force(session.profile, raws)
@@ -142,7 +149,8 @@ def _refused(session: DriveSession) -> str:
         return f"This drive is not commanded from here: {chart.name}."
     if session.line.read_only:
         return "The line is read-only: nothing is written."
-    return interlock(chart, "forward", raws)
+    held = held_back(session.profile, chart, "forward", raws)
+    return told_anywhere(held) if held is not None else ""
 
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
@@ -159,6 +167,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
         "alarms": [bit.name for bit in state.alarms],
         "commanded_by": status.channels["Commanded by"] or None,
         "reference_from": status.channels["Reference from"] or None,
+        "switched_by": list(status.switches),
         "commandable": not status.refused,
         "why_not": status.refused or None,
         "watch": watch_json(watch),
@@ -200,7 +209,8 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         ("Fault", fault_text(state) or "none"),
         ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
         *status.channels.items(),
-        ("From here", status.refused or "orders can have an effect"),
+        *(("Besides", text) for text in status.switches),
+        ("From here", status.refused or "commands can have an effect"),
         ("Line watch", _watch_text(status)),
         *shown_values(profile, status.readings).items(),
     ]

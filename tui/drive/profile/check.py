@@ -168,6 +168,7 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
             for code in (order.parameter, order.groups)
         ],
         "control_sources": [s.parameter for c in data.control_sources for s in c.settings],
+        "channels": [code for told in _channel_words(data) for code in told],
         "identification": [
             data.identification.model_parameter,
             data.identification.class_parameter,
@@ -195,6 +196,14 @@ def _states(data: ProfileData) -> Iterator[Finding]:
                     ["charts", index],
                     f"chart {chart.id}: state {state_.id} has value bits outside its mask.",
                 )
+
+
+def _channel_words(data: ProfileData) -> Iterator[tuple[str, ...]]:
+    channels = data.channels
+    for row in (*channels.command, *channels.reference):
+        yield row.parameter, *(when.parameter for when in row.when)
+    for switch in channels.switches:
+        yield switch.parameter, *(when.parameter for when in switch.when)
 
 
 def _functions(data: ProfileData) -> Iterator[Finding]:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 from tui.bus.api import Priority
 from tui.drive.chart import state_codes, state_now
+from tui.drive.held_back import held_back
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
     deciding_codes,
-    interlock,
     interlock_codes,
     order_target,
     with_options,
@@ -26,6 +26,7 @@ from ..reading import Reading
 from ..settings.write import Writer
 from ..work import Permit
 from .given import GivenCommands
+from .way_out import told_anywhere
 
 STEP_TIME = 2.0
 """Seconds that a drive may take for one step of its chart."""
@@ -70,8 +71,9 @@ class CommandAccess:
         if found is None or not found.orders:
             name = found.name if found else "what decides about its commands was not read"
             raise OrderRefused(f"This drive is not commanded from here: {name}.")
-        if wanted is not None and (refused := interlock(found, wanted, self.raws)):
-            raise OrderRefused(refused)
+        held = held_back(session.profile, found, wanted, self.raws) if wanted is not None else None
+        if held is not None:
+            raise OrderRefused(told_anywhere(held))
         return found
 
     async def state(self, chart: Chart) -> State:

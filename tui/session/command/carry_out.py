@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
+from tui.drive.channel import channel_codes, reference_channel
 from tui.drive.chart import ENABLED_KINDS, state_of
 from tui.drive.orders import STOP_ORDERS, OrderRefused, choose
 from tui.drive.profile.schema import CommandOption, OrderId
@@ -31,13 +32,14 @@ async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | 
     chart = await access.chart(id)
     if reference is not None:
         await give_reference(access, reference)
-    return await MotorStart(access).carry_out(chart, id)
+    done = await MotorStart(access).carry_out(chart, id)
+    return done if reference is None else f"{done}{_without_effect(access)}"
 
 
 async def give_reference(access: CommandAccess, text: str) -> str:
     """Write a reference as typed."""
     profile = access.session.profile
-    readings = await access.read(reference_codes(profile))
+    readings = await access.read([*reference_codes(profile), *channel_codes(profile)])
     return await _write_reference(access, parse_reference(profile, text, readings))
 
 
@@ -60,7 +62,16 @@ async def _write_reference(access: CommandAccess, reference: Reference) -> str:
     access.session.note_command()
     access.given.note_reference(reference)
     rounded = ", rounded to what the drive can hold" if reference.rounded else ""
-    return f"Reference {reference.text} ({reference.parameter.code}){rounded}"
+    without = _without_effect(access)
+    return f"Reference {reference.text} ({reference.parameter.code}){rounded}{without}"
+
+
+def _without_effect(access: CommandAccess) -> str:
+    """That a reference given from here changes nothing, where somebody else surely gives it."""
+    found = reference_channel(access.session.profile, access.raws)
+    if found is None or found.by_line is not False:
+        return ""
+    return f"; no effect from here: the reference comes from {found.text}"
 
 
 async def set_option(access: CommandAccess, option: CommandOption, bits: int) -> str:

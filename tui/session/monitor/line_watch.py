@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from tui.bus.api import LineWorker, ModbusLine, Priority
 from tui.bus.errors import LineError
+from tui.drive.channel import channel_codes
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
@@ -241,8 +242,12 @@ class LineWatch:
         state, error, readings = None, "", {}
         try:
             codes = [*_state_codes(profile), *_glance_codes(profile), *unread_limit(kept.session)]
+            told = channel_codes(profile)
+            codes += [code for code in told if profile[code].access == "r"]
             readings = await kept.reader.read(codes, priority=Priority.POLL)
-            state = drive_state(profile, readings)
+            # settings are read with the time-out: another channel is set up at rest only
+            settings = {c: one for c in told if (one := kept.session.image.get(c)) is not None}
+            state = drive_state(profile, settings | readings)
         except LineError as fault:
             error = str(fault)
         watch = self._watch(kept)

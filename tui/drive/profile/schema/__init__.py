@@ -20,6 +20,7 @@ from .base import (
     WordAddress,
 )
 from .block import Block, BlockChoice
+from .channel import ChannelRow, Channels, ChannelSwitch
 from .chart import (
     ChannelBits,
     Chart,
@@ -92,6 +93,9 @@ __all__ = [
     "Block",
     "BlockChoice",
     "ChannelBits",
+    "ChannelRow",
+    "ChannelSwitch",
+    "Channels",
     "Chart",
     "CommandExample",
     "CommandOption",
