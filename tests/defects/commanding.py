@@ -131,6 +131,14 @@ DEFECTS = (
         ("tests/session/test_command.py::test_refusals",),
     ),
     Defect(
+        "old-reference-behind-a-reset",
+        "tui/session/command",
+        "access.given.forget_reference()",
+        "access.given.forget_words()",
+        "After a reset, which is said to leave the reference at 0, the motor runs at the old one.",
+        ("tests/session/test_reset_clears.py",),
+    ),
+    Defect(
         "wrong-way-goes-on",
         "tui/session/command",
         "if turns is None or turns == id:",

@@ -60,6 +60,11 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | No
     raise OrderRefused(f"{same[0].name} is possible in the states: {allowed}. It is now: {now}.")
 
 
+def follows_from(chart: Chart, id: OrderId) -> str:
+    """What follows from an order besides, for whoever is asked before it is given."""
+    return " ".join(dict.fromkeys(o.follows for o in chart.orders if o.id == id and o.follows))
+
+
 def nearest_stop(chart: Chart, id: OrderId) -> OrderId:
     """The way to stop that a chart has in place of one that it lacks.
 

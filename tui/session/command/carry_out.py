@@ -7,7 +7,7 @@ from decimal import Decimal
 from tui.drive.channel import channel_codes, reference_channel
 from tui.drive.chart import ENABLED_KINDS, state_of
 from tui.drive.orders import STOP_ORDERS, OrderRefused, choose
-from tui.drive.profile.schema import CommandOption, OrderId
+from tui.drive.profile.schema import CommandOption, Order, OrderId
 from tui.drive.values import from_words
 
 from .access import CommandAccess
@@ -24,7 +24,25 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
     # a fault holds no stop back: its word follows the status word alone
     order = choose(chart, id, access.raws, None if id in STOP_ORDERS else state)
     await access.send(chart, order)
-    return f"{order.name}: {(await access.state(chart)).name}"
+    name = (await access.state(chart)).name
+    return f"{order.name}: {name}{await _cleared(access, order)}"
+
+
+async def _cleared(access: CommandAccess, order: Order) -> str:
+    """What the reference is now, where an order puts words back to their initial values."""
+    if not order.clears:
+        return ""
+    access.session.image.forget(order.clears)
+    readings = await access.read(order.clears)
+    wanted = access.given.wanted
+    now = readings.get(wanted.parameter.code) if wanted is not None else None
+    if wanted is not None and now is not None and now.raw != wanted.raw:
+        access.given.forget_reference()
+    parameter = access.session.profile.quantity("command_frequency")
+    reading = readings.get(parameter.code) if parameter is not None else None
+    if reading is None or reading.value is None:
+        return ""
+    return f"; the reference is {reading.value.display} now"
 
 
 async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | None) -> str:
