@@ -8,7 +8,9 @@ import pytest
 
 from tui.bus.api import Priority
 from tui.drive.chart import watched_codes
+from tui.drive.held_back import IN_FAULT, state_refusal
 from tui.drive.orders import OrderRefused
+from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.session.command.access import CommandAccess
 from tui.session.command.carry_out import give_order
@@ -104,6 +106,19 @@ async def test_a_tripped_drive_is_not_run_and_can_be_reset() -> None:
     assert line.registers[COMMAND] == 0
     assert await give_order(made, "reset") == "Fault reset: Ready"
     assert await give_order(made, "forward") == "Run: Running"
+
+
+def test_status_and_run_refuse_alike() -> None:
+    profile = own()
+    chart = profile.data.charts[0]
+    assert state_refusal(profile, chart, "forward", {"STAT": READY, "TRIP": 5}) == IN_FAULT
+    assert state_refusal(profile, chart, "forward", {"STAT": READY, "TRIP": 0}) == ""
+    atv21 = library.load("atv21")
+    chart = atv21.data.charts[0]
+    coasting = {"FD01": 0x0800, "FC90": 0}
+    assert "possible in the states" in state_refusal(atv21, chart, "forward", coasting)
+    assert state_refusal(atv21, chart, "forward", {"FD01": 0x4000, "FC90": 0}) == ""
+    assert state_refusal(atv21, chart, "forward", {"FD01": 0x4000, "FC90": 24}) == IN_FAULT
 
 
 async def test_a_fault_word_stops_no_motor() -> None:

@@ -7,9 +7,12 @@ from dataclasses import dataclass
 from typing import Literal
 
 from .channel import Channel, command_channel
-from .orders import MOVING_ORDERS, locked_by, order_target, unmet
+from .chart import state_now
+from .orders import MOVING_ORDERS, OrderRefused, choose, locked_by, order_target, unmet
 from .profile.profile import Profile
 from .profile.schema import Chart, OrderId
+
+IN_FAULT = "The drive is in fault: reset it first."
 
 WayOut = Literal["", "set-up", "take-control"]
 """What opens the way: nothing from here, another control source, taking the control."""
@@ -48,6 +51,19 @@ def held_back(
         way: WayOut = "take-control" if _takes_control(profile, chart, when.parameter) else ""
         return HeldBack(text, "", way, of_channel=True)
     return None
+
+
+def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
+    """Why the state of now lets no such start through; empty where it does."""
+    state = state_now(profile, chart, raws)
+    if state.kind == "fault":
+        return IN_FAULT
+    if chart.kind != "drivecom":  # one of that kind is walked from any other state
+        try:
+            choose(chart, id, raws, state)
+        except OrderRefused as refused:
+            return str(refused)
+    return ""
 
 
 def _by_others(profile: Profile, found: Channel) -> HeldBack:

@@ -137,7 +137,7 @@ def _channels(
 
 
 def _refused(session: DriveSession) -> str:
-    from tui.drive.held_back import held_back
+    from tui.drive.held_back import held_back, state_refusal
     from tui.drive.orders import chart_in_force
     from tui.session.command.way_out import told_anywhere
 
@@ -150,7 +150,9 @@ def _refused(session: DriveSession) -> str:
     if session.line.read_only:
         return "The line is read-only: nothing is written."
     held = held_back(session.profile, chart, "forward", raws)
-    return told_anywhere(held) if held is not None else ""
+    if held is not None:
+        return told_anywhere(held)
+    return state_refusal(session.profile, chart, "forward", raws)
 
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:

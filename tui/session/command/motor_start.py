@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from tui.drive.chart import ENABLED_KINDS, read_chart
+from tui.drive.held_back import IN_FAULT
 from tui.drive.orders import OrderRefused, choose, walk
 from tui.drive.profile.schema import Chart, Order, OrderId
 
@@ -39,7 +40,7 @@ class MotorStart:
         access = self.access
         state = await access.state(chart)
         if state.kind == "fault":
-            raise OrderRefused("The drive is in fault: reset it first.")
+            raise OrderRefused(IN_FAULT)
         at_rest = state.kind not in ENABLED_KINDS
         await record_start(self.session, "reverse" if id == "reverse" else "forward", access.permit)
         try:
