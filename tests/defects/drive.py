@@ -111,9 +111,9 @@ DEFECTS = (
     ),
     Defect(
         "unread-interlock-passes",
-        "tui/drive/orders.py",
-        'return f"{lock.parameter} is not known, and it decides: {lock.text}"',
-        "continue",
+        "tui/drive/held_back.py",
+        'return HeldBack(f"{lock.parameter} is not known, and it decides: {lock.text}")',
+        "return None",
         "A motor is started although the word that forbids it could not be read.",
         ("tests/drive/test_orders.py",),
     ),

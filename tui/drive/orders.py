@@ -163,16 +163,6 @@ STOP_ORDERS: frozenset[OrderId] = frozenset({"stop", "quick-stop", "freewheel", 
 MOVING_ORDERS: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking"})
 
 
-def interlock(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
-    """Why an order must not be sent now, with what to do; empty when it may."""
-    lock = locked_by(chart, id, raws)
-    if lock is None:
-        return ""
-    if lock.parameter not in raws:
-        return f"{lock.parameter} is not known, and it decides: {lock.text}"
-    return f"{lock.text} {lock.remedy}".strip()
-
-
 def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock | None:
     """The first interlock that holds an order back now, or whose word is not known."""
     if id in STOP_ORDERS:
