@@ -7,7 +7,7 @@ from decimal import Decimal
 import pytest
 
 from tui.drive.control_taking import control_taking
-from tui.drive.orders import choose, interlock
+from tui.drive.orders import choose, locked_by
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.settings.factory import not_factory
@@ -108,6 +108,6 @@ def test_the_control_is_not_taken_over_a_waiting_run_command(
     family: Profile, word: int, holds: bool
 ) -> None:
     (chart,) = family.data.charts
-    assert bool(interlock(chart, "take-control", {"6.42": word})) is holds
-    assert not interlock(chart, "forward", {"6.42": word})
-    assert not interlock(chart, "hand-back", {"6.42": word})
+    assert (locked_by(chart, "take-control", {"6.42": word}) is not None) is holds
+    assert locked_by(chart, "forward", {"6.42": word}) is None
+    assert locked_by(chart, "hand-back", {"6.42": word}) is None

@@ -75,6 +75,18 @@ def test_what_has_no_effect_names_the_way_out(family: str, raws: dict[str, int],
     assert found.way == way
 
 
+@pytest.mark.parametrize("eti", [0x0002, 0x4002])
+def test_an_idle_altivar_312_set_up_for_modbus_is_commanded_by_modbus(eti: int) -> None:
+    """Whether its extended status word names the channel yet or not."""
+    profile = library.load("atv312")
+    raws = {"LAC": 2, "CHCF": 1, "Fr1": 164, "rFC": 96, "LRS3": 0, "ETA": 0x0240, "ETI": eti}
+    view = view_of(profile, raws)
+    text = [" ".join(line.plain.split()) for line in state_lines(view, 22)]
+    assert "Command Modbus" in text
+    assert "Reference Modbus" in text
+    assert hindrance(profile, raws) is None
+
+
 def test_nothing_hinders_a_drive_that_stands_by() -> None:
     assert hindrance(ATV71, fakes.READY) is None
     assert hindrance(library.load("powerdrive"), {"10.40": 3, "6.43": 1}) is None

@@ -27,6 +27,8 @@ class Value:
     """What a person reads, without the unit."""
     taught: bool = False
     """Whether a person has taught its scale; no document has it."""
+    unsure: bool = False
+    """Whether no document says what so high a raw value means; its text ends with `?`."""
 
     @property
     def display(self) -> str:
@@ -109,7 +111,8 @@ def decode(
     if scale is None:
         return Value(raw, Decimal(raw), "raw", str(raw))
     number = engineering(raw, scale)
-    return Value(raw, number, parameter.unit, f"{number:f}")
+    unsure = parameter.sure_up_to is not None and raw > parameter.sure_up_to
+    return Value(raw, number, parameter.unit, f"{number:f}{'?' * unsure}", unsure=unsure)
 
 
 def is_enumeration(parameter: Parameter) -> bool:
@@ -139,6 +142,8 @@ def encode(
     value is out of the profile's range or sets a reserved bit.
     """
     typed = text.strip()
+    if parameter.sure_up_to is not None:
+        typed = typed.replace("?", "")  # the mark of such a value, as it is shown
     raw = _named(typed, names)
     rounded = False
     if raw is None and typed.lower().startswith(("16#", "0x")):

@@ -6,7 +6,7 @@ import math
 
 from tui.bus.api import ModbusLine
 from tui.bus.link import label
-from tui.drive.chart import UNKNOWN, ChartState, read_chart
+from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile
 
 from .arming import Arming
@@ -100,9 +100,15 @@ class DriveSession:
         return label(self.line.link)
 
     def state(self, longest: float) -> ChartState:
-        """The drive's state by its status word; unknown where that is older than so many s."""
+        """The drive's state by its words; unknown where its status is older than so many s.
+
+        A fault word that old tells nothing: the fault may have been reset since.
+        """
         raws = self.image.trusted
         chart = self.profile.chart(raws)
         if chart is None or self.image.age(chart.status) > longest:
             return ChartState(UNKNOWN)
+        fault = fault_code(self.profile)
+        if fault and self.image.age(fault) > longest:
+            raws = {code: raw for code, raw in raws.items() if code != fault}
         return read_chart(self.profile, raws)

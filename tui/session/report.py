@@ -8,6 +8,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from tui.drive.blocks.assignment import slot_target
+from tui.drive.channel import switch_texts
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
 from tui.drive.hints import hint_markdown, reset_text
@@ -126,8 +127,10 @@ class _Report:
         raws = self.values.raws
         source = source_in_force(self.profile, raws)
         lines = [f"- Configuration: {source.name if source else 'none of those in the manual'}"]
-        if channel := read_chart(self.profile, raws).channel:
-            lines.append(f"- Commanded by: {channel}")
+        told = read_chart(self.profile, raws)
+        lines += [f"- Commanded by: {told.channel}"] if told.channel else []
+        lines += [f"- Reference from: {told.reference}"] if told.reference else []
+        lines += [f"- {text}" for text in switch_texts(self.profile, raws)]
         for quantity in CHANNEL_QUANTITIES:
             parameter = self.profile.quantity(quantity)
             if parameter is None or parameter.code not in raws:

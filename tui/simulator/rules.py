@@ -15,6 +15,7 @@ from tui.drive.profile.profile import Profile
 ChartKind = Literal["drivecom", "altivar21", "leroy-somer", "own"]
 
 MODBUS_REFERENCE = 164
+FIRST_CHANNEL = 96
 MODBUS_COMMAND = 10
 
 
@@ -65,7 +66,13 @@ class Traits:
     """Settings of a simulated drive that was commissioned for the line, by code."""
 
 
-_LINE_CONTROL = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND, "CHCF": 1, "TCT": 0}
+_LINE_CONTROL = {
+    "FR1": MODBUS_REFERENCE,
+    "CD1": MODBUS_COMMAND,
+    "CHCF": 1,
+    "RFC": FIRST_CHANNEL,
+    "TCT": 0,
+}
 
 _COMPACT = Traits(
     "drivecom",

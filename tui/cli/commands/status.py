@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -53,8 +53,10 @@ class Status:
     state: DriveState
     readings: Mapping[str, Reading]
     channels: Mapping[str, str]
+    switches: Sequence[str]
+    """What can bring another channel into force, as sentences."""
     refused: str
-    """Why a run order from here would have no effect; empty where it would have one."""
+    """Why a run command from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
     finding: FaultFinding | None = None
     """What its fault or its alarm points at; None where it has neither."""
@@ -93,6 +95,7 @@ def fault_text(state: DriveState) -> str:
 
 async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     """Read all that `status` tells. Raises the line's errors."""
+    from tui.drive.channel import switch_texts
     from tui.session.drive_state import drive_state
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
@@ -110,7 +113,9 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     finally:
         fleet.forget()
     channels = _channels(profile, readings, state)
-    return Status(session, state, readings, channels, _refused(session), watch, finding)
+    switches = switch_texts(profile, session.image.raws)
+    refused = _refused(session)
+    return Status(session, state, readings, channels, switches, refused, watch, finding)
 
 
 def _codes(profile: Profile) -> list[str]:
@@ -137,13 +142,16 @@ def _channels(
     for quantity, name in CHANNEL_NAMES.items():
         parameter = profile.quantity(quantity)
         found[name] = channel_text(parameter, readings.get(parameter.code)) if parameter else ""
-    # some families tell who commands in their status word
+    # some families tell who commands by several words
     found["Commanded by"] = state.channel or found["Commanded by"]
+    found["Reference from"] = state.reference or found["Reference from"]
     return found
 
 
 def _refused(session: DriveSession) -> str:
-    from tui.drive.orders import chart_in_force, interlock
+    from tui.drive.held_back import held_back, state_refusal
+    from tui.drive.orders import chart_in_force
+    from tui.session.command.way_out import told_anywhere
 
     raws = session.image.raws
     chart = chart_in_force(session.profile, raws)
@@ -153,7 +161,10 @@ def _refused(session: DriveSession) -> str:
         return f"This drive is not commanded from here: {chart.name}."
     if session.line.read_only:
         return "The line is read-only: nothing is written."
-    return interlock(chart, "forward", raws)
+    held = held_back(session.profile, chart, "forward", raws)
+    if held is not None:
+        return told_anywhere(held)
+    return state_refusal(session.profile, chart, "forward", raws)
 
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
@@ -169,6 +180,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
         "alarms": [bit.name for bit in state.alarms],
         "commanded_by": status.channels["Commanded by"] or None,
         "reference_from": status.channels["Reference from"] or None,
+        "switched_by": list(status.switches),
         "commandable": not status.refused,
         "why_not": status.refused or None,
         "control": control_json(status.session),
@@ -220,7 +232,8 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
         *(found if of_alarm else []),
         *status.channels.items(),
-        ("From here", status.refused or "orders can have an effect"),
+        *(("Besides", text) for text in status.switches),
+        ("From here", status.refused or "commands can have an effect"),
         ("Line watch", _watch_text(status)),
         *control_row(status.session),
         *shown_values(profile, status.readings).items(),

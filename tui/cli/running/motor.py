@@ -220,7 +220,8 @@ class Run:
     def _stands(self) -> bool:
         """Whether the motor is seen at rest, though the drive did not take the stop."""
         latest = latest_of(self.console)
-        return self._at_rest(latest) and self._frequency(latest) == 0
+        enabled = latest.state.motion == "running"
+        return self._at_rest(latest) and not enabled and self._frequency(latest) == 0
 
     async def _line_was_bad(self, since: float) -> bool:
         """Wait until the drive answers; whether it failed to at any time since."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterator
 
 from ..errors import ProfileError
@@ -9,6 +10,13 @@ from ..values import raw_range, type_range, word_count
 from .decode import source_line
 from .help_file import help_findings
 from .schema import HelpData, Multiple, Parameter, ProfileData
+
+WORD_FORMS = {
+    re.compile(r"16#"): re.compile(r"\b(?=[0-9]*[A-F])[0-9A-F]{4}\b"),
+    re.compile(r"W[0-9]"): re.compile(r"\bW[0-9]{3,5}\b"),
+    re.compile(r"[0-9]+\.[0-9]"): re.compile(r"\b[0-9]{1,2}\.[0-9]{2}\b"),
+}
+"""How a text names a word, by how the numbers of a family are written."""
 
 SchemaPath = list[str | int]
 Finding = tuple[SchemaPath, str]
@@ -127,6 +135,7 @@ def _referred(data: ProfileData) -> Iterator[tuple[SchemaPath, str]]:
         )
         ordered = [o.parameter for o in chart.orders]
         ordered += [when.parameter for o in chart.orders for when in o.when]
+        ordered += [code for o in chart.orders for code in o.clears]
         ordered += [lock.parameter for lock in chart.interlocks]
         ordered += [when.parameter for lock in chart.interlocks for when in lock.when]
         ordered += [option.parameter for option in chart.options]
@@ -188,12 +197,29 @@ def _named_in_tables(data: ProfileData) -> dict[str, list[str]]:
         ],
         "start_up": [code for step in data.start_up for code in step.parameters],
         "control_sources": [s.parameter for c in data.control_sources for s in c.settings],
+        "channels": [code for told in _channel_words(data) for code in told],
         "identification": [
             data.identification.model_parameter,
             data.identification.class_parameter,
         ],
         "addresses": [server.parameter for server in data.addresses.servers],
     }
+
+
+def _written_words(data: ProfileData) -> Iterator[Finding]:
+    """Words that the texts of control sources name by their numbers."""
+    numbers = [parameter.number for parameter in data.parameters]
+    known = {name for p in data.parameters for name in (p.code, p.number, p.number[3:])}
+    forms = [form for start, form in WORD_FORMS.items() if any(start.match(n) for n in numbers)]
+    for index, source in enumerate(data.control_sources):
+        texts = [source.name, source.note]
+        texts += [
+            t for way in (source.command, source.reference) for t in (*way.sources, way.switch)
+        ]
+        for word in (word for text in texts for form in forms for word in form.findall(text)):
+            if word not in known:
+                place: SchemaPath = ["control_sources", index]
+                yield place, f"control source {source.id}: there is no word {word}."
 
 
 def _states(data: ProfileData) -> Iterator[Finding]:
@@ -215,6 +241,14 @@ def _states(data: ProfileData) -> Iterator[Finding]:
                     ["charts", index],
                     f"chart {chart.id}: state {state_.id} has value bits outside its mask.",
                 )
+
+
+def _channel_words(data: ProfileData) -> Iterator[tuple[str, ...]]:
+    channels = data.channels
+    for row in (*channels.command, *channels.reference):
+        yield row.parameter, *(when.parameter for when in row.when)
+    for switch in channels.switches:
+        yield switch.parameter, *(when.parameter for when in switch.when)
 
 
 def _functions(data: ProfileData) -> Iterator[Finding]:
@@ -281,4 +315,5 @@ RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
     _scales,
     _factory_settings,
     _start_up,
+    _written_words,
 )

@@ -134,7 +134,7 @@ class Profile:
         for chart in self.data.charts:
             if chart.when is None:
                 fallback = fallback or chart
-            elif raws.get(chart.when.parameter) in chart.when.values:
+            elif chart.when.holds(raws):
                 return chart
         return fallback or (self.data.charts[0] if self.data.charts else None)
 

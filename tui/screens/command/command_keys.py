@@ -6,7 +6,7 @@ from collections.abc import Callable
 from decimal import Decimal
 from functools import partial
 
-from tui.drive.orders import OrderRefused, chart_in_force
+from tui.drive.orders import OrderRefused, chart_in_force, follows_from
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
 
@@ -60,7 +60,7 @@ class OrderKeys(TeachKeys):
         starts, latest = self.session.starts, self.console.latest
         if starts is None or latest is None or latest.error:
             return ""
-        said = starts.offered(self.session, runs=latest.state.kind == "running")
+        said = starts.offered(self.session, runs=latest.state.motion == "running")
         return f"{said[0].upper()}{said[1:]}. T takes over." if said else ""
 
     def action_take_over(self) -> None:
@@ -95,7 +95,10 @@ class OrderKeys(TeachKeys):
     def action_reset(self) -> None:
         """Reset a fault, after saying what that needs."""
         if self._armed_or_told():
-            follows = "The cause must be gone. Nothing runs by itself: command it anew afterwards."
+            chart = chart_in_force(self.session.profile, self.session.image.raws)
+            besides = follows_from(chart, "reset") if chart is not None else ""
+            besides = besides or "Nothing runs by itself: command it anew afterwards."
+            follows = f"The cause must be gone. {besides}"
             work = partial(self.commander.order, "reset")
             self._ask("Reset the fault?", follows, "resets it", "leaves it", work)
 

@@ -77,5 +77,5 @@ class ViewSource:
         outcome, latest = self._console.session.work.outcome, self._console.latest
         if outcome is not None and outcome.time > report.since:
             return True
-        runs = latest is not None and not latest.error and latest.state.kind == "running"
+        runs = latest is not None and not latest.error and latest.state.motion == "running"
         return runs and report.phase is Phase.STOPPED

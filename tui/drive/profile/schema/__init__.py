@@ -21,6 +21,7 @@ from .base import (
     WordAddress,
 )
 from .block import Block, BlockChoice
+from .channel import ChannelRow, Channels, ChannelSwitch
 from .chart import (
     ChannelBits,
     Chart,
@@ -107,6 +108,9 @@ __all__ = [
     "Block",
     "BlockChoice",
     "ChannelBits",
+    "ChannelRow",
+    "ChannelSwitch",
+    "Channels",
     "Chart",
     "CommandExample",
     "CommandOption",

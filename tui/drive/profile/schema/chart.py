@@ -92,6 +92,10 @@ class Order(Table, frozen=True, kw_only=True):
     """Raw values that must be known and hold."""
     broadcast: bool = False
     """True where its word can start no motor on any drive that hears it."""
+    clears: list[str] = []
+    """Words that go back to their initial values by it."""
+    follows: str = ""
+    """What follows from it besides, told before it is given; sentences."""
     note: str = ""
     confidence: Confidence = "manual"
 

@@ -182,6 +182,8 @@ class Parameter(Table, frozen=True, kw_only=True):
     type: WordType = "uint16"
     low_word_first: bool = True
     """Order of the two words of a 32-bit value."""
+    sure_up_to: int | None = None
+    """Highest raw value whose meaning is sure; one above it is marked `?`."""
     unit: str = ""
     scale: DecimalText = "1"
     scale_by: ScaleBy | None = None

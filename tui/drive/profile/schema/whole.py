@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from .base import Table
 from .block import Block
+from .channel import Channels
 from .chart import Chart, CommandExample, ReferenceWay, TeachableReference
 from .control_source import ControlSource
 from .identification import Erratum, Identification, ProfileHead, Source
@@ -34,6 +35,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     teachable_references: list[TeachableReference] = []
     faults: Faults = Faults()
     monitoring: Monitoring
+    channels: Channels = Channels()
     control_sources: list[ControlSource] = []
     communication_fault: CommunicationFault | None = None
     memory: MemoryOrders = MemoryOrders()
