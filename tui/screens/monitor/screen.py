@@ -142,21 +142,15 @@ class MonitorScreen(InputKeys):
         """How many rows each part has."""
         return arrange(*self.size, len(other_values(self.session.profile)))
 
-    def _said_rows(self) -> int:
-        """Rows of the message."""
-        said = self.query("#said")
-        height = said.first().styles.height if said else None
-        return int(height.value) if height is not None else 1
-
     def _place(self, room: Arrangement) -> None:
         """Give each part its rows; only where they change is anything laid out anew."""
+        bottom = max(room.bottom, self._run_rows)
+        placed = (room, bottom, self.said_rows)
+        if placed == self._placed:
+            return
         there = {part.id for part in self.query("Lines, Horizontal, Vertical")}
         if not there >= PLACED or len(self.query(".word")) < WORDS_MOST:
             return  # not made yet, or on its way out
-        bottom = max(room.bottom, self._run_rows)
-        placed = (room, bottom, self._said_rows())
-        if placed == self._placed:
-            return
         self._placed = placed
         self.set_class(not room.big, "plain")
         rows = {"top": room.top, "motor": room.values, "trend": room.trend, "words": room.words}
