@@ -37,7 +37,8 @@ SIZES = ((80, 24), (120, 40))
 SLOW = 20_000.0
 """Bytes a second of the slow terminal."""
 PANEL = (sys.executable, "-m", "tui")
-SIMULATED = ("--format", "8N1", "--real-time", "--run", "50")
+SIMULATED = ("--format", "8N1", "--real-time", "--run", "50", "--set", "SLL=0")
+"""A drive that goes on where nobody asks it between two programs."""
 HELLO = (sys.executable, "-m", "benchmarks.hello")
 HTOP = ("htop", "-d", "1")
 FIRST_WORDS = (
