@@ -93,5 +93,5 @@ def _rows(rows: Iterable[tuple[str, Style, str]], column: int, width: int) -> It
     """Each with its sentence on as many lines as that takes."""
     for head, style, sentence in rows:
         for number, part in enumerate(wrapped(sentence, width - column, SENTENCE_LINES)):
-            line = Text(f"{'' if number else head:<{column}}", style, no_wrap=True)
+            line = Text(no_wrap=True).append(f"{'' if number else head:<{column}}", style)
             yield line.append(part, PLAIN)
