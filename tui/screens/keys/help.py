@@ -34,7 +34,7 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
     ("S", "amber", "of a setting: lost when the drive is off, until S keeps it in its EEPROM"),
     ("R", "amber", "of a setting: in force only after a reset of the drive"),
 )
-HELP_WIDTH, BESIDE_HELP = 76, 5
+HELP_WIDTH, BESIDE_HELP = 76, 6
 """Columns of the list at most, and those of its border, its margin and its scroll bar."""
 SENTENCE_LINES = 6
 WITHOUT_KEY = "^p"
