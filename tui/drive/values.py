@@ -46,24 +46,33 @@ def word_count(parameter: Parameter) -> int:
 
 
 def from_words(parameter: Parameter, words: Sequence[int]) -> int:
-    """The raw value in the parameter's registers, sign and word order applied."""
+    """The raw value in the parameter's registers: sign, word order and own bits applied."""
     if word_count(parameter) == 2:
         low, high = words if parameter.low_word_first else reversed(words)
         raw, width = (high << 16) | low, 32
     else:
-        raw, width = words[0], 16
+        raw, width = words[0] >> parameter.shift & parameter.mask, 16
     if parameter.type.startswith("int") and raw >= 1 << (width - 1):
         raw -= 1 << width
     return raw
 
 
-def to_words(parameter: Parameter, raw: int) -> tuple[int, ...]:
-    """The registers that carry a raw value; raises ValueRefused if it does not fit."""
+def is_field(parameter: Parameter) -> bool:
+    """Whether the parameter is some bits of its register, and others are not its own."""
+    return parameter.shift != 0 or parameter.mask != 0xFFFF
+
+
+def to_words(parameter: Parameter, raw: int, held: int = 0) -> tuple[int, ...]:
+    """The registers that carry a raw value; raises ValueRefused if it does not fit.
+
+    `held` is the word as the drive has it: bits that are not the parameter's own stay.
+    """
     low, high = type_range(parameter)
     if not low <= raw <= high:
         raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
     if word_count(parameter) == 1:
-        return (raw & 0xFFFF,)
+        own = parameter.mask << parameter.shift
+        return (held & ~own & 0xFFFF | raw << parameter.shift & own,)
     pair = (raw & 0xFFFF, (raw >> 16) & 0xFFFF)
     return pair if parameter.low_word_first else (pair[1], pair[0])
 
@@ -71,6 +80,8 @@ def to_words(parameter: Parameter, raw: int) -> tuple[int, ...]:
 def type_range(parameter: Parameter) -> tuple[int, int]:
     """Lowest and highest raw value that the parameter's type can hold."""
     width = 32 if parameter.type.endswith("32") else 16
+    if is_field(parameter):
+        return 0, parameter.mask
     if parameter.type.startswith("int"):
         return -(1 << (width - 1)), (1 << (width - 1)) - 1
     return 0, (1 << width) - 1
@@ -243,6 +254,7 @@ __all__ = [
     "engineering",
     "from_words",
     "is_enumeration",
+    "is_field",
     "percent_of",
     "raw_range",
     "set_bits",

@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from .field_texts import field_text
 from .schema import ProfileData
 
 
@@ -20,6 +21,10 @@ def profile_schema() -> dict[str, Any]:
     (reference,), parts = msgspec.json.schema_components(
         [ProfileData], ref_template="#/$defs/{name}"
     )
+    for table, part in parts.items():
+        for field, shape in part.get("properties", {}).items():
+            if text := field_text(table, field):
+                shape["description"] = text
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": "Drive Panel profile",

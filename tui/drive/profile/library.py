@@ -1,24 +1,20 @@
 """Finding and loading profiles: those that come with the panel and the user's own.
 
-A listing reads the first table of a file and counts its parameters, no more: a large profile
-costs nothing until it is used.
+A listing reads the first table of a packaged file and counts its parameters, no more: a large
+profile costs nothing until it is used. A file of the user's own is read as a whole.
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 
 from ..errors import ProfileError, UnknownProfile
+from .heads import asked_of, file_head
 from .profile import Profile
-
-_HEAD_KEY = re.compile(r'^(id|name|vendor|version|summary)\s*=\s*"((?:[^"\\]|\\.)*)"', re.MULTILINE)
-_NEXT_TABLE = re.compile(r"^\[(?!profile\])", re.MULTILINE)
-_PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +30,12 @@ class Listing:
     path: Path
     own: bool
     """True for a profile of the user's own folder."""
+    fault: str = ""
+    """Why the file cannot be used, where its head or its TOML is broken."""
+    hidden_by: Path | None = None
+    """The file that counts in its place, as it has the same id."""
+    demo_hz: float | None = None
+    """Frequency at which its motor runs in the demo; None: it is not in the demo."""
 
 
 def packaged_folder() -> Path:
@@ -69,29 +71,33 @@ def listings() -> list[Listing]:
     A file whose head cannot be read is listed under its file name, so that it is seen; using
     it then tells the fault.
     """
-    found: dict[str, Listing] = {}
+    return [listing for listing in all_files() if listing.hidden_by is None]
+
+
+def all_files() -> list[Listing]:
+    """Every profile file by id, those that another with the same id hides too, behind it."""
+    first: dict[str, Path] = {}
+    found = []
     for path, own in profile_files():
         listing = _listing(path, own)
-        found.setdefault(listing.id, listing)
-    return [found[key] for key in sorted(found)]
+        found.append(replace(listing, hidden_by=first.get(listing.id)))
+        first.setdefault(listing.id, path)
+    return sorted(found, key=lambda listing: listing.id)
 
 
 def _listing(path: Path, own: bool) -> Listing:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return Listing(path.stem, path.stem, "", "", "cannot be read", 0, path, own)
-    end = _NEXT_TABLE.search(text)
-    head = dict(_HEAD_KEY.findall(text[: end.start() if end else len(text)]))
+    head = file_head(path, own, packaged_folder())
     return Listing(
-        id=head.get("id", path.stem),
-        name=head.get("name", path.stem),
-        vendor=head.get("vendor", ""),
-        version=head.get("version", ""),
-        summary=head.get("summary", ""),
-        parameters=len(_PARAMETER.findall(text)),
+        id=head.text("id") or path.stem,
+        name=head.text("name") or path.stem,
+        vendor=head.text("vendor"),
+        version=head.text("version"),
+        summary=head.text("summary"),
+        parameters=head.parameters,
         path=path,
         own=own,
+        fault=head.fault,
+        demo_hz=head.demo_hz,
     )
 
 
@@ -110,51 +116,33 @@ def load(profile_id: str) -> Profile:
 
 def load_file(path: Path) -> Profile:
     """The profile in a file, checked strictly; raises ProfileError."""
-    from .check import check
-    from .decode import decode_profile
+    from .check import checked_data
+
+    return Profile(checked_data(path, packaged_folder()))
+
+
+def faults_of(path: Path) -> list[str]:
+    """Every fault of a profile file, each with file and line; none where it can be used."""
+    from .check import examined
 
     try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ProfileError(f"{path}: cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
-    data = decode_profile(text, str(path))
-    check(data, str(path), text)
-    return Profile(data)
+        return [str(fault) for fault in examined(path, packaged_folder())[1]]
+    except ProfileError as error:
+        return [str(error)]
 
 
 def matching_profiles(reference: str) -> list[str]:
-    """Ids of the profiles whose reference beginnings fit an identification, best first.
-
-    Reads only the line with `reference_prefixes` of each file.
-    """
+    """Ids of the profiles whose reference beginnings fit an identification, best first."""
     wanted = reference.strip().upper()
     fits: list[tuple[int, str]] = []
     for listing in listings():
-        longest = max(
-            (len(p) for p in _prefixes(listing.path) if wanted.startswith(p.upper())), default=0
-        )
+        prefixes = asked_of(listing.path, listing.own, packaged_folder()).prefixes
+        longest = max((len(p) for p in prefixes if wanted.startswith(p.upper())), default=0)
         if longest:
             fits.append((longest, listing.id))
     return [profile_id for _, profile_id in sorted(fits, reverse=True)]
 
 
-def mentions_function(path: Path, code: int) -> bool:
-    """Whether a profile file declares a Modbus function, without decoding the file."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return False
-    return re.search(rf"^\[\[functions\]\]\s+code\s*=\s*{code}\b", text, re.MULTILINE) is not None
-
-
-_PREFIXES = re.compile(r"^reference_prefixes\s*=\s*\[([^\]]*)\]", re.MULTILINE)
-
-
-def _prefixes(path: Path) -> list[str]:
-    try:
-        match = _PREFIXES.search(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError):
-        return []
-    return re.findall(r'"([^"]+)"', match[1]) if match else []
+def mentions_function(listing: Listing, code: int) -> bool:
+    """Whether a profile declares a Modbus function, without decoding the file."""
+    return code in asked_of(listing.path, listing.own, packaged_folder()).functions

@@ -133,7 +133,7 @@ async def _nameless_families(line: Askable, device: int, priority: Priority) -> 
 def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
     found: dict[int, tuple[str, ...]] = {}
     for listing in library.listings():
-        if library.mentions_function(listing.path, IDENTIFY):
+        if library.mentions_function(listing, IDENTIFY):
             continue
         try:
             profile = library.load(listing.id)

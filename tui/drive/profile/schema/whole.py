@@ -10,7 +10,7 @@ from .identification import Erratum, Identification, ProfileHead, Source
 from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkSettings, ReadShapes
 from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
-from .parameter import Enumeration, Parameter
+from .parameter import Enumeration, Parameter, ParameterGroup
 
 
 class ProfileData(Table, frozen=True, kw_only=True):
@@ -36,5 +36,6 @@ class ProfileData(Table, frozen=True, kw_only=True):
     memory: MemoryOrders = MemoryOrders()
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
+    groups: list[ParameterGroup] = []
     enumerations: list[Enumeration] = []
     parameters: list[Parameter]
