@@ -11,7 +11,8 @@ from tui.drive.errors import ValueRefused
 from tui.drive.profile.library import load_file, matching_profiles, packaged_folder
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.read_plan import plan_reads
-from tui.drive.values import decode, encode, speed_from_frequency
+from tui.drive.values import decode, encode
+from tui.simulator.plant.monitoring import speed_from_frequency
 
 
 @pytest.fixture(scope="module")

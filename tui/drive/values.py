@@ -226,17 +226,6 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
     return number
 
 
-def speed_from_frequency(raw_frequency: int, poles: int) -> int:
-    """Speed in rpm from a raw output frequency in 0.01 Hz and the number of poles.
-
-    The drive's own rounding: (F x 12 + 5 x poles) / (poles x 10), cut to an integer.
-    Source: ATV21 Modbus manual 8.3, FE90. Raises ValueRefused for less than one pole.
-    """
-    if poles < 1:
-        raise ValueRefused(f"{poles} poles: a motor has at least 2.")
-    return (raw_frequency * 12 + 5 * poles) // (poles * 10)
-
-
 def percent_of(percent: Decimal, rating: Decimal) -> Decimal:
     """A percentage in the unit of its rating, to the rating's decimals, half away from zero."""
     return (percent * rating / 100).quantize(
@@ -258,7 +247,6 @@ __all__ = [
     "percent_of",
     "raw_range",
     "set_bits",
-    "speed_from_frequency",
     "to_words",
     "type_range",
     "word_count",

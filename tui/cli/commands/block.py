@@ -259,5 +259,5 @@ def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
 def _pair(text: str) -> tuple[str, str]:
     slot, sign, code = text.partition("=")
     if not sign or not slot.strip():
-        raise click.UsageError(f"{text!r} is not written SLOT=CODE, like NMA3=LCR or F875=none.")
+        raise click.UsageError(f"{text!r} is not written SLOT=CODE or SLOT=none.")
     return slot.strip(), code.strip()

@@ -16,6 +16,8 @@ from typing import Any
 
 from ..errors import ProfileError
 
+BEGINNING = 4096
+"""Characters in which a head stands."""
 _HEADER = re.compile(r"^\[+[ \t]*([\w-]+)[^\n]*", re.MULTILINE)
 _PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
 
@@ -49,11 +51,22 @@ class AskedOf:
     prefixes: tuple[str, ...] = ()
     """Beginnings of its reference."""
     functions: frozenset[int] = frozenset()
+    version_digits: str = "as-told"
 
 
 def file_head(path: Path, own: bool, packaged: Path) -> ProfileFileHead:
     """The head of a file; a broken one says so in `fault`."""
     return _head(path, own, packaged, _stamp(path))
+
+
+def quick_head(path: Path) -> ProfileFileHead:
+    """The head of a file out of its first characters; empty where it is not there alone."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            text = file.read(BEGINNING)
+    except (OSError, UnicodeDecodeError):
+        return ProfileFileHead()
+    return ProfileFileHead(_section(text, "profile") or {})
 
 
 def asked_of(path: Path, own: bool, packaged: Path) -> AskedOf:
@@ -104,6 +117,7 @@ def _asked(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> As
     return AskedOf(
         tuple(p for p in prefixes if isinstance(p, str)) if isinstance(prefixes, list) else (),
         frozenset(code for code in codes if isinstance(code, int)),
+        str(named.get("version_digits", "")) if isinstance(named, dict) else "",
     )
 
 

@@ -11,10 +11,13 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..errors import ProfileError, UnknownProfile
-from .heads import asked_of, file_head
-from .profile import Profile
+from .heads import asked_of, file_head, quick_head
+
+if TYPE_CHECKING:
+    from .profile import Profile
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,8 +37,6 @@ class Listing:
     """Why the file cannot be used, where its head or its TOML is broken."""
     hidden_by: Path | None = None
     """The file that counts in its place, as it has the same id."""
-    demo_hz: float | None = None
-    """Frequency at which its motor runs in the demo; None: it is not in the demo."""
 
 
 def packaged_folder() -> Path:
@@ -97,7 +98,6 @@ def _listing(path: Path, own: bool) -> Listing:
         path=path,
         own=own,
         fault=head.fault,
-        demo_hz=head.demo_hz,
     )
 
 
@@ -117,6 +117,7 @@ def load(profile_id: str) -> Profile:
 def load_file(path: Path) -> Profile:
     """The profile in a file, checked strictly; raises ProfileError."""
     from .check import checked_data
+    from .profile import Profile
 
     return Profile(checked_data(path, packaged_folder()))
 
@@ -146,3 +147,28 @@ def matching_profiles(reference: str) -> list[str]:
 def mentions_function(listing: Listing, code: int) -> bool:
     """Whether a profile declares a Modbus function, without decoding the file."""
     return code in asked_of(listing.path, listing.own, packaged_folder()).functions
+
+
+@lru_cache(maxsize=64)
+def version_shown(profile_id: str | None, version: str) -> str:
+    """The version that a drive of a family tells, as a person reads it: 0201 may be 2.1."""
+    listing = next((one for one in listings() if one.id == profile_id), None)
+    if listing is None or len(version) != 4 or not version.isdecimal():
+        return version
+    told = asked_of(listing.path, listing.own, packaged_folder())
+    if told.version_digits != "two-and-two":
+        return version
+    return f"{int(version[:2])}.{int(version[2:])}"
+
+
+def demo_drives() -> dict[str, tuple[str, float]]:
+    """By id, names of the families of the demo and the frequency in Hz at which each motor runs.
+
+    Only the beginning of each file is read.
+    """
+    found: dict[str, tuple[str, float]] = {}
+    for path, _ in profile_files():
+        head = quick_head(path)
+        if head.demo_hz is not None and head.text("id"):
+            found.setdefault(head.text("id"), (head.text("name"), head.demo_hz))
+    return dict(sorted(found.items()))

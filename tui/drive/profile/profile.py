@@ -6,10 +6,19 @@ import difflib
 import re
 from collections.abc import Collection, Iterable, Mapping
 from decimal import Decimal
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from ..errors import UnknownParameter
-from .schema import Chart, FaultCode, FaultHelp, Function, Parameter, ProfileData, Quantity
+from .schema import (
+    Chart,
+    FaultCode,
+    FaultHelp,
+    Function,
+    Parameter,
+    ParameterGroup,
+    ProfileData,
+    Quantity,
+)
 
 _HEX = re.compile(r"^(?:16#|0x)([0-9a-f]+)$", re.IGNORECASE)
 _WORD = re.compile(r"^w ?([0-9 ]+)$", re.IGNORECASE)
@@ -160,6 +169,19 @@ class Profile:
         if word is None:
             return "raw"
         return told.units.get(str(word >> told.shift & told.mask), "raw")
+
+
+# a profile stays as it was loaded, and every row of a table asks
+@lru_cache(maxsize=32)
+def told_groups(profile: Profile) -> Mapping[str, ParameterGroup]:
+    """By name, the groups of which the profile says what they hold."""
+    return {group.name: group for group in profile.data.groups}
+
+
+def group_holds(profile: Profile, parameter: Parameter) -> str:
+    """What the parameter's group holds: settings, commands or measurements."""
+    group = told_groups(profile).get(parameter.group)
+    return group.holds if group is not None else "settings"
 
 
 def parse_address(text: str) -> int | None:

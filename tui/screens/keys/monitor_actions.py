@@ -12,7 +12,7 @@ QUICK = "Quick stop at once, where the drive has one, else its ramp stop; needs 
 EMERGENCY = "Emergency stop at once, else the quick stop, else the ramp stop; needs no arming."
 COAST = "Let the motor coast; asks, needs no arming. A coasting hoist falls."
 BRAKE = "Brake by direct current, where the drive has that; asks, needs no arming."
-TAKE = "Take the control from the terminals (Leroy-Somer 6.43); armed, locked only, asks."
+TAKE = "Take the control from the terminals, where a drive has that; armed, locked only, asks."
 HAND_BACK = "Give the control back to the terminals; a run command waiting there counts then; asks."
 TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
 
@@ -26,8 +26,18 @@ COMMAND_ACTIONS = (
     *on((MONITOR, FAULTS), ("reset", "x", "reset", "Reset a fault; armed, asks. Runs nothing.")),
     *on(
         (MONITOR,),
-        ("step_reference(1)", "up", "", "Raise the reference by 1 Hz, at most to HSP; armed."),
-        ("step_reference(-1)", "down", "", "Lower the reference by 1 Hz, at most to LSP; armed."),
+        (
+            "step_reference(1)",
+            "up",
+            "",
+            "Raise the reference by 1 Hz, to its highest at most; armed.",
+        ),
+        (
+            "step_reference(-1)",
+            "down",
+            "",
+            "Lower the reference by 1 Hz, to its lowest at most; armed.",
+        ),
         ("step_reference(5)", "pageup", "", "Raise the reference by 5 Hz; armed."),
         ("step_reference(-5)", "pagedown", "", "Lower the reference by 5 Hz; armed."),
         ("options", "o", "", OPTIONS),

@@ -43,10 +43,8 @@ class DriveIdentity:
 
     @property
     def version_text(self) -> str:
-        """The version as a person reads it: 0201 is 2.1."""
-        if len(self.version) == 4 and self.version.isdecimal():
-            return f"{int(self.version[:2])}.{int(self.version[2:])}"
-        return self.version
+        """The version as a person reads it."""
+        return library.version_shown(self.profile, self.version)
 
 
 @dataclass(frozen=True, slots=True)
