@@ -62,16 +62,23 @@ def is_field(parameter: Parameter) -> bool:
     return parameter.shift != 0 or parameter.mask != 0xFFFF
 
 
-def to_words(parameter: Parameter, raw: int, held: int = 0) -> tuple[int, ...]:
+def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[int, ...]:
     """The registers that carry a raw value; raises ValueRefused if it does not fit.
 
-    `held` is the word as the drive has it: bits that are not the parameter's own stay.
+    `held` is the word as the drive has it, needed for a field of a register: the bits that are
+    not its own stay.
     """
     low, high = type_range(parameter)
     if not low <= raw <= high:
         raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
     if word_count(parameter) == 1:
         own = parameter.mask << parameter.shift
+        if held is None:
+            if is_field(parameter):
+                raise ValueRefused(
+                    f"{parameter.code} is some bits of a word whose others are not known here."
+                )
+            held = 0
         return (held & ~own & 0xFFFF | raw << parameter.shift & own,)
     pair = (raw & 0xFFFF, (raw >> 16) & 0xFFFF)
     return pair if parameter.low_word_first else (pair[1], pair[0])
@@ -176,7 +183,7 @@ def check_raw(
             f"{parameter.code}: {_plain(parameter, raw, scale)} is out of range, "
             f"{_plain(parameter, low, scale)} to {_plain(parameter, high, scale)}."
         )
-    to_words(parameter, raw)
+    to_words(parameter, raw, held=0)
     if is_enumeration(parameter) and raw not in names:
         raise ValueRefused(f"{parameter.code}: {raw} is none of its values.")
     taken = [bit for bit in parameter.reserved if raw >> bit & 1]

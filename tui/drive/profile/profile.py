@@ -39,7 +39,9 @@ class Profile:
         self.parameters = tuple(data.parameters)
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)
-        self._by_address = {p.address: p for p in self.parameters}
+        self._by_address: dict[tuple[int, int], Parameter] = {}
+        for one in self.parameters:
+            self._by_address.setdefault((one.function, one.address), one)
         self._by_quantity: dict[Quantity, Parameter] = {
             p.quantity: p for p in self.parameters if p.quantity is not None
         }
@@ -78,9 +80,12 @@ class Profile:
         """The parameter with exactly this code, or None."""
         return self._by_code.get(code)
 
-    def at(self, address: int) -> Parameter | None:
-        """The parameter at a wire address, or None."""
-        return self._by_address.get(address)
+    def at(self, address: int, function: int = 3) -> Parameter | None:
+        """The parameter at a wire address, the first of its fields where it has several, or None.
+
+        `function` is 4 for an input register.
+        """
+        return self._by_address.get((function, address))
 
     def quantity(self, quantity: Quantity) -> Parameter | None:
         """The parameter that carries a quantity on this family, or None."""
@@ -124,7 +129,7 @@ class Profile:
         if exact is not None:
             return exact
         address = parse_address(wanted)
-        if address is not None and (found := self._by_address.get(address)):
+        if address is not None and (found := self.at(address) or self.at(address, 4)):
             return found
         near = difflib.get_close_matches(wanted.casefold(), self._by_folded, n=3, cutoff=0.5)
         hint = ", ".join(dict.fromkeys(self._by_folded[n].code for n in near))

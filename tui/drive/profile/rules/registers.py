@@ -68,4 +68,21 @@ def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
             )
 
 
-REGISTER_RULES = (overlaps, functions)
+def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """A command needs no read before it: its word is nobody else's."""
+    fields = {p.code for p in data.parameters if p.shift or p.mask != 0xFFFF}
+    for index, chart in enumerate(data.charts):
+        places: list[tuple[TomlPath, str]] = [(("charts", index, "command"), chart.command)]
+        places += [
+            (("charts", index, "orders", n, "parameter"), order.parameter)
+            for n, order in enumerate(chart.orders)
+        ]
+        for place, code in places:
+            if code in fields:
+                yield (
+                    place,
+                    f"chart {chart.id}: {code} is some bits of a word; a command is a whole word.",
+                )
+
+
+REGISTER_RULES = (whole_words, overlaps, functions)
