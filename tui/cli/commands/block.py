@@ -85,7 +85,7 @@ def block(
         session = await connect_drive(opened, target)
         return await _carry_out(session, target.line_text, wanted)
 
-    status = on_line(target.line_text, work, read_only=read_only or not writes)
+    status = on_line(target, work, read_only=read_only or not writes)
     if status != DONE:
         raise click.exceptions.Exit(status)
 

@@ -60,4 +60,4 @@ def run(
     wish = Wish(
         "reverse" if reverse else "forward", reference, seconds, leave_running, unrecorded, as_json
     )
-    on_line(target.line_text, lambda opened: run_motor(opened, target, wish), read_only=read_only)
+    on_line(target, lambda opened: run_motor(opened, target, wish), read_only=read_only)

@@ -70,7 +70,7 @@ def write(
             return DONE
         return await _write(session, edits, confirmed, save=save)
 
-    status = on_line(target.line_text, work, read_only=read_only or dry_run)
+    status = on_line(target, work, read_only=read_only or dry_run)
     if status != DONE:
         raise click.exceptions.Exit(status)
 
