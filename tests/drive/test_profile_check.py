@@ -68,7 +68,7 @@ Change = tuple[str, str]
 FAULTS: dict[str, tuple[list[Change], str, str]] = {
     "no stop": (
         [('  { id = "stop", name = "Stop", words = [0] },\n', "")],
-        "no stop",
+        "it can run a motor and has no stop",
         "orders = [",
     ),
     "a stop in some states only": (
