@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import re
 from pathlib import Path
 
 import pytest
@@ -13,31 +12,7 @@ from tui.cli.main import main
 from tui.drive.profile import library
 from tui.drive.profile.toml_lines import toml_lines
 
-ORDERS = """\
-command = "CTRL"
-orders = [
-  { id = "forward", name = "Run", words = [1], states = ["ready", "running"] },
-  { id = "stop", name = "Stop", words = [0] },
-]
-"""
-README = Path(__file__).parents[2] / "profiles" / "README.md"
-[EXAMPLE] = re.findall(r"^```toml\n(.*?)^```$", README.read_text("utf-8"), re.M | re.S)
-COMMANDED = EXAMPLE.replace('kind = "io"\nstatus = "STAT"\n', f'status = "STAT"\n{ORDERS}')
-COMMANDED += """
-[[parameters]]
-code = "CTRL"
-name = "Control word"
-number = "40301"
-address = 300
-access = "rw"
-group = "Command"
-source = "guide 4.2"
-confidence = "manual"
-
-[[enumerations]]
-id = "levels"
-values = { 0 = "Low", 1 = "High" }
-"""
+COMMANDED = (Path(__file__).parent / "pump.toml").read_text(encoding="utf-8")
 RUNNING = '{ id = "running", name = "Running", kind = "running", mask = 0x0002, value = 0x0002 },'
 FAULT = '  { id = "fault", name = "Fault", kind = "fault", mask = 0x0004, value = 0x0004 },\n'
 PAIR = """
@@ -202,6 +177,11 @@ FAULTS: dict[str, tuple[list[Change], str, str]] = {
         [("address = 300", "address = 70000")],
         "allowed is 0 to 65535",
         "address = 70000",
+    ),
+    "an id that is a word of the command": (
+        [('id = "example-pump"', 'id = "path"')],
+        "'path' cannot be an id",
+        'id = "path"',
     ),
     "a field too few": (
         [('number = "40301"\n', "")],

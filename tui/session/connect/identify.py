@@ -139,6 +139,6 @@ def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
             # a profile that cannot be used is told where it is chosen; it ends no search
             continue
         status = profile.quantity("status_word")
-        if status is not None:
+        if status is not None and status.function == 3:
             found[status.address] = (*found.get(status.address, ()), profile.id)
     return found

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from ..schema import Chart, Parameter, ProfileData
 from ..toml_lines import TomlPath
 
+TAKEN_IDS = frozenset({"new", "path"})
 NamedPlace = tuple[TomlPath, str]
 """A place that names a parameter, and the code."""
 
@@ -115,6 +116,13 @@ def _of_tables(data: ProfileData) -> Iterator[NamedPlace]:
         yield ("addresses", "servers", place, "parameter"), server.parameter
 
 
+def own_id(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """The id is none of the words of `drivepanel profiles`."""
+    if data.profile.id in TAKEN_IDS:
+        taken = ", ".join(sorted(TAKEN_IDS))
+        yield ("profile", "id"), f"{data.profile.id!r} cannot be an id; nor can {taken}."
+
+
 def groups_in_use(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
     """A group that is described has parameters."""
     known = {parameter.group for parameter in data.parameters}
@@ -131,4 +139,4 @@ def fault_of_the_line(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         yield ("communication_fault", "fault"), f"there is no fault {watch.fault}."
 
 
-NAME_RULES = (references, groups_in_use, fault_of_the_line)
+NAME_RULES = (own_id, references, groups_in_use, fault_of_the_line)
