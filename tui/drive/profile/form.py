@@ -32,16 +32,18 @@ class FormFaults:
     """Places whose value had to be invented: nothing more can be said of them."""
 
 
-@lru_cache(maxsize=1)
-def whole_shape() -> shapes.Type:
-    """The form of a whole profile."""
-    return shapes.type_info(ProfileData)
+@lru_cache(maxsize=4)
+def shape_of(form: type) -> shapes.Type:
+    """A form of files as its fields and their types."""
+    return shapes.type_info(form)
 
 
-def form_faults(tables: dict[str, Any]) -> tuple[FormFaults, dict[str, Any]]:
+def form_faults(
+    tables: dict[str, Any], form: type = ProfileData
+) -> tuple[FormFaults, dict[str, Any]]:
     """Every fault of form, and tables without them, so that the rest can be looked at too."""
     faults = FormFaults()
-    mended = _mended(whole_shape(), tables, (), faults)
+    mended = _mended(shape_of(form), tables, (), faults)
     return faults, mended if isinstance(mended, dict) else {}
 
 

@@ -83,7 +83,7 @@ def read_tables(path: Path, packaged: Path) -> ProfileTables:
     profile.
     """
     own = source_text(path)
-    tables = _parsed(own)
+    tables = parsed(own)
     head = tables.get("profile")
     names = head.get("rows_from", []) if isinstance(head, dict) else []
     merging = _Merging()
@@ -93,7 +93,7 @@ def read_tables(path: Path, packaged: Path) -> ProfileTables:
     whole: dict[str, Any] = {}
     for name in names:
         shared = source_text(_shared_file(own, path, packaged, name))
-        merging.into(whole, _parsed(shared), shared, (), ())
+        merging.into(whole, parsed(shared), shared, (), ())
     without = head.get("without", []) if isinstance(head, dict) else []
     merging.drop(whole, without if isinstance(without, list) else [], own)
     merging.into(whole, tables, own, (), ())
@@ -110,7 +110,8 @@ def source_text(path: Path) -> SourceText:
         raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
 
 
-def _parsed(source: SourceText) -> dict[str, Any]:
+def parsed(source: SourceText) -> dict[str, Any]:
+    """The tables of a text; raises ProfileError with the line where it is no TOML."""
     try:
         return tomli.loads(source.text)
     except tomli.TOMLDecodeError as error:
