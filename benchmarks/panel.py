@@ -20,6 +20,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import closing, contextmanager
+from itertools import takewhile
 from pathlib import Path
 from typing import Any
 
@@ -30,6 +31,7 @@ from benchmarks.hello import TEXTS
 from benchmarks.terminal import Figures, Key, Terminal, press_often, spread, steady
 from benchmarks.wire import ROOT
 from tui.cli.commands.panel import run_panel
+from tui.terminal.dialects import APART
 
 SIZES = ((80, 24), (120, 40))
 SLOW = 20_000.0
@@ -60,7 +62,8 @@ def word_sign(text: str) -> tuple[object, ...]:
     rows = text.split("\n")
     for y, row in enumerate(rows):
         if title := re.match(r" ?([A-Z]\w+(?: .*)?) ─+ 16#", row):
-            return title[1], *(row[5:13].strip() for row in rows[y + 1 : y + 13])
+            bits = takewhile(re.compile(r" +\d+ [●·] ").match, rows[y + 1 :])
+            return title[1], *(row[5:13].strip() for row in bits)
     return ()
 
 
@@ -82,6 +85,9 @@ SCREENS = {
 WORD = Key("\t", word_sign)
 HELP = Key("?", saying("Keys on Monitor", "──╮", "──╯"))
 HELLO_TEXT = Key("w", saying(*TEXTS))
+HELLO_HELP = Key("?", saying("Line 0 of a help", "──╮", "──╯"))
+HELD = APART * 1e3
+"""Time in ms for which the panel holds a key back, as others may follow it at once."""
 HTOP_HELP = Key("?", saying("Released under the GNU", "F10Quit"))
 
 
@@ -208,6 +214,7 @@ def hello(bench: Bench, size: tuple[int, int]) -> Figures:
         terminal.run(SETTLED)
         found = steady(terminal, bench.options.seconds / 2)
         found["key"] = press_often(terminal, HELLO_TEXT, bench.options.presses // 2)
+        found["help"] = press_often(terminal, HELLO_HELP, bench.options.presses // 5)
     return found
 
 
@@ -300,6 +307,23 @@ def show(console: Console, size: str, figures: Figures) -> None:
         console.print(f"Low bandwidth, bytes a second (aim 500): {rates}")
 
 
+def show_ratios(console: Console, size: str, figures: Figures) -> None:
+    """Print what is asked of the panel as ratios to its peers in the same run."""
+    ours, bare, peer = figures["10 Hz"], figures["hello"], figures["htop"]
+    for name, words in (("key", "a text that changes"), ("help", "opening and closing help")):
+        median, of_bare = ours[name]["median_ms"], bare[name]["median_ms"]
+        if median is None or of_bare is None:
+            console.print(f"{size}: {words}: keys were lost")
+            continue
+        console.print(
+            f"{size}: {words} / bare Textual's: {(median - HELD) / of_bare:.2f} after the"
+            f" {HELD:.0f} ms for which a key is held (aim 2.5), {median / of_bare:.1f} with them"
+        )
+    if peer and peer["cpu_share"]:
+        ratio = ours["cpu_share"] / peer["cpu_share"]
+        console.print(f"{size}: CPU at 10 Hz / htop's: {ratio:.1f} (aim 2)")
+
+
 def _reason(name: str) -> str:
     return "not installed" if name == "htop" else "not there"
 
@@ -344,6 +368,7 @@ def main() -> None:
     show_starts(console, found)
     for size, figures in found.items():
         show(console, size, figures)
+        show_ratios(console, size, figures)
     console.print(f"Load of this machine before: {load:.2f} on {os.cpu_count()} cores.")
     print(json.dumps({"load_before": load, "sizes": found}))
 

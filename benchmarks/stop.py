@@ -38,6 +38,7 @@ from rich.table import Table
 
 from benchmarks.fleet import fleet
 from benchmarks.wire import ROOT, Exchange, WireLine, share
+from tests.answering import read_answering
 from tui.simulator import LineTiming
 
 KEY = b"\x1b[24~"
@@ -136,7 +137,7 @@ class Terminal:
         while self._reading:
             if select.select([self.fd], [], [], 0.05)[0]:
                 try:
-                    self._seen = (self._seen + os.read(self.fd, 65536))[-200_000:]
+                    self._seen = (self._seen + read_answering(self.fd))[-200_000:]
                 except OSError:
                     return
 

@@ -62,6 +62,8 @@ class Picture:
         self._x = self._y = 0
         self._decode = codecs.getincrementaldecoder("utf-8")("replace").decode
         self._rest = ""
+        self.answers: list[str] = []
+        """What a terminal owes the program: its cursor's place, for each question."""
 
     def feed(self, data: bytes) -> None:
         """Take what the program wrote; a sequence may come in pieces."""
@@ -120,6 +122,9 @@ class Picture:
             self._write(self._cells[self._y][max(0, self._x - 1)] * count)
         elif final in "JKX":
             self._erase(final, numbers[0])
+        elif final == "n" and numbers[0] == 6:
+            x = min(self._x, self._columns - 1)
+            self.answers.append(f"\x1b[{self._y + 1};{x + 1}R")
 
     def _go(self, x: int, y: int) -> None:
         self._x = max(0, min(x, self._columns - 1))
@@ -219,6 +224,9 @@ class Terminal:
             raise NotShown(f"the program ended: {self.picture.text()}")
         self.written += len(data)
         self.picture.feed(data)
+        while self.picture.answers:
+            with suppress(OSError):  # the program may have ended meanwhile
+                os.write(self._terminal, self.picture.answers.pop(0).encode())
         return come
 
     def wait(self, shown: Callable[[str], bool], within: float = 20.0) -> float:

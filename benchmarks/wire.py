@@ -234,7 +234,7 @@ def serve() -> None:
             simulation = Simulation(drives, timing=LineTiming(job["baud"], job["format"], True))
             recording = Recording(RtuConversation(simulation.line, simulation.faults))
             simulation.start()
-            endpoint = _plugged(recording)
+            endpoint = _plugged(recording, simulation.timing)
             waits = {drive.address: drive.station.turnaround for drive in simulation.drives}
             answer = {"path": endpoint.path, "turnarounds": waits}
         elif job["do"] == "take" and recording is not None:
@@ -246,8 +246,8 @@ def serve() -> None:
         print(json.dumps(answer), flush=True)
 
 
-def _plugged(recording: Recording) -> PtyEndpoint:
-    endpoint = PtyEndpoint(lambda: recording, None)
+def _plugged(recording: Recording, timing: LineTiming) -> PtyEndpoint:
+    endpoint = PtyEndpoint(lambda client: recording, None, timing, any_settings=True)
     endpoint.plug()
     return endpoint
 

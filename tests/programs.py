@@ -51,11 +51,13 @@ class Served:
 
 
 @contextmanager
-def served(command: Sequence[str], *, ready: str = "") -> Iterator[Served]:
+def served(
+    command: Sequence[str], *, ready: str = "", stdin: int = subprocess.DEVNULL
+) -> Iterator[Served]:
     """A program that serves until the block ends; begins once it printed a line with `ready`."""
     process = subprocess.Popen(
         command,
-        stdin=subprocess.DEVNULL,
+        stdin=stdin,
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         text=True,
@@ -70,9 +72,10 @@ def served(command: Sequence[str], *, ready: str = "") -> Iterator[Served]:
 
 
 @contextmanager
-def simulated(*arguments: str) -> Iterator[Served]:
+def simulated(*arguments: str, stdin: int = subprocess.DEVNULL) -> Iterator[Served]:
     """`drivepanel simulate` at work."""
-    with served([*DRIVEPANEL, "simulate", *arguments], ready="Ready:") as program:
+    command = [*DRIVEPANEL, "simulate", *arguments]
+    with served(command, ready="Ready:", stdin=stdin) as program:
         yield program
 
 

@@ -8,6 +8,7 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from textual.driver import Driver
+from textual.screen import Screen
 
 from tui.drive.plain import plain
 from tui.screens.connection.screen import ConnectionScreen
@@ -16,9 +17,9 @@ from tui.session.clock import Clock
 from tui.session.connect.open_line import open_line
 from tui.session.events import EventLog
 from tui.session.paths import state_folder
+from tui.terminal.abilities import EVERYTHING, Abilities
 from tui.terminal.driver import with_own_keys
 from tui.terminal.last_words import LastWords
-from tui.terminal.lean import LeanApp
 from tui.widgets.palette import THEME
 
 from .screens.hands import Hands
@@ -30,12 +31,13 @@ from .screens.places import Places
 log = logging.getLogger(__name__)
 
 
-class DrivePanelApp(LeanApp, LastWords, Hands, Lookout, LineOwner, Places, Leaving):
+class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, Places, Leaving):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
     `leave_running` motors are not stopped when the panel ends without being asked. With `mouse` the
-    terminal reports its mouse. `on_shown` is called after the first picture.
+    terminal reports its mouse. `abilities` is what the terminal can show. `on_shown` is
+    called after the first picture.
     """
 
     TITLE = "Drive Panel"
@@ -54,9 +56,11 @@ class DrivePanelApp(LeanApp, LastWords, Hands, Lookout, LineOwner, Places, Leavi
         leave_running: bool = False,
         mouse: bool = False,
         bell: bool = True,
+        abilities: Abilities = EVERYTHING,
         on_shown: Callable[[], None] | None = None,
     ) -> None:
         super().__init__()
+        self.fit_terminal(abilities, slow=low_bandwidth)
         self.register_theme(THEME)
         self.theme = THEME.name
         self.clock = clock or Clock()
@@ -92,9 +96,15 @@ class DrivePanelApp(LeanApp, LastWords, Hands, Lookout, LineOwner, Places, Leavi
     def on_mount(self) -> None:
         """Show Connection, and open the line that was named."""
         self.push_screen(self.connection)
+        first: Screen[None] = self.connection
+        if self._start is not None and self._device is not None:
+            from tui.screens.opening import OpeningScreen
+
+            first = OpeningScreen(self._start, self._device)
+            self.push_screen(first)
         self.set_interval(FRAME_LOOK, self.look_around)
         if self._on_shown is not None:
-            self.connection.call_after_refresh(self._on_shown)
+            first.call_after_refresh(self._on_shown)
         if self._start is None:
             self.call_after_refresh(self.try_f12)
         else:

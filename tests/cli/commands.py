@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import socket
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
 from click.testing import CliRunner, Result
 
-from tests.programs import port_of, simulated
+from tests.programs import drivepanel, port_of, simulated
 from tui.cli.main import main
 
 
@@ -42,3 +44,29 @@ def refused(status: int, *arguments: str | Path) -> str:
     said = ended(status, *arguments).stderr
     assert said.startswith("drivepanel: ")
     return said
+
+
+def put(line: str, address: int, word: int) -> None:
+    """What somebody else writes, as a person at the keypad would set it."""
+    pdu = struct.pack(">BHH", 6, address, word)
+    assert asked(line, pdu) == pdu
+
+
+def held(line: str, address: int) -> int:
+    """A word as it is on the wire."""
+    return int.from_bytes(asked(line, struct.pack(">BHH", 3, address, 1))[2:], "big")
+
+
+def asked(line: str, pdu: bytes) -> bytes:
+    """One Modbus TCP exchange of another master."""
+    _, host, port = line.split(":")
+    with socket.create_connection((host, int(port)), timeout=30) as other:
+        other.sendall(struct.pack(">HHHB", 1, 0, len(pdu) + 1, 1) + pdu)
+        return other.recv(300)[7:]
+
+
+def motor(status: int, *arguments: str) -> str:
+    """`drivepanel run`, which wants a standard output of its own; what it says, on which stream."""
+    done = drivepanel("run", *arguments)
+    assert done.returncode == status, done.stderr
+    return done.stderr if status else done.stdout

@@ -15,7 +15,7 @@ from tui.session.monitor.rates import monitoring_codes
 from .commands import tcp_line
 
 LINE = ("sim:atv71@2", "-d", "2")
-VALUE_KEYS = {"address", "raw", "value", "unit", "text", "quality"}
+VALUE_KEYS = {"address", "raw", "value", "unit", "text", "taught", "quality"}
 
 
 def told(*arguments: str, status: int = 0) -> Any:
@@ -81,7 +81,7 @@ def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
 
 def test_identify() -> None:
     who = told("identify", *LINE)
-    assert set(who) == {"device", "vendor", "reference", "version", "name", "profile"}
+    assert set(who) == {"device", "vendor", "reference", "version", "name", "profile", "model"}
     assert (who["device"], who["profile"]) == (2, "atv71")
     assert who["reference"].startswith("ATV71")
 

@@ -188,6 +188,24 @@ def test_a_dry_run_of_write_sends_nothing(line: str) -> None:
     assert "3.0" in run(0, "read", line, "ACC", "-d", "2")
 
 
+PAST_LIMITS = [
+    # the drive of the line has HSP 50.0 Hz and TFR 60.0 Hz
+    (("HSP=70",), "above TFR = 60.0 Hz"),
+    (("TFR=45",), "below HSP = 50.0 Hz"),
+    (("ITH=900",), "1.5 x INV"),
+]
+
+
+@pytest.mark.parametrize(("wanted", "text"), PAST_LIMITS)
+def test_5_a_value_past_a_limit_of_another_parameter(wanted: tuple[str, ...], text: str) -> None:
+    assert text in run(5, "write", "sim:atv71", *wanted, "--dry-run")
+    assert text in refused(5, "write", "sim:atv71", *wanted, "--arm")
+
+
+def test_a_limit_is_raised_before_what_it_limits() -> None:
+    assert "HSP: 50.0 Hz -> 70.0 Hz" in run(0, "write", "sim:atv71", "HSP=70", "TFR=80", "--arm")
+
+
 def test_where_the_drive_is_found_after_its_address_was_written() -> None:
     with tcp_line("atv21") as line:
         told = run(0, "write", line, "F802=7", "--arm")

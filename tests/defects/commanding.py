@@ -124,10 +124,19 @@ DEFECTS = (
     Defect(
         "interlock-ignored",
         "tui/session/command",
-        "(refused := interlock(found, wanted, self.raws))",
-        '(refused := "")',
+        "if held is not None:\n            raise OrderRefused(told_anywhere(held))",
+        "if held is not None and not held.text:\n"
+        "            raise OrderRefused(told_anywhere(held))",
         "A motor is started although its enable or its channel forbids it.",
         ("tests/session/test_command.py::test_refusals",),
+    ),
+    Defect(
+        "old-reference-behind-a-reset",
+        "tui/session/command",
+        "access.given.forget_reference()",
+        "access.given.forget_words()",
+        "After a reset, which is said to leave the reference at 0, the motor runs at the old one.",
+        ("tests/session/test_reset_clears.py",),
     ),
     Defect(
         "wrong-way-goes-on",

@@ -209,7 +209,7 @@ def test_every_value_is_held_at_the_end(
 
 
 @given(
-    seconds=st.decimals(0, "99.99", places=2),
+    seconds=st.decimals("0.5", "99.99", places=2),  # less than a count is out of range
     first=st.sampled_from(["0.01 s", "0.1 s", "1 s"]),
     last=st.sampled_from(["0.01 s", "0.1 s", "1 s"]),
     scale_first=st.booleans(),

@@ -102,6 +102,30 @@ def test_two_parameters_with_one_address(tmp_path: Path) -> None:
         library.load_file(write(tmp_path, SMALL + "\n" + again))
 
 
+@pytest.mark.parametrize(
+    ("family", "right", "wrong"),
+    [
+        ("atv21", "Modbus FA01", "Modbus FA07"),
+        ("atv71", "Combined.", "Combined, as W8999 says."),
+        ("powerdrive", "", "6.44"),
+    ],
+)
+def test_a_control_source_names_no_word_that_is_not_there(
+    tmp_path: Path, family: str, right: str, wrong: str
+) -> None:
+    text = (library.packaged_folder() / f"{family}.toml").read_text("utf-8")
+    if not right:  # a family that has none yet
+        way = f'command = {{ sources = ["{wrong}"] }}\nreference = {{ sources = ["Line"] }}'
+        source = f'[[control_sources]]\nid = "one"\nname = "One"\n{way}\nsettings = []\n'
+        text = text.replace("[[parameters]]", f"{source}\n[[parameters]]", 1)
+    else:
+        assert right in text
+        text = text.replace(right, wrong)
+    word = next(part for part in wrong.split() if part[-1].isdecimal())
+    with pytest.raises(ProfileError, match=rf"there is no word {word}\."):
+        library.load_file(write(tmp_path, text.encode()))
+
+
 def test_a_file_that_is_not_text(tmp_path: Path) -> None:
     with pytest.raises(ProfileError, match="not UTF-8"):
         library.load_file(write(tmp_path, b"\xff\xfe\x00"))

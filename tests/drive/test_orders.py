@@ -6,9 +6,11 @@ from collections.abc import Iterator
 
 import pytest
 
-from tui.drive.orders import MOVING_ORDERS, STOP_ORDERS, interlock
+from tui.drive.held_back import held_back
+from tui.drive.orders import MOVING_ORDERS, STOP_ORDERS
 from tui.drive.profile import library
-from tui.drive.profile.schema import Chart, Interlock
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Chart, Interlock, OrderId
 
 LOCKED = ["atv21", "atv31", "atv312", "atv71"]
 """Families with interlocks."""
@@ -18,6 +20,11 @@ def interlocks(family: str) -> Iterator[tuple[Chart, Interlock]]:
     for chart in library.load(family).data.charts:
         for lock in chart.interlocks:
             yield chart, lock
+
+
+def refusal(profile: Profile, chart: Chart, id: OrderId, raws: dict[str, int]) -> str:
+    held = held_back(profile, chart, id, raws)
+    return held.text if held is not None else ""
 
 
 def words_of(chart: Chart, lock: Interlock) -> dict[str, int]:
@@ -32,7 +39,9 @@ def test_a_word_that_was_not_read_holds_every_moving_command_back(family: str) -
     for chart, lock in interlocks(family):
         raws = {c: raw for c, raw in words_of(chart, lock).items() if c != lock.parameter}
         for id in lock.orders or MOVING_ORDERS:
-            assert "is not known, and it decides" in interlock(chart, id, raws), (
+            assert "is not known, and it decides" in refusal(
+                library.load(family), chart, id, raws
+            ), (
                 id,
                 lock.parameter,
             )
@@ -42,7 +51,7 @@ def test_a_word_that_was_not_read_holds_every_moving_command_back(family: str) -
 def test_no_interlock_ever_holds_a_stop_back(family: str) -> None:
     for chart, lock in interlocks(family):
         for id in STOP_ORDERS:
-            assert interlock(chart, id, {}) == "", (id, lock.parameter)
+            assert refusal(library.load(family), chart, id, {}) == "", (id, lock.parameter)
 
 
 @pytest.mark.parametrize("family", LOCKED)
@@ -54,4 +63,4 @@ def test_another_value_holds_a_command_back_and_tells_what_to_do(family: str) ->
         if raws[lock.parameter] & lock.mask in lock.values:
             continue
         for id in lock.orders or MOVING_ORDERS:
-            assert interlock(chart, id, raws), (id, lock.parameter)
+            assert refusal(library.load(family), chart, id, raws), (id, lock.parameter)

@@ -109,14 +109,20 @@ def test_a_simulated_one_has_input_registers_and_fields(own_file: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("status", "state", "alarms"),
-    [(0x1, "ready", 0), (0x3, "running", 0), (0xB, "running", 1), (0x4, "fault", 0)],
+    ("status", "trip", "state", "alarms"),
+    [
+        (0x1, 0, "ready", 0),
+        (0x3, 0, "running", 0),
+        (0xB, 0, "running", 1),
+        (0x4, 7, "fault", 0),
+        (0x1, 7, "fault", 0),
+    ],
 )
 async def test_it_is_read_over_a_line_with_its_state(
-    own_file: Path, status: int, state: str, alarms: int
+    own_file: Path, status: int, trip: int, state: str, alarms: int
 ) -> None:
     profile = library.load(PUMP)
-    drive = DriveSpec(PUMP, ADDRESS, sets={"STAT": status, "FREQ": -125, "TRIP": 7})
+    drive = DriveSpec(PUMP, ADDRESS, sets={"STAT": status, "FREQ": -125, "TRIP": trip})
     with Simulation([drive]) as simulation:
         host, port = simulation.serve_tcp()
         opened = open_line(f"tcp:{host}:{port}", wait=5)

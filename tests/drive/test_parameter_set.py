@@ -248,7 +248,8 @@ def test_what_one_side_could_not_read_differs_and_what_it_does_not_know_does_not
 @pytest.mark.parametrize("family", FAMILIES)
 def test_factory_settings_differ_from_themselves_in_nothing(family: str) -> None:
     profile = library.load(family)
-    side = factory_side(profile)
+    left = {p.code: p.factory for p in profile.parameters if p.factory is not None}
+    side = factory_side(profile, ParameterSet(SetHead(family), left))
     assert compare_settings(profile, side, side) == []
     assert (
         compare_settings(profile, side, side_of("f", ParameterSet(SetHead(family), side.raws)))

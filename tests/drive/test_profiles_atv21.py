@@ -11,6 +11,9 @@ from tui.drive.errors import ValueRefused
 from tui.drive.profile.library import load_file, matching_profiles, packaged_folder
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.read_plan import plan_reads
+from tui.drive.settings.edits import Edits
+from tui.drive.settings.limits import edit_problems
+from tui.drive.settings.writable import write_refusal
 from tui.drive.values import decode, encode
 from tui.simulator.plant.monitoring import speed_from_frequency
 
@@ -301,25 +304,77 @@ def test_what_must_never_be_written(profile: Profile, code: str) -> None:
     assert profile[code].forbidden
 
 
-UNPRINTED = "FMSL FM Fr dEC FH LL vL Pt vb OLM Sr1 Sr2 Sr3 Sr4 Sr5 Sr6 Sr7 F118 F500 F856 FE70"
+SURE_BY_NUMBER_ONLY = "FMSL FM vLv F171 F300 F856 FE70"
 
 
-def test_unverified_settings_are_raw_and_read_only(profile: Profile) -> None:
-    for code in UNPRINTED.split():
+def test_what_has_no_sure_scale_is_raw_and_read_only(profile: Profile) -> None:
+    for code in SURE_BY_NUMBER_ONLY.split():
         parameter = profile[code]
         assert not is_verified(parameter)
         assert (parameter.access, parameter.unit, parameter.scale) == ("r", "", "1")
+
+
+SETTINGS = [
+    # code, address, scale, unit, min, max, factory; of no document: each is confirmed by a person
+    ("dEC", 0x0010, "0.1", "s", 0, 32000, 100),
+    ("FH", 0x0011, "0.01", "Hz", 3000, 20000, 8000),
+    ("LL", 0x0013, "0.01", "Hz", 0, None, 0),
+    ("vL", 0x0014, "0.01", "Hz", 2500, 20000, 5000),
+    ("tHr", 0x0600, "1", "%", 10, 100, 100),
+    ("F415", 0x0415, "0.1", "A", 1, 2000, None),
+    ("F417", 0x0417, "1", "rpm", 100, 15000, None),
+    ("F500", 0x0500, "0.1", "s", 0, 32000, 200),
+    ("F601", 0x0601, "1", "%", 10, 110, 110),
+]
+
+
+@pytest.mark.parametrize(("code", "address", "scale", "unit", "low", "high", "factory"), SETTINGS)
+def test_settings_by_number_are_unverified_and_ask_for_a_person(
+    profile: Profile,
+    code: str,
+    address: int,
+    scale: str,
+    unit: str,
+    low: int | None,
+    high: int | None,
+    factory: int | None,
+) -> None:
+    parameter = profile[code]
+    assert (parameter.address, parameter.scale, parameter.unit) == (address, scale, unit)
+    assert (parameter.min, parameter.max, parameter.factory) == (low, high, factory)
+    refusal = write_refusal(profile, parameter, "ready")
+    assert refusal is not None
+    assert refusal.reason == "unverified"
+    assert write_refusal(profile, parameter, "ready", {code}) is None
+
+
+def test_no_setting_of_no_document_is_taken_for_verified(profile: Profile) -> None:
+    manual = "AU1 CMOD FMOD ACC F800 F801 F802 F803 F829 F870 F871 F875 F876 F877 F878 F879"
+    settings = {p.code for p in profile.parameters if p.storage == "eeprom" and is_verified(p)}
+    assert settings == set(manual.split())
     assert [profile[f"Sr{n}"].address for n in range(1, 8)] == [
         0x18, 0x19, 0x20, 0x21, 0x22, 0x23, 0x24,
     ]  # fmt: skip
 
 
-def test_inputs_take_the_two_functions_of_the_manual_once_confirmed(profile: Profile) -> None:
-    for code in ("F111", "F112", "F113"):
+def test_inputs_know_their_functions_and_keep_the_mark(profile: Profile) -> None:
+    for code, factory in (("F111", "Forward"), ("F112", "Preset speed bit 1")):
         parameter = profile[code]
         assert not is_verified(parameter)
         assert parameter.access == "rw-stopped"
-        assert set(profile.names(parameter)) == {38, 48}
+        assert profile.names(parameter)[38] == "Reference from F207"
+        assert profile.names(parameter)[48] == "Forced local"
+        assert parameter.factory is not None
+        assert profile.names(parameter)[parameter.factory] == factory
+
+
+def test_limits_end_at_each_other(profile: Profile) -> None:
+    raws = {"FH": 8000, "UL": 5000, "LL": 0, "FA01": 6000}
+    past = Edits().stage(profile, "UL", "85 Hz", raws)
+    assert "above FH = 80.00 Hz" in edit_problems(profile, past, raws)["UL"]
+    # the reference of the line is no setting: it holds up none
+    lower = Edits().stage(profile, "FH", "55 Hz", raws)
+    assert edit_problems(profile, lower, raws) == {}
 
 
 def test_link_and_addresses(profile: Profile) -> None:

@@ -99,7 +99,7 @@ def test_words(
     ("code", "low", "high", "factory"),
     [
         ("TFR", 100, 16000, 600),
-        ("HSP", 0, 16000, None),
+        ("HSP", 0, 16000, 500),
         ("SFR", 10, 160, None),
         ("TTO", 1, 300, 100),
         ("ADD", 0, 247, 0),

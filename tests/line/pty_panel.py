@@ -14,10 +14,11 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 
+from tests.answering import read_answering
 from tests.bus.peer import tcp_request_length
 from tests.programs import wait_until
 from tui.simulator import DriveSpec, Simulation
@@ -139,7 +140,7 @@ class PtyPanel:
         """Take what the panel sends; False once it has ended."""
         while select.select([self.terminal], [], [], seconds)[0]:
             try:
-                data = os.read(self.terminal, 65536)
+                data = read_answering(self.terminal)
             except OSError:
                 return False
             self.sent += data
@@ -155,6 +156,10 @@ class PtyPanel:
             if control["final"] == "H":
                 row, _, column = control["arguments"].partition(";")
                 self._at = (int(row or 1) - 1, int(column or 1) - 1)
+            elif control["final"] == "X":
+                row_at, column_at = self._at
+                for erased in range(int(control["arguments"] or 1)):
+                    self.cells[row_at, column_at + erased] = " "
         end = text.find("\x1b", at)
         self._put(text[at : end if end >= 0 else len(text)])
         self._rest = text[end:] if end >= 0 else ""
@@ -235,12 +240,18 @@ class PtyPanel:
 
 
 @contextmanager
-def panel_on_a_pty(*options: str, drives: int = 1) -> Iterator[PtyPanel]:
+def panel_on_a_pty(
+    *options: str,
+    drives: int = 1,
+    size: tuple[int, int] = (COLUMNS, ROWS),
+    environment: Mapping[str, str] | None = None,
+) -> Iterator[PtyPanel]:
     """The panel on simulated drives over TCP, the first on Monitor."""
     specs = [DriveSpec("atv71", address) for address in range(1, drives + 1)]
     with Simulation(specs) as simulation, WriteLog(simulation.serve_tcp()).at_work() as log:
         line = [f"tcp:127.0.0.1:{log.port}", "-d", "1"]
-        panel = PtyPanel(*_started([*line, *options]), simulation, log)
+        started = _started([*line, *options], size, environment or {})
+        panel = PtyPanel(*started, simulation, log)
         try:
             panel.shows("STANDBY")
             yield panel
@@ -251,13 +262,15 @@ def panel_on_a_pty(*options: str, drives: int = 1) -> Iterator[PtyPanel]:
             os.close(panel.terminal)
 
 
-def _started(arguments: list[str]) -> tuple[int, int]:
+def _started(
+    arguments: list[str], size: tuple[int, int], more: Mapping[str, str]
+) -> tuple[int, int]:
     pid, terminal = pty.fork()
     if pid == 0:
         try:
-            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", ROWS, COLUMNS, 0, 0))
+            fcntl.ioctl(0, termios.TIOCSWINSZ, struct.pack("HHHH", *size[::-1], 0, 0))
             environment = {k: v for k, v in os.environ.items() if k not in ("COLUMNS", "LINES")}
-            environment["TERM"] = "xterm-256color"
+            environment |= {"TERM": "xterm-256color", "LC_ALL": "C.UTF-8", **more}
             command = [sys.executable, "-m", "tui", *arguments]
             os.execvpe(command[0], command, environment)
         finally:

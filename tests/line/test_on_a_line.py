@@ -271,7 +271,7 @@ async def test_who_cannot_be_fed_is_told_of_before_it_acts(tmp_path: Path) -> No
 
 
 async def test_a_watch_that_begins_with_a_command_is_not_told_of_before() -> None:
-    opened = demo_line({"atv71": 50.0})
+    opened = demo_line({"atv71": 0.0})
     line_watch = LineWatch(opened.line)
     drive = DriveSession(opened.line, 1, library.load("atv71"))
     line_watch.keep(drive, Monitor(drive))

@@ -255,7 +255,8 @@ REFUSALS = [
     ("atv31", {"LAC": 1}, "forward", r"below L3.*Set LAC to L3"),
     ("atv312", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
     ("atv71", {"CD1": 0, "CHCF": 2}, "forward", r"not commanded by Modbus"),
-    ("powerdrive", {"6.43": 0}, "forward", r"needs 6\.43 = 1"),
+    ("powerdrive", {"6.43": 0}, "forward", r"6\.43 is Terminals\. .*t takes the control"),
+    ("atv312", {"rFC": 97}, "forward", r"reference channel 2 \(Fr2\), which counts, is None"),
     ("atv71", {}, "reset", r"possible in the states: Fault"),
     ("atv31", {}, "take-control", r"no order 'take control'"),
 ]

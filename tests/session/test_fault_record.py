@@ -66,6 +66,10 @@ async def test_the_record_as_a_text() -> None:
         assert recorder.latest is not None
         session = made.session
         text = record_text(session, recorder.latest, [("FE00", "Output frequency", "12.34 Hz")])
+        assert "- Probably (manual): " in text
+        assert "- Look at FA00, Command word: 16#D000 (bit 12" in record_text(
+            session, recorder.latest, [], {"FA00": "16#D000"}
+        )
         for part in ("E (17) Emergency stop", "| FE00 | Output frequency | 12.34 Hz |", "Run forw"):
             assert part in text
         rows = text.partition("## Values")[2].partition("## Written")[0].splitlines()

@@ -34,6 +34,7 @@ async def test_every_family_has_its_report(family: str) -> None:
     assert text.startswith(f"# {made.profile.name} at serial:")
     for setting in made.profile.data.link.settings:
         assert f"| {setting.parameter} |" in text
+    assert ("- Model by its own code: ATV21H" in text) is (family == "atv21")
     tables = [line.count(" | ") for line in text.splitlines() if line.startswith("| ")]
     assert tables
 
@@ -53,6 +54,12 @@ async def test_what_was_changed_with_what_was_before() -> None:
     assert any(row.endswith("| 10.0 s | 5.0 s | 3.3 s |") for row in rows), rows
     assert "- Reference: ATV312" in text
     assert "OCF" in text.partition("## Faults")[2].partition("##")[0]
+    faults = text.partition("## Faults")[2].partition("## ")[0]
+    assert "What OCF Overcurrent points at:" in faults
+    assert "- Probably (general practice): " in faults
+    assert "- Look at ACC, " in faults
+    assert "- Reset (recalled, not sure): " in faults
+    assert faults.count("points at:") == 1
     assert "| SP2 | 10.0 Hz | 7.0 Hz | ok | setting |" in text
 
 
@@ -65,7 +72,9 @@ async def test_what_the_drive_stored_with_a_fault() -> None:
         held = upload.parameter_set()
         text = report_text(made.profile, held, [])
     assert text.count("What the drive stored with") == 1
-    found = text.partition("What the drive stored with DP0, OCF Overcurrent:")[2].partition("##")[0]
+    found = text.partition("What the drive stored with DP0, OCF Overcurrent:")[2].partition(
+        "\nWhat "
+    )[0]
     stored = made.profile.data.faults.stored[0]
     assert [line.split(" | ")[0] for line in found.splitlines()[4:] if line] == [
         f"| {code}" for code in stored

@@ -213,18 +213,18 @@ def test_high_resolution_counts_in_32767ths() -> None:
     assert bench.word("RFR") == pytest.approx(32767 // 2, abs=60)
 
 
-# Orders at the terminals
+# What another master, or the terminals, ordered before
 
 
-def test_a_run_order_at_the_terminals_runs_the_motor_and_the_line_takes_over() -> None:
+def test_a_motor_that_another_master_left_running_is_taken_over_without_a_bump() -> None:
     bench = Bench("atv71", run_hz=40.0)
     bench.run(5)
     assert bench.word("RFR") == 400
-    assert not bench.word("ETA") & REMOTE
+    assert (bench.word("CMD"), bench.word("LFR")) == (0x000F, 400)
+    assert bench.word("ETA") == 0x0637
     bench.taken("CMD", 15)
-    assert bench.word("ETA") & REMOTE
     bench.run(1)
-    assert bench.word("RFR") == 400, "without a bump: no reference was written yet"
+    assert bench.word("RFR") == 400
     bench.taken("LFR", 100)
     bench.run(5)
     assert bench.word("RFR") == 100
@@ -234,7 +234,7 @@ def test_a_run_order_at_the_terminals_runs_the_motor_and_the_line_takes_over() -
 
 
 def test_the_end_of_the_order_at_the_terminals_stops_on_the_ramp() -> None:
-    bench = Bench("atv71", run_hz=40.0)
+    bench = Bench("atv71", {"FR1": 1}, run_hz=40.0)
     bench.run(5)
     bench.drive.halt()
     bench.run(1)

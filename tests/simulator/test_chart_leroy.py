@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import struct
+
 import pytest
+
+from tui.drive.profile import library
+from tui.simulator import DriveSpec, SimulatedDrive
 
 from .bench import Bench
 
@@ -70,3 +75,49 @@ def test_jogging_is_slow() -> None:
     bench.taken("6.42", 0x0005)
     bench.run(4)
     assert bench.drive.motor.frequency == pytest.approx(5)
+
+
+PRESET_WORD = 0x0103
+"""Unlock, run forward, and bit 8: the preset reference."""
+
+
+def library_drive(**sets: int) -> SimulatedDrive:
+    """A Powerdrive by the profile that comes with the panel, commanded by its control word."""
+    words = {"6.43": 1, **sets}
+    return SimulatedDrive(library.load("powerdrive"), DriveSpec("powerdrive", sets=words))
+
+
+def written(drive: SimulatedDrive, code: str, word: int) -> bool:
+    """Whether the drive took a word of the line."""
+    pdu = struct.pack(">BHH", 6, drive.profile[code].address, word)
+    return drive.line_side.answer(1, pdu) == pdu
+
+
+def after(drive: SimulatedDrive, seconds: float) -> float:
+    """The output frequency after some time."""
+    for _ in range(round(seconds / 0.05)):
+        drive.step(0.05)
+    return drive.motor.frequency
+
+
+def test_bit_8_chooses_the_first_preset_in_rpm() -> None:
+    drive = library_drive()
+    assert written(drive, "1.21", 600)
+    assert written(drive, "6.42", PRESET_WORD)
+    assert drive.raw("1.42") == 1
+    assert after(drive, 5) == pytest.approx(20)
+    assert written(drive, "1.21", 1200), "a motor that runs follows it"
+    assert after(drive, 5) == pytest.approx(40)
+    assert written(drive, "6.42", 0x0003)
+    assert after(drive, 5) == pytest.approx(30), "the analogue reference at the terminals"
+
+
+def test_no_preset_goes_past_the_maximum() -> None:
+    drive = library_drive(**{"1.06": 900})
+    assert written(drive, "1.21", 1500)
+    assert written(drive, "6.42", PRESET_WORD)
+    assert after(drive, 5) == pytest.approx(30)
+
+
+def test_other_words_of_unknown_scale_cannot_be_written() -> None:
+    assert not written(library_drive(), "1.06", 3000)

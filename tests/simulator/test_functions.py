@@ -78,7 +78,7 @@ def test_the_frame_counter_starts_again_after_65535_and_the_error_counter_stays(
     counters = bench.drive.server.counters
     counters.frames = counters.checksum_errors = 0xFFFF
     bench.drive.line_side.count_checksum_error()
-    assert bench.ask("08000E0000") == "08000E0000"
+    assert bench.ask("08000E0000") == "08000E0001", "a damaged frame counts too"
     assert bench.ask("08000C0000") == "08000CFFFF"
     assert bench.word("M1EC") == 0xFFFF
 

@@ -46,6 +46,15 @@ def test_the_watch_needs_an_order_first() -> None:
     assert bench.drive.fault is not None
 
 
+def test_the_order_of_another_master_counts_once_somebody_has_asked() -> None:
+    bench = Bench("atv71", {"TTO": 10, "SLL": 1}, run_hz=30.0)
+    bench.run(3)
+    assert bench.drive.fault is None
+    bench.word("ETA")
+    bench.run(3)
+    assert bench.drive.fault is not None
+
+
 @pytest.mark.parametrize(("reaction", "seconds"), [(5, 1.3), (6, 0.35)])
 def test_a_ramp_and_a_fast_stop_come_before_the_fault(reaction: int, seconds: float) -> None:
     bench = running(reaction)

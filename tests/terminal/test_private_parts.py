@@ -170,18 +170,31 @@ def _updates_go_through_display() -> bool:
     return (
         list(asked) == ["self", "screen", "renderable"]
         and "isinstance(renderable, CompositorUpdate)" in sends
-        and "renderable.render_segments(console)" in sends
         and "app._display(self, " in inspect.getsource(Screen)
     )
 
 
-def _console_knows_its_colours() -> bool:
-    from rich.color import ColorSystem
-    from rich.console import Console
+def _drawing_asks_whether_there_is_a_terminal() -> bool:
+    from textual.app import App
 
-    known: Any = Console(color_system="256")._color_system
-    none: Any = Console(color_system=None)._color_system
-    return known is ColorSystem.EIGHT_BIT and none is None
+    sends = inspect.getsource(App._display)
+    app: Any = App[None]()
+    conditions = ("self._batch_count", "self._running", "not self._closed", "self._driver is not")
+    return all(one in sends for one in conditions) and (
+        app._batch_count,
+        app._running,
+        app._closed,
+        app._driver,
+    ) == (0, False, False, None)
+
+
+def _updates_have_a_beginning_and_an_end() -> bool:
+    from textual.app import App
+
+    sends = inspect.getsource(App._display)
+    both = inspect.getsource(App._begin_update) + inspect.getsource(App._end_update)
+    asked = both.count("if self._sync_available and self._driver is not None:") == 2
+    return asked and "self._begin_update()" in sends and "self._end_update()" in sends
 
 
 def _loop_is_there_while_the_app_runs() -> bool:
@@ -291,20 +304,26 @@ PARTS = [
     Part(
         "textual._compositor.ChopsUpdate, LayoutUpdate, CompositorUpdate",
         "lean.py",
-        "lean: what the compositor hands over, and what App._display asks of it",
+        "strips_of: what the compositor hands over",
         _updates_of_the_compositor,
     ),
     Part(
         "App._display",
-        "lean.py",
+        "lean_app.py",
         "LeanApp: the one place through which every picture goes to the terminal",
         _updates_go_through_display,
     ),
     Part(
-        "rich.console.Console._color_system",
-        "lean.py",
-        "LeanUpdate: how many colours Rich says that the terminal has",
-        _console_knows_its_colours,
+        "App._batch_count._running._closed._driver",
+        "lean_app.py",
+        "LeanApp: when Textual itself sends an update, and when it lets it fall",
+        _drawing_asks_whether_there_is_a_terminal,
+    ),
+    Part(
+        "App._begin_update._end_update",
+        "lean_app.py",
+        "LeanApp: how Textual brackets what a terminal is to show at one time",
+        _updates_have_a_beginning_and_an_end,
     ),
     Part(
         "App._loop",

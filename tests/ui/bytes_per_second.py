@@ -20,6 +20,8 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 
+from tests.answering import read_answering
+
 ROOT = Path(__file__).resolve().parents[2]
 SETTLED = 1.5
 """Seconds for the first full picture after the drive's values are on it."""
@@ -85,7 +87,7 @@ def _read_until(terminal: int, wanted: bytes) -> None:
 
 def _read(terminal: int) -> bytes:
     try:
-        return os.read(terminal, 65536)
+        return read_answering(terminal)
     except OSError as error:
         raise RuntimeError("the program on the terminal ended before its time") from error
 

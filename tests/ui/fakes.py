@@ -39,6 +39,7 @@ from tui.session.monitor.snapshot import Snapshot
 from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.reading import Quality, Reading
+from tui.terminal.abilities import EVERYTHING, Abilities
 
 NOW = 1000.0
 CONNECTED = LineState(LineStatus.CONNECTED, "", NOW - 60)
@@ -58,7 +59,7 @@ READY = {**RUNNING, "ETA": 0x0231, "RFR": 0, "RFRD": 0, "LCR": 0, "OTR": 0, "OPR
 FAULT = {**READY, "ETA": 0x0218, "LFT": 18}
 ALARM = {**RUNNING, "ETA": 0x06B7, "LRS6": 1 << 11}
 
-CHANNELS = {"CHCF": 1, "FR1": 164, "FR2": 0, "RFC": 0, "CD1": 1, "CD2": 10, "CCS": 98, "FR1B": 0}
+CHANNELS = {"CHCF": 1, "FR1": 164, "FR2": 0, "RFC": 96, "CD1": 1, "CD2": 10, "CCS": 98, "FR1B": 0}
 STORED = {
     "RFP0": 488, "LCP0": 84, "ULP0": 3980, "THP0": 50, "RTP0": 2483,
     "EP0": 0x0637, "IP0": 0x0812, "CMP0": 0x000F, "CRP0": 0x0015,
@@ -314,10 +315,12 @@ async def press(pilot: Pilot[None], *keys: str) -> None:
             await pilot.press(key)
 
 
-def app_of(open_line: Callable[..., OpenLine] | None = None) -> DrivePanelApp:
+def app_of(
+    open_line: Callable[..., OpenLine] | None = None, abilities: Abilities = EVERYTHING
+) -> DrivePanelApp:
     """The panel with a clock that stands still."""
 
     def closed(*_: Any, **__: Any) -> OpenLine:
         raise AssertionError("no line is opened in this picture")
 
-    return DrivePanelApp(open_line=open_line or closed, clock=StillClock())
+    return DrivePanelApp(open_line=open_line or closed, clock=StillClock(), abilities=abilities)

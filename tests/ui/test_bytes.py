@@ -3,24 +3,28 @@
 from __future__ import annotations
 
 import re
+import time
 from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from rich.cells import get_character_cell_size
+from rich.color import ColorSystem
 from rich.console import RenderableType
 from rich.segment import Segment
 from rich.style import Style
 from rich.text import Text
-from textual._compositor import CompositorUpdate
 from textual.app import App, ComposeResult
 from textual.containers import Horizontal
+from textual.pilot import Pilot
 from textual.screen import ModalScreen, Screen
 from textual.strip import Strip
 from textual.widgets import Label
 
-from tui.terminal.lean import Shown, lean
+from tui.terminal.lean import Picture, strips_of
+from tui.terminal.lean_app import LeanApp
+from tui.terminal.pacing import ASK, WHOLE
 from tui.widgets.lines import Lines, cells, runs
 
 from .bytes_per_second import compare
@@ -36,6 +40,7 @@ class Terminal:
     def __init__(self) -> None:
         self.cells: dict[tuple[int, int], Cell] = {}
         self._x, self._y, self._colour = 0, 0, ""
+        self._pen: dict[str, str] = {}
 
     def feed(self, data: str) -> None:
         at = 0
@@ -46,8 +51,24 @@ class Terminal:
                 row, column = control[1].split(";")
                 self._x, self._y = int(column) - 1, int(row) - 1
             elif control[2] == "m":
-                self._colour = re.sub(r"^0;?", "", control[1])
+                self._set_colour(control[1])
+            elif control[2] == "X":
+                for x in range(self._x, self._x + int(control[1])):
+                    self.cells[self._y, x] = (" ", self._colour)
         self._write(data[at:])
+
+    def _set_colour(self, numbers: str) -> None:
+        """One number after another, as a terminal takes them."""
+        left = numbers.split(";")
+        while left:
+            size = 1
+            if left[0] in ("38", "48"):
+                size = {"2": 5, "5": 3}[left[1]]
+            name = _part(left[0])
+            self._pen = {**self._pen, name: ";".join(left[:size])} if name else {}
+            left = left[size:]
+        order = sorted(self._pen, key=lambda name: (name == "behind", name == "front", name))
+        self._colour = ";".join(self._pen[name] for name in order)
 
     def _write(self, text: str) -> None:
         for character in text:
@@ -71,13 +92,22 @@ class Terminal:
         ]
 
 
+def _part(number: str) -> str:
+    """What a number of a style sets; nothing where it resets all."""
+    if number in ("48", *map(str, (*range(40, 48), *range(100, 108)))):
+        return "behind"
+    if number in ("38", *map(str, (*range(30, 38), *range(90, 98)))):
+        return "front"
+    return "" if number == "0" else number
+
+
 class Seen(App[None]):
     """Two columns of lines; every update goes to a terminal that is looked at."""
 
     def __init__(self) -> None:
         super().__init__()
         self.terminal = Terminal()
-        self.shown = Shown()
+        self.picture = Picture(erases=True)
         self.sent = 0
 
     def compose(self) -> ComposeResult:
@@ -86,11 +116,12 @@ class Seen(App[None]):
             yield Lines(id="right")
 
     def _display(self, screen: Screen[Any], renderable: RenderableType | None) -> None:
-        update = lean(renderable, self.shown)
-        if isinstance(update, CompositorUpdate):
-            data = update.render_segments(self.console)
-            self.sent += len(data)
-            self.terminal.feed(data)
+        strips = strips_of(renderable)
+        assert strips is not None or renderable is None
+        self.picture.want(strips or [], self.console._color_system or ColorSystem.TRUECOLOR)
+        data = self.picture.frame(WHOLE)
+        self.sent += len(data)
+        self.terminal.feed(data)
 
 
 COLOURS = [Style(color="#112233"), Style(color="#445566", bold=True), Style()]
@@ -158,7 +189,7 @@ async def test_dialogs_and_other_sizes_leave_no_trace() -> None:
             if step % 5 == 4:
                 # what a terminal shows after it was resized is its own affair
                 app.terminal.cells.clear()
-                app.shown.forget()
+                app.picture.forget()
                 app.screen.refresh()
                 await pilot.pause()
                 agree()
@@ -220,3 +251,88 @@ def test_monitor_sends_a_small_part_of_what_stock_widgets_send() -> None:
     ours, plain = compare(4.0)
     assert ours.size > 0
     assert ours.rate / plain.rate < 0.1
+
+
+@given(st.lists(st.tuples(st.integers(0, ROWS - 1), PIECES, st.integers(0, 200)), max_size=20))
+def test_pieces_of_frames_come_to_the_same_picture(
+    steps: list[tuple[int, Text, int]],
+) -> None:
+    """However little a frame may have, and whatever changes before the rest of it is sent."""
+    picture, terminal, last = Picture(erases=True), Terminal(), {}
+    for y, text, room in steps:
+        last[y] = strip_of(text)
+        picture.want([(0, y, last[y])], ColorSystem.TRUECOLOR)
+        terminal.feed(picture.frame(room))
+    terminal.feed(picture.frame(WHOLE))
+    assert picture.is_shown
+    assert picture.frame(WHOLE) == ""
+    for y, strip in last.items():
+        assert terminal.text()[y].rstrip("?") == strip.text
+
+
+def test_a_frame_begins_with_the_strip_and_the_message() -> None:
+    picture = Picture()
+    rows = [(0, y, Strip([Segment(f"row{y}")])) for y in range(24)]
+    picture.want(rows, ColorSystem.TRUECOLOR)
+    order = [int(row) for row in re.findall(r"row(\d+)", picture.frame(WHOLE))]
+    assert order == [0, 1, 22, 23, *range(2, 22)]
+    picture.forget()
+    assert re.findall(r"row\d+", picture.frame(1)) == ["row0"]
+
+
+class Paced(LeanApp):
+    """One line; what goes to its terminal is kept, and answered when the test wants it."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.written: list[str] = []
+
+    @property
+    def _draws(self) -> bool:
+        return True
+
+    def compose(self) -> ComposeResult:
+        yield Lines(id="left")
+
+    def on_mount(self) -> None:
+        driver: Any = self._driver
+        driver.write = self.written.append
+
+    async def show(self, pilot: Pilot[None], text: str) -> str:
+        self.written.clear()
+        self.query_one("#left", Lines).show([Text(text)])
+        await pilot.pause()
+        return "".join(self.written)
+
+    def answer(self) -> str:
+        self.written.clear()
+        self.picture_taken(time.monotonic())
+        return "".join(self.written)
+
+
+async def test_what_a_terminal_has_not_taken_is_left_out_and_the_newest_comes_then() -> None:
+    app = Paced()
+    async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+        await pilot.pause()
+        for _ in range(8):
+            app.answer()
+        sent = await app.show(pilot, "one")
+        assert "one" in sent
+        assert sent.endswith(ASK)
+        assert await app.show(pilot, "two") == ""
+        assert await app.show(pilot, "six") == ""
+        then = app.answer()
+        assert "six" in then
+        assert "two" not in then
+        assert app.answer() == ""
+
+
+async def test_what_a_key_brings_goes_at_once() -> None:
+    app = Paced()
+    async with app.run_test(size=(COLUMNS, ROWS)) as pilot:
+        await pilot.pause()
+        for _ in range(8):
+            app.answer()
+        assert "one" in await app.show(pilot, "one")
+        app.hurry()
+        assert "two" in await app.show(pilot, "two")

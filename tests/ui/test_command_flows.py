@@ -26,6 +26,7 @@ from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.help import HelpScreen
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.wiring.screen import WiringScreen
 from tui.session.command.stop_report import Phase
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.simulator import DriveSpec, Simulation
@@ -257,6 +258,7 @@ SCREENS = {
     "faults": ("5", FaultsScreen),
     "frames": ("7", FramesScreen),
     "messages": ("m", MessagesScreen),
+    "wiring": ("I", WiringScreen),
     "run line": ("v", MonitorScreen),
     "coast": ("z", Confirm),
     "leave": ("q", Leave),

@@ -24,6 +24,7 @@ from tui.screens.keys.table import ACTIONS, EVERYWHERE
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.screen import ParametersScreen
+from tui.screens.wiring.screen import WiringScreen
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.monitor.line_watch import LineWatch
 from tui.widgets.lines import Lines
@@ -178,7 +179,7 @@ async def test_leaving_a_drive_that_will_trip_asks_first() -> None:
         await to_monitor(app, pilot, 2)
         assert app.fleet is not None
         line_watch = app.fleet.line_watch
-        await until(pilot, lambda: alone(line_watch) == {1: 3.0})
+        await until(pilot, lambda: alone(line_watch) == {1: 3.0, 2: 10.0})
         await pilot.press("q")
         await until(pilot, lambda: isinstance(app.screen, Confirm))
         await pilot.press("escape")
@@ -211,6 +212,7 @@ def test_every_action_has_a_method_and_words() -> None:
         ParametersScreen,
         BlocksScreen,
         MessagesScreen,
+        WiringScreen,
     )
     owners = {(screen.TITLE or "line").lower(): screen for screen in screens}
     for action in ACTIONS:

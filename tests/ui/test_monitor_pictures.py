@@ -18,6 +18,7 @@ from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
 from tui.session.monitor.alarms import LineAlarms
 from tui.session.monitor.timeout import TimeoutWatch
+from tui.terminal.abilities import EVERYTHING, Abilities
 
 from . import fakes
 from .test_command_pictures import FakeStopper
@@ -101,7 +102,9 @@ SCENES = {
 LIMITS = {"HSP": 500, "LSP": 0, "ACC": 30, "INR": 1, "TFR": 600, "FRS": 500}
 
 
-def panel(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, MonitorScreen]:
+def panel(
+    scene: Scene, monkeypatch: pytest.MonkeyPatch, abilities: Abilities = EVERYTHING
+) -> tuple[Any, MonitorScreen]:
     """The panel on Monitor in that scene."""
     profile = library.load(scene.family)
     snapshot = None
@@ -109,7 +112,7 @@ def panel(scene: Scene, monkeypatch: pytest.MonkeyPatch) -> tuple[Any, MonitorSc
         snapshot = fakes.snapshot_of(
             profile, scene.raws, scene.line, age=scene.age, error=scene.error, block=scene.block
         )
-    app = fakes.app_of()
+    app = fakes.app_of(abilities=abilities)
     app.opened, app.read_only = fakes.opened(scene.line), scene.read_only
     app.low_bandwidth = scene.low_bandwidth
     console = fakes.console_of(snapshot, scene.line, family=scene.family, armed=scene.armed)
@@ -163,7 +166,15 @@ def test_monitor(
     )
 
 
-OTHER_SIZES = {"60x20": (60, 20), "200x60": (200, 60), "40x12": (40, 12), "100x30": (100, 30)}
+OTHER_SIZES = {
+    "60x20": (60, 20),
+    "60x16": (60, 16),
+    "200x60": (200, 60),
+    "100x30": (100, 30),
+    "59x24, too small": (59, 24),
+    "40x12, too small": (40, 12),
+    "24x6, too small": (24, 6),
+}
 
 
 @pytest.mark.parametrize("size", OTHER_SIZES)

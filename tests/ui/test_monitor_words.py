@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from tui.drive.orders import MOVING_ORDERS
 from tui.drive.profile import library
 from tui.screens.command.control import Control, hindrance
 from tui.screens.monitor.notices import NOTICE_ROWS, line_figures, notice_lines
@@ -74,6 +75,18 @@ def test_what_has_no_effect_names_the_way_out(family: str, raws: dict[str, int],
     assert found.way == way
 
 
+@pytest.mark.parametrize("eti", [0x0002, 0x4002])
+def test_an_idle_altivar_312_set_up_for_modbus_is_commanded_by_modbus(eti: int) -> None:
+    """Whether its extended status word names the channel yet or not."""
+    profile = library.load("atv312")
+    raws = {"LAC": 2, "CHCF": 1, "Fr1": 164, "rFC": 96, "LRS3": 0, "ETA": 0x0240, "ETI": eti}
+    view = view_of(profile, raws)
+    text = [" ".join(line.plain.split()) for line in state_lines(view, 22)]
+    assert "Command Modbus" in text
+    assert "Reference Modbus" in text
+    assert hindrance(profile, raws) is None
+
+
 def test_nothing_hinders_a_drive_that_stands_by() -> None:
     assert hindrance(ATV71, fakes.READY) is None
     assert hindrance(library.load("powerdrive"), {"10.40": 3, "6.43": 1}) is None
@@ -84,6 +97,8 @@ def test_why_a_command_has_no_effect_is_never_clipped(family: str) -> None:
     profile = library.load(family)
     for chart in profile.data.charts:
         for lock in chart.interlocks:
+            if "forward" not in (lock.orders or MOVING_ORDERS):
+                continue
             wrong = next(raw for raw in range(0x10000) if raw & lock.mask not in lock.values)
             raws = {one.parameter: one.values[0] for one in chart.interlocks}
             raws |= {when.parameter: when.values[0] for when in lock.when}

@@ -15,6 +15,7 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
+from tui.screens.parameters.parameter_list import shows_steps
 from tui.screens.parameters.results import RestQuestion, Results
 from tui.screens.parameters.screen import ParametersScreen
 
@@ -152,6 +153,32 @@ async def test_the_groups_have_tab_and_the_arrows() -> None:
         assert seen[0] == seen[4]
         assert seen[1] == seen[3]
         assert len(set(seen)) == 3
+
+
+async def test_simply_start_is_the_first_group_with_its_steps_in_their_order() -> None:
+    async with bench("atv31") as made:
+        screen = await to_parameters(made)
+        lines = [line.strip() for line in shown(made.app, "groups").splitlines()]
+        assert lines[lines.index("Unsaved 0") + 1] == "Simply start"
+        while not shows_steps(screen.listed):
+            await made.pilot.press("left")
+        await until(made.pilot, lambda: "2 Mains standard" in shown(made.app, "table"))
+        assert screen.listed.code == "bFr"
+        assert "1 Before" in shown(made.app, "table")
+        assert "drive powered without a run command" in table(made)
+        listed = [item.code for item in screen.listed.items if item.code]
+        assert listed[:3] == ["bFr", "UnS", "FrS"]
+        await press(made.pilot, "down", "down", "down")
+        assert screen.listed.code == "nCr"
+        assert "Nameplate: From the motor's nameplate" in " ".join(
+            shown(made.app, "detail").split()
+        )
+        # its limits follow the rated current of the drive
+        await until(made.pilot, lambda: "(INV)" in shown(made.app, "detail"))
+        await press(made.pilot, "up", "up", "up")
+        await until(made.pilot, lambda: "1 Before" in shown(made.app, "table"))
+        await press(made.pilot, "end")
+        await until(made.pilot, lambda: "14 First run" in shown(made.app, "table"))
 
 
 async def test_a_name_from_a_list_and_a_word_bit_by_bit() -> None:

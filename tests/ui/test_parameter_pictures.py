@@ -38,7 +38,7 @@ HELD = {
     "INR": 1, "ACC": 30, "DEC": 30, "AC2": 50, "DE2": 50, "HSP": 500, "LSP": 0, "TFR": 600,
     "BFR": 0, "NPR": 15, "UNS": 400, "NCR": 41, "NSP": 1450, "FRS": 500, "ITH": 41, "CTT": 3,
     "SFR": 40, "STT": 0, "CHCF": 1, "FR1": 164, "CD1": 10, "CCS": 98, "TTO": 100, "SLL": 6,
-    "LAC": 0, "ADD": 2, "TBR": 32, "TFO": 3, "BRA": 1, "RPT": 0, "CLI": 62,
+    "LAC": 0, "INV": 41, "ADD": 2, "TBR": 32, "TFO": 3, "BRA": 1, "RPT": 0, "CLI": 62,
 }  # fmt: skip
 
 
@@ -191,7 +191,8 @@ FILES = (
 STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
     "settings": (plain, fakes.READY, None, []),
     "group": (plain, fakes.READY, None, ["tab", "right", "right"]),
-    "changed": (plain, fakes.READY, None, ["left"] * 4),
+    "changed": (plain, fakes.READY, None, ["left"] * 5),
+    "start-up": (plain, fakes.READY, None, ["left"] * 3 + ["down"] * 6),
     "rest": (rest, fakes.RUNNING, 52.0, []),
     "results": (stopped, fakes.RUNNING, 52.0, []),
     "written": (written, fakes.READY, 52.0, ["slash", *"acc", "enter"]),
@@ -221,7 +222,7 @@ STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
 OTHER_SIZES = [
     pytest.param(state, size, id=f"{size[0]}x{size[1]}-{state}")
     for size in ((60, 20), (200, 60))
-    for state in ("settings", "staged", "number", "write-running")
+    for state in ("settings", "start-up", "staged", "number", "write-running")
 ]
 
 

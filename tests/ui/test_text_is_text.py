@@ -16,6 +16,7 @@ import pytest
 from rich.text import Text
 from textual.widgets import Input
 
+from tests.answering import read_answering
 from tui.app import DrivePanelApp
 from tui.drive.settings.restore_plan import RestoreItem
 from tui.screens.blocks.pick_parameter import PickParameter
@@ -94,6 +95,12 @@ async def rating(made: Bench) -> None:
     await dialog(made, "(rating)")
 
 
+async def inputs(made: Bench) -> None:
+    assert made.app.opened is not None
+    made.app.opened.simulation = made.simulation
+    await dialog(made, "D")
+
+
 async def parameters(made: Bench) -> None:
     await made.pilot.press("3")
     await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
@@ -170,6 +177,7 @@ async def connection(made: Bench) -> None:
 WAYS: dict[str, tuple[str, Way]] = {
     "monitor": ("atv71", monitor),
     "rating": ("atv21", rating),
+    "inputs": ("atv21", inputs),
     "parameters": ("atv71", parameters),
     "scanner": ("atv71", blocks),
     "faults": ("atv71", faults),
@@ -177,6 +185,7 @@ WAYS: dict[str, tuple[str, Way]] = {
 }
 ASKED = {
     "rating",
+    "inputs",
     "Ctrl+S and report of Parameters",
     "Ctrl+S of Blocks",
     "words",
@@ -292,5 +301,5 @@ def read_until(terminal: int, *wanted: bytes) -> bytes:
     while not all(part in seen for part in wanted):
         assert time.monotonic() < end, seen[-2000:]
         if select.select([terminal], [], [], 0.2)[0]:
-            seen += os.read(terminal, 65536)
+            seen += read_answering(terminal)
     return seen

@@ -29,6 +29,7 @@ COMMANDS = {
     "simulate": ("simulate", "Serve simulated drives."),
     "status": ("status", "Tell what a drive does and who commands it."),
     "stop": ("stop", "Stop a drive, or every drive of a line."),
+    "teach": ("teach", "Teach a raw value's scale by the drive's display."),
     "watch": ("watch", "Watch parameters of a drive."),
     "write": ("write", "Write settings of a drive."),
 }

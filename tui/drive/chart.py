@@ -6,10 +6,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
+from .channel import command_channel, reference_channel
 from .profile.profile import Profile
 from .profile.schema import ChannelBits, Chart, DirectionBit, State, StateKind, StatusBit
 
 UNKNOWN = State(id="unknown", name="Unknown", kind="unknown", mask=0, value=0)
+TOLD_FAULT = State(id="fault", name="Fault", kind="fault", mask=0, value=0)
+"""What a fault word tells where the chart has no state for it."""
+ENABLED_KINDS: frozenset[StateKind] = frozenset({"running", "stopping"})
+"""Kinds of state in which the drive may turn its motor."""
 Direction = Literal["forward", "reverse"]
 
 
@@ -18,17 +23,27 @@ class ChartState:
     """What the status words say; a part is None where its word was not read."""
 
     state: State
+    """The state in force: a fault where the fault word tells one, whatever the status word."""
+    own: State = UNKNOWN
+    """The state by the status word alone."""
     direction: Direction | None = None
     reached: bool | None = None
     alarm: bool | None = None
     local: bool | None = None
     channel: str = ""
-    """Who commands the drive, where the chart tells it."""
+    """Who commands the drive, where its words tell it."""
+    reference: str = ""
+    """Who gives its reference, where its words tell it."""
 
     @property
     def kind(self) -> StateKind:
         """The kind of the state, the same words on every family."""
         return self.state.kind
+
+    @property
+    def motion(self) -> StateKind:
+        """The kind for whoever needs a motor at rest: a fault word stops no motor by itself."""
+        return self.own.kind if self.own.kind in ENABLED_KINDS else self.state.kind
 
 
 def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
@@ -36,14 +51,16 @@ def read_chart(profile: Profile, raws: Mapping[str, int]) -> ChartState:
     chart = profile.chart(raws)
     word = raws.get(chart.status) if chart else None
     if chart is None or word is None:
-        return ChartState(UNKNOWN)
+        return ChartState(TOLD_FAULT if told_fault(profile, raws) is not None else UNKNOWN)
     return ChartState(
-        state=state_of(chart, word),
+        state=state_now(profile, chart, raws),
+        own=state_of(chart, word),
         direction=_direction(chart.direction, raws),
         reached=_status_bit(chart.reached, raws),
         alarm=_status_bit(chart.alarm, raws),
         local=_status_bit(chart.local, raws),
-        channel=_channel(chart.channel, raws),
+        channel=_commanded_by(profile, chart, raws),
+        reference=found.text if (found := reference_channel(profile, raws)) else "",
     )
 
 
@@ -52,8 +69,38 @@ def state_of(chart: Chart, word: int) -> State:
     return next((s for s in chart.states if word & s.mask == s.value), UNKNOWN)
 
 
+def state_now(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> State:
+    """The state in force in a chart; a fault word goes before the status word.
+
+    UNKNOWN where the status word was not read and no fault is told.
+    """
+    word = raws.get(chart.status)
+    own = state_of(chart, word) if word is not None else UNKNOWN
+    if own.kind == "fault" or told_fault(profile, raws) is None:
+        return own
+    return next((state for state in chart.states if state.kind == "fault"), TOLD_FAULT)
+
+
+def told_fault(profile: Profile, raws: Mapping[str, int]) -> int | None:
+    """The fault of now by the fault word; None where it tells none, or keeps the last one."""
+    faults = profile.data.faults
+    raw = raws.get(faults.parameter)
+    return None if faults.shows_last or raw == faults.none else raw
+
+
+def fault_code(profile: Profile) -> str:
+    """The code of the word that tells a present fault by itself; empty where none does."""
+    faults = profile.data.faults
+    return "" if faults.shows_last else faults.parameter
+
+
+def state_codes(profile: Profile, chart: Chart) -> list[str]:
+    """Codes of the words that tell the state in a chart."""
+    return [code for code in (chart.status, fault_code(profile)) if code]
+
+
 def watched_codes(profile: Profile) -> list[str]:
-    """Codes of every word that the charts of a profile look at."""
+    """Codes of every word that the charts of a profile look at, and of a present fault."""
     codes: list[str] = []
     for chart in profile.data.charts:
         marks = (
@@ -65,6 +112,8 @@ def watched_codes(profile: Profile) -> list[str]:
             chart.when,
         )
         codes += [chart.status, *(mark.parameter for mark in marks if mark)]
+    if codes and (code := fault_code(profile)):
+        codes.append(code)
     return list(dict.fromkeys(codes))
 
 
@@ -72,6 +121,12 @@ def _direction(mark: DirectionBit | None, raws: Mapping[str, int]) -> Direction 
     if mark is None or (word := raws.get(mark.parameter)) is None:
         return None
     return "reverse" if word >> mark.bit & 1 == mark.reverse else "forward"
+
+
+def _commanded_by(profile: Profile, chart: Chart, raws: Mapping[str, int]) -> str:
+    """Who commands: by the channels of the profile, else by bits of the chart."""
+    found = command_channel(profile, raws)
+    return found.text if found is not None else _channel(chart.channel, raws)
 
 
 def _channel(bits: ChannelBits | None, raws: Mapping[str, int]) -> str:

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Mapping, Sequence
 
+from .channel import channel_codes
 from .chart import state_of
 from .errors import DriveError
 from .profile.profile import Profile
-from .profile.schema import Chart, Interlock, Order, OrderId, Parameter, When
+from .profile.schema import Chart, Interlock, Order, OrderId, Parameter, State, When
 
 GENTLE_FIRST: tuple[OrderId, ...] = ("stop", "quick-stop", "freewheel")
 """Ways to stop that trip no drive, the gentlest first."""
@@ -31,23 +32,24 @@ def chart_in_force(profile: Profile, raws: Mapping[str, int]) -> Chart | None:
 
 
 def deciding_codes(profile: Profile) -> list[str]:
-    """Codes of the words on which it depends how an order is carried out."""
+    """Codes of the words on which it depends how an order is carried out, and by whom."""
     codes = [chart.when.parameter for chart in profile.data.charts if chart.when]
     for chart in profile.data.charts:
         codes += [when.parameter for order in chart.orders for when in order.when]
-    return list(dict.fromkeys(codes))
+    return list(dict.fromkeys((*codes, *channel_codes(profile))))
 
 
-def choose(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Order:
-    """The order that holds in the state that the raw values tell; raises OrderRefused."""
+def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | None = None) -> Order:
+    """The order that holds in a state, by default that of the status word; raises OrderRefused."""
     same = [order for order in chart.orders if order.id == id]
     if not same:
         raise OrderRefused(f"The {chart.name} has no order {id.replace('-', ' ')!r}.")
     word = raws.get(chart.status)
-    state = state_of(chart, word) if word is not None else None
+    if state is None and word is not None:
+        state = state_of(chart, word)
     fitting = [o for o in same if not o.states or (state is not None and state.id in o.states)]
     for order in fitting:
-        if all(raws.get(when.parameter) in when.values for when in order.when):
+        if all(when.holds(raws) for when in order.when):
             return order
     if fitting:
         needed = " or ".join(_conditions(order) for order in fitting)
@@ -56,6 +58,11 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Order:
     allowed = ", ".join(dict.fromkeys(names[s] for order in same for s in order.states))
     now = state.name if state else "not known"
     raise OrderRefused(f"{same[0].name} is possible in the states: {allowed}. It is now: {now}.")
+
+
+def follows_from(chart: Chart, id: OrderId) -> str:
+    """What follows from an order besides, for whoever is asked before it is given."""
+    return " ".join(dict.fromkeys(o.follows for o in chart.orders if o.id == id and o.follows))
 
 
 def nearest_stop(chart: Chart, id: OrderId) -> OrderId:
@@ -100,8 +107,7 @@ def _may_hold(chart: Chart, raws: Mapping[str, int]) -> bool:
     """Whether a chart may be the one in force."""
     if chart.when is None:
         return True
-    raw = raws.get(chart.when.parameter)
-    return raw is None or raw in chart.when.values
+    return chart.when.holds(raws) is not False
 
 
 def _stops(profile: Profile, chart: Chart, where: Parameter, words: Sequence[int]) -> bool:
@@ -156,16 +162,6 @@ STOP_ORDERS: frozenset[OrderId] = frozenset({"stop", "quick-stop", "freewheel", 
 MOVING_ORDERS: frozenset[OrderId] = frozenset({"forward", "reverse", "dc-braking"})
 
 
-def interlock(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
-    """Why an order must not be sent now, with what to do; empty when it may."""
-    lock = locked_by(chart, id, raws)
-    if lock is None:
-        return ""
-    if lock.parameter not in raws:
-        return f"{lock.parameter} is not known, and it decides: {lock.text}"
-    return f"{lock.text} {lock.remedy}".strip()
-
-
 def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock | None:
     """The first interlock that holds an order back now, or whose word is not known."""
     if id in STOP_ORDERS:
@@ -173,7 +169,7 @@ def locked_by(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> Interlock |
     for lock in chart.interlocks:
         if id not in (lock.orders or MOVING_ORDERS):
             continue
-        if not all(raws.get(when.parameter) in when.values for when in lock.when):
+        if any(when.holds(raws) is False for when in lock.when):
             continue
         raw = raws.get(lock.parameter)
         if raw is None or raw & lock.mask not in lock.values:
@@ -187,8 +183,7 @@ def unmet(chart: Chart, id: OrderId, raws: Mapping[str, int]) -> When | None:
     for order in chart.orders:
         if order.id != id:
             continue
-        known = [when for when in order.when if when.parameter in raws]
-        wrong = next((w for w in known if raws[w.parameter] not in w.values), None)
+        wrong = next((when for when in order.when if when.holds(raws) is False), None)
         if wrong is None:
             return None
         first = first or wrong

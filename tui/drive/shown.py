@@ -12,6 +12,7 @@ from decimal import Decimal
 
 from .profile.profile import Profile
 from .profile.schema import Parameter
+from .teaching import TaughtScale
 from .values import Value, decode, raw_range
 
 
@@ -23,11 +24,21 @@ def shown(
     absent: Collection[str] = (),
 ) -> Value:
     """The reading of a raw value; `raws` are raw values by code, `absent` codes the drive lacks."""
+    if (taught := profile.taught.get(parameter.code)) is not None:
+        return _taught_value(raw, taught)
     scale = profile.scale(parameter, raws, absent)
     value = decode(parameter, raw, profile.names(parameter), scale)
     if parameter.unit_by is not None and value.number is not None:
         value = replace(value, unit=profile.unit(parameter, raws))
     return value
+
+
+def _taught_value(raw: int, taught: TaughtScale) -> Value:
+    """The reading of a word whose scale was taught; raw as long as its sign is not known."""
+    number = taught.number(raw)
+    if number is None:
+        return Value(raw, Decimal(raw), "raw", str(raw))
+    return Value(raw, number, taught.unit, f"{number:f}", taught=True)
 
 
 def shown_text(
@@ -84,6 +95,8 @@ def number_of(
     absent: Collection[str] = (),
 ) -> Decimal | None:
     """The engineering value of a raw one, a named one too; None while its scale is not known."""
+    if (taught := profile.taught.get(parameter.code)) is not None:
+        return taught.number(raw)
     scale = profile.scale(parameter, raws, absent)
     return None if scale is None else raw * scale
 

@@ -25,6 +25,10 @@ class Value:
     unit: str
     text: str
     """What a person reads, without the unit."""
+    taught: bool = False
+    """Whether a person has taught its scale; no document has it."""
+    unsure: bool = False
+    """Whether no document says what so high a raw value means; its text ends with `?`."""
 
     @property
     def display(self) -> str:
@@ -125,7 +129,8 @@ def decode(
     if scale is None:
         return Value(raw, Decimal(raw), "raw", str(raw))
     number = engineering(raw, scale)
-    return Value(raw, number, parameter.unit, f"{number:f}")
+    unsure = parameter.sure_up_to is not None and raw > parameter.sure_up_to
+    return Value(raw, number, parameter.unit, f"{number:f}{'?' * unsure}", unsure=unsure)
 
 
 def is_enumeration(parameter: Parameter) -> bool:
@@ -155,6 +160,8 @@ def encode(
     value is out of the profile's range or sets a reserved bit.
     """
     typed = text.strip()
+    if parameter.sure_up_to is not None:
+        typed = typed.replace("?", "")  # the mark of such a value, as it is shown
     raw = _named(typed, names)
     rounded = False
     if raw is None and typed.lower().startswith(("16#", "0x")):
@@ -179,9 +186,10 @@ def check_raw(
     """Raise ValueRefused unless the profile lets the parameter hold this raw value."""
     low, high = raw_range(parameter)
     if not low <= raw <= high and raw not in names:
+        limits = f"{_plain(parameter, low, scale)} to {_plain(parameter, high, scale)}"
         raise ValueRefused(
             f"{parameter.code}: {_plain(parameter, raw, scale)} is out of range, "
-            f"{_plain(parameter, low, scale)} to {_plain(parameter, high, scale)}."
+            f"{limits}{_doubt(parameter)}."
         )
     to_words(parameter, raw, held=0)
     if is_enumeration(parameter) and raw not in names:
@@ -196,6 +204,13 @@ def _plain(parameter: Parameter, raw: int, scale: Decimal | None) -> str:
     if scale is None:
         return f"raw {raw}"
     return f"{engineering(raw, scale):f} {parameter.unit}".rstrip()
+
+
+def _doubt(parameter: Parameter) -> str:
+    """That no document of the family tells the limits, where only the row itself is sure."""
+    grounds = parameter.limit_grounds
+    weak = grounds is not None and grounds.confidence in ("analogy", "unverified")
+    return " (limits that no document of this family tells)" if weak else ""
 
 
 def _scale_source(parameter: Parameter) -> str:

@@ -5,9 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import TYPE_CHECKING
 
-from textual.app import App
-
 from tui.drive.plain import plain
+from tui.terminal.lean_app import LeanApp
 
 if TYPE_CHECKING:
     from textual.notifications import SeverityLevel
@@ -23,7 +22,7 @@ if TYPE_CHECKING:
     from tui.widgets.strip import FrameView
 
 
-class Panel(App[None]):
+class Panel(LeanApp):
     """The app as its screens see it: one line at a time, the drives found on it."""
 
     clock: Clock

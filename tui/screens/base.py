@@ -29,7 +29,7 @@ class PanelScreen(Framed):
     PanelScreen { layout: vertical; overflow: hidden; }
     PanelScreen { background: $background; color: $foreground; }
     PanelScreen #frame-room { height: 2; }
-    PanelScreen #keys { height: 1; margin-top: 1; background: $surface; }
+    PanelScreen #keys { dock: bottom; height: 1; margin-top: 1; background: $surface; }
     """
     LOOK: ClassVar[float | None] = None
     """Seconds between two looks at what there is; None for a screen with a time of its own."""

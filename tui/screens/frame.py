@@ -18,6 +18,7 @@ from tui.drive.plain import plain
 from tui.widgets.drawing import wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, PLAIN, STRONG
+from tui.widgets.small import is_too_small, small_lines
 from tui.widgets.strip import FrameView, Said, Tab, said_line, strip_line, tabs_line
 
 from .keys.action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
@@ -64,6 +65,7 @@ class Framed(Screen[Any]):
     Framed #tabs { dock: top; height: 1; margin-top: 1; background: $background; layer: frame; }
     Framed #said { dock: bottom; height: 1; margin-bottom: 1; layer: frame; }
     Framed #said { background: $background; }
+    Framed #small { dock: top; height: 100%; width: 100%; background: $background; layer: frame; }
     """
 
     def framed(self) -> Iterable[Widget]:
@@ -91,6 +93,7 @@ class Framed(Screen[Any]):
         width = self.size.width
         if not width:
             return
+        self._draw_small(view)
         parts = self._parts(view, width)
         # a screen that is being made, or goes, has none of them or some
         for said in self.query("#said").results(Lines):
@@ -100,6 +103,19 @@ class Framed(Screen[Any]):
         for place, lines in parts.items():
             for part in self.query(f"#{place}").results(Lines):
                 part.show(lines)
+
+    def _draw_small(self, view: FrameView) -> None:
+        """Cover the screen where the terminal is too small for it."""
+        there = self.query("#small").results(Lines)
+        small = next(iter(there), None)
+        if not is_too_small(*self.app.size):
+            if small is not None:
+                small.remove()
+            return
+        if small is None:
+            small = Lines(id="small")
+            self.mount(small)
+        small.show(small_lines(view.strip, self.app.stops_whom, *self.size))
 
 
 def said_lines(said: Said | None, width: int) -> list[Text]:

@@ -15,6 +15,7 @@ from tui.terminal.loop import soon_in_loop
 from tui.terminal.names import STOP_KEYS
 from tui.terminal.stroke import stroke_of
 from tui.terminal.type_ahead import TypeAhead
+from tui.widgets.small import is_too_small
 
 from .app_port import Panel
 
@@ -46,8 +47,10 @@ class Hands(Panel):
         left = left_at is not None and left_at > self._typed.done_to
         if key not in STOP_KEYS:
             return False
-        if key == STOP_OUTSIDE_TEXT and takes_space(self.focused) and not left:
+        in_text = takes_space(self.focused) and not left and not is_too_small(*self.size)
+        if key == STOP_OUTSIDE_TEXT and in_text:
             return False
+        self.hurry()
         self._stop(everything=key == STOP_ALL)
         if key == STOP and self._trying_f12:
             self._f12_arrived()
@@ -98,7 +101,7 @@ class Hands(Panel):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A space belongs to the text that is being typed."""
         if action == "stop_by_space":
-            return not takes_space(self.focused)
+            return not takes_space(self.focused) or is_too_small(*self.size)
         return super().check_action(action, parameters)
 
     def action_stop_by_space(self) -> None:
@@ -148,8 +151,9 @@ class Hands(Panel):
         if isinstance(event, InputEvent | Paste) and not self.is_running:
             return  # the panel ends: there is no screen any more that could take it
         if isinstance(event, Key | Paste) and not event.is_forwarded:
-            if not self._typed.admit(event):
-                return
+            if not self._typed.admit(event) or is_too_small(*self.size):
+                return  # nobody acts on a screen that cannot be seen
+            self.hurry()
             if isinstance(event, Key):
                 for session in self.fleet.sessions if self.fleet else ():
                     session.arming.touch()

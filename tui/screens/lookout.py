@@ -58,7 +58,9 @@ class Lookout(Panel):
             return
         view, now = self._frame.view(), self.clock.monotonic()
         drawn = (self.screen, self.screen.size, view.at_once)
-        if self.low_bandwidth and drawn == self._drawn and now < self._drawn_at + SELDOM:
+        if drawn != self._drawn:
+            self.hurry()
+        elif self.low_bandwidth and now < self._drawn_at + SELDOM:
             return
         self._drawn, self._drawn_at = drawn, now
         self.screen.draw_frame(view)

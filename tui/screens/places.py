@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING
 from textual.screen import Screen
 
 from .app_port import Panel
-from .keys.action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
+from .keys.action import (
+    BLOCKS,
+    CONNECTION,
+    FAULTS,
+    FRAMES,
+    MESSAGES,
+    MONITOR,
+    PARAMETERS,
+    SOURCES,
+    WIRING,
+)
 
 if TYPE_CHECKING:
     from textual.widget import AwaitMount
@@ -37,8 +47,12 @@ class Places(Panel):
 
         log.info("watching device %s, %s", console.device, console.session.profile.id)
         self.chosen = console
-        self._to_base()
-        self.push_screen(MonitorScreen(console))
+        while len(self.screen_stack) > 3:
+            self.pop_screen()
+        if len(self.screen_stack) == 3:  # no picture of Line in between
+            self.switch_screen(MonitorScreen(console))
+        else:
+            self.push_screen(MonitorScreen(console))
 
     def _to_base(self) -> None:
         """Back to the list of lines, whatever is above it."""
@@ -89,7 +103,7 @@ class Places(Panel):
             self.chosen = wanted
             return
         self.show_monitor(wanted)
-        if place != MONITOR:
+        if place not in (MONITOR, MESSAGES):
             self.show_place(place, wanted)
 
     async def action_find(self) -> None:
@@ -114,6 +128,21 @@ class Places(Panel):
 
         if not isinstance(self.screen, MessagesScreen):
             self.push_screen(MessagesScreen())
+
+    def action_wiring(self) -> None:
+        """The page of a family: of the drive under the cursor of Line, else of the open one."""
+        if self.place == WIRING:
+            return
+        console = getattr(self.screen, "pointed", None) or self.chosen
+        if console is None:
+            self.tell(
+                "No drive is here yet. Of any family:"
+                " drivepanel profiles ID --wiring, outside the panel."
+            )
+            return
+        from .wiring.screen import WiringScreen
+
+        self.push_screen(WiringScreen(console))
 
     def action_save_shown(self) -> None:
         """Save what the screen shows to a file."""
@@ -157,6 +186,10 @@ def _made(place: str, console: DriveConsole) -> Screen[None]:
         from .control.screen import ControlSourceScreen
 
         return ControlSourceScreen(console)
+    if place == WIRING:
+        from .wiring.screen import WiringScreen
+
+        return WiringScreen(console)
     assert place == FRAMES
     from .frames.screen import FramesScreen
 

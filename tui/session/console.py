@@ -17,6 +17,7 @@ from .monitor.monitor import Monitor
 from .monitor.snapshot import Snapshot
 from .read.reader import Reader
 from .reading import Reading
+from .teaching.teacher import Teacher
 
 if TYPE_CHECKING:
     from .blocks.editor import BlockEditor
@@ -25,7 +26,7 @@ if TYPE_CHECKING:
 
 @dataclass(eq=False)
 class DriveConsole:
-    """The one monitor, commander, settings, blocks and recorder of a drive."""
+    """The one monitor, commander, settings, blocks, recorder and teacher of a drive."""
 
     session: DriveSession
     journal: Journal
@@ -35,6 +36,7 @@ class DriveConsole:
         self.commander = Commander(self.session, self.journal)
         self.recorder = Recorder(self.session, self.journal)
         self.monitor.listen(self.recorder.take)
+        self.teacher = Teacher(self.session)
 
     async def read(self, codes: Iterable[str]) -> dict[str, Reading]:
         """Readings by code, asked for by a person; raises the line's errors."""

@@ -6,7 +6,7 @@ import math
 
 from tui.bus.api import ModbusLine
 from tui.bus.link import label
-from tui.drive.chart import UNKNOWN, ChartState, read_chart
+from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile
 
 from .arming import Arming
@@ -35,7 +35,10 @@ class DriveSession:
     ) -> None:
         self.line = line
         self.device = device
+        self.family = profile
+        """What is known of every drive of its family."""
         self.profile = profile
+        """The same, with what a person has taught of this drive."""
         self.identity = identity
         self.clock = clock
         """What everything that is done with the drive counts by."""
@@ -70,6 +73,11 @@ class DriveSession:
         """Whether a command or reference was sent to the drive from here."""
         return self.commanded_at is not None
 
+    def learn(self, profile: Profile) -> None:
+        """Go by the family's profile with what was taught of this drive."""
+        self.profile = profile
+        self.stir()
+
     def note_command(self) -> None:
         """A command or reference was sent."""
         self.commanded_at = self.clock.monotonic()
@@ -92,9 +100,15 @@ class DriveSession:
         return label(self.line.link)
 
     def state(self, longest: float) -> ChartState:
-        """The drive's state by its status word; unknown where that is older than so many s."""
+        """The drive's state by its words; unknown where its status is older than so many s.
+
+        A fault word that old tells nothing: the fault may have been reset since.
+        """
         raws = self.image.trusted
         chart = self.profile.chart(raws)
         if chart is None or self.image.age(chart.status) > longest:
             return ChartState(UNKNOWN)
+        fault = fault_code(self.profile)
+        if fault and self.image.age(fault) > longest:
+            raws = {code: raw for code, raw in raws.items() if code != fault}
         return read_chart(self.profile, raws)

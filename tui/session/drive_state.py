@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tui.drive.chart import UNKNOWN, ChartState, Direction, read_chart
+from tui.drive.chart import ChartState, Direction, read_chart
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Bit, FaultCode, Parameter, StateKind
 from tui.drive.values import set_bits
@@ -23,12 +23,16 @@ class DriveState:
     id: str
     name: str
     kind: StateKind
+    motion: StateKind
+    """The kind for whoever needs a motor at rest: a fault word stops no motor by itself."""
     direction: Direction | None
     reached: bool | None
     alarm: bool | None
     local: bool | None
     channel: str
-    """Who commands the drive, where its chart tells it."""
+    """Who commands the drive, where its words tell it."""
+    reference: str
+    """Who gives its reference, where its words tell it."""
     fault: FaultCode | None
     """The fault that the drive is in now."""
     fault_raw: int | None
@@ -52,11 +56,13 @@ def drive_state(profile: Profile, readings: Mapping[str, Reading]) -> DriveState
         id=chart.state.id,
         name=chart.state.name,
         kind=chart.kind,
+        motion=chart.motion,
         direction=chart.direction,
         reached=chart.reached,
         alarm=chart.alarm,
         local=chart.local,
         channel=chart.channel,
+        reference=chart.reference,
         fault=fault,
         fault_raw=fault_raw,
         alarms=_alarms(profile, raws),
@@ -71,10 +77,7 @@ def _asked(profile: Profile, readings: Mapping[str, Reading]) -> bool:
 
 def _present_fault(profile: Profile, chart: ChartState, raw: int | None) -> FaultCode | None:
     """The fault now: a family that keeps its last fault is in it only while its chart says so."""
-    faults = profile.data.faults
-    if raw is None or raw == faults.none:
-        return None
-    if chart.kind != "fault" and (faults.shows_last or chart.state is not UNKNOWN):
+    if raw is None or raw == profile.data.faults.none or chart.kind != "fault":
         return None
     return profile.fault(raw) or FaultCode(raw=raw, code=f"code {raw}", name="Not in the profile")
 

@@ -117,11 +117,17 @@ class Fleet:
         if before is not None:
             before.close()
         self.line_watch.keep(session, console.monitor)
-        if self.starts is not None:
-            # reads files: in a thread that nobody waits for
-            look = threading.Thread(target=self.starts.look, args=(session,), daemon=True)
-            look.start()
+        # reads files: in a thread that nobody waits for
+        threading.Thread(target=self._recall, args=(console,), daemon=True).start()
         return console
+
+    def _recall(self, console: DriveConsole) -> None:
+        """What earlier programs have left of a drive: a motor that runs, and what was taught."""
+        if self.starts is not None:
+            self.starts.look(console.session)
+        console.teacher.recall()
+        if console.teacher.trouble:
+            self.events.add("failed", console.teacher.trouble, console.device)
 
     def _note_outcome(self, device: int, outcome: Outcome) -> None:
         if outcome.kind is not OutcomeKind.WORKING:

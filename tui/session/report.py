@@ -8,8 +8,11 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 
 from tui.drive.blocks.assignment import slot_target
+from tui.drive.channel import switch_texts
 from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
+from tui.drive.hints import hint_markdown, reset_text
+from tui.drive.model import model_told
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
@@ -80,6 +83,8 @@ class _Report:
         """What the drive is, and when and where it was read."""
         head = self.values.head
         known = [f"- {key.capitalize()}: {_cell(text)}" for key, text in head.identity.items()]
+        model = model_told(self.profile, self.values.raws)
+        known += [f"- Model by its own code: {_cell(model)}"] if model else []
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
             "",
@@ -102,7 +107,7 @@ class _Report:
         before: dict[str, str] = {}
         for entry in self.entries:
             before.setdefault(entry.code, entry.old)
-        sides = factory_side(self.profile), side_of("now", self.values)
+        sides = factory_side(self.profile, self.values), side_of("now", self.values)
         rows = [
             (row.code, row.name, row.a, row.b, before.get(row.code, ""))
             for row in compare_settings(self.profile, *sides)
@@ -111,8 +116,8 @@ class _Report:
         return [
             "## Settings changed from the factory",
             "",
-            f"The factory settings of {known} parameters are known. Before: the first old value in"
-            " the journal.",
+            f"The factory settings of {known} parameters are known; ? marks those that no document"
+            " of this family tells. Before: the first old value in the journal.",
             "",
             *_table(("code", "name", "factory", "now", "before"), rows),
         ]
@@ -122,8 +127,10 @@ class _Report:
         raws = self.values.raws
         source = source_in_force(self.profile, raws)
         lines = [f"- Configuration: {source.name if source else 'none of those in the manual'}"]
-        if channel := read_chart(self.profile, raws).channel:
-            lines.append(f"- Commanded by: {channel}")
+        told = read_chart(self.profile, raws)
+        lines += [f"- Commanded by: {told.channel}"] if told.channel else []
+        lines += [f"- Reference from: {told.reference}"] if told.reference else []
+        lines += [f"- {text}" for text in switch_texts(self.profile, raws)]
         for quantity in CHANNEL_QUANTITIES:
             parameter = self.profile.quantity(quantity)
             if parameter is None or parameter.code not in raws:
@@ -183,6 +190,19 @@ class _Report:
             kept = [(one, self.profile[one].name, self.text(one)) for one in stored]
             head = f"What the drive stored with {code}, {self._fault(code)}:"
             lines += ["", head, "", *_table(("code", "name", "value"), kept)]
+        return [*lines, *self._pointed_at(codes)]
+
+    def _pointed_at(self, codes: Sequence[str]) -> list[str]:
+        """What the faults that these words tell point at, each once."""
+        lines: list[str] = []
+        raws = (self.values.raws.get(code) for code in codes)
+        for raw in dict.fromkeys(raw for raw in raws if raw is not None):
+            fault, help_ = self.profile.fault(raw), self.profile.guide.fault(raw)
+            if fault is None or help_ is None:
+                continue
+            reset = reset_text(help_, None, "a fault reset").text
+            told = hint_markdown(self.profile, help_, self.text, reset)
+            lines += ["", f"What {fault.code} {fault.name} points at:", "", *told]
         return lines
 
     def _fault(self, code: str) -> str:

@@ -2,17 +2,22 @@
 
 from .drive import SimulatedDrive
 from .errors import SimulatorError
+from .input_lines import check_inputs, set_inputs
+from .server.client_settings import ClientSettings
 from .server.endpoints import ByteStream
 from .simulation import Simulation
 from .spec import DriveSpec, FaultRates, LineTiming, parse_drives
 
 __all__ = [
     "ByteStream",
+    "ClientSettings",
     "DriveSpec",
     "FaultRates",
     "LineTiming",
     "SimulatedDrive",
     "Simulation",
     "SimulatorError",
+    "check_inputs",
     "parse_drives",
+    "set_inputs",
 ]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
 
@@ -9,6 +10,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
 
 from .plant.motor import MotorState, RatingPlate, Stop
+from .plant.terminals import PLAIN_TERMINALS, Terminals
 from .registers import Registers
 from .rules import Traits
 
@@ -20,6 +22,9 @@ class ActiveFault:
     raw: int
     code: str
     persists: bool = False
+
+
+CHART_WORDS: Mapping[Quantity, str] = {"status_word": "status", "command_word": "command"}
 
 
 class Fallback(Enum):
@@ -46,6 +51,12 @@ class LineOrders:
         """When the line last wrote this one, as a running number; 0: not since power-up."""
         return self._at.get(parameter.code, 0) if parameter else 0
 
+    def take_back(self, *parameters: Parameter | None) -> None:
+        """Something else took the place of what the line wrote into these."""
+        for parameter in parameters:
+            if parameter and parameter.code in self._at:
+                self._at[parameter.code] = 0
+
     def forget(self) -> None:
         """Forget them, as a power-down does."""
         self._at.clear()
@@ -67,10 +78,14 @@ class Body:
     motor: MotorState = field(default_factory=MotorState)
     powered: bool = True
     """Whether the drive's supply is on; without it the drive is silent."""
-    terminal_hz: float | None = None
-    """Reference in Hz of a run order at the terminals; None: no order there."""
+    terminals: Terminals = field(default_factory=lambda: Terminals(PLAIN_TERMINALS))
+    """Its inputs; no trip, reset or power-down changes them."""
+    earlier_hz: float | None = None
+    """Reference in Hz that another master gave before the line wrote one; None: none."""
     fault: ActiveFault | None = None
     fallback: Fallback | None = None
+    forced_local: bool = False
+    """Whether an input forces local control: the line is not watched meanwhile."""
     alarms: int = 0
     """Alarm word as provoked, beside what the motor itself raises."""
     saving: float = 0.0
@@ -80,8 +95,15 @@ class Body:
     # Parameters by meaning
 
     def parameter(self, quantity: Quantity) -> Parameter | None:
-        """The parameter that carries a quantity, or None."""
-        return self.profile.quantity(quantity)
+        """The parameter that carries a quantity, or None.
+
+        Status and command word are those of the chart where no parameter is called so.
+        """
+        if found := self.profile.quantity(quantity):
+            return found
+        if quantity in CHART_WORDS and self.profile.data.charts:
+            return self.registers.named(getattr(self.profile.data.charts[0], CHART_WORDS[quantity]))
+        return None
 
     def raw(self, quantity: Quantity, default: int = 0) -> int:
         """Raw value in force of a quantity; the default where the family has none."""

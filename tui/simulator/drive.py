@@ -11,27 +11,27 @@ from random import Random
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
-from tui.drive.values import type_range
 
 from .body import ActiveFault, Body
-from .charts.altivar21 import EMERGENCY_FAULT, Altivar21Chart
+from .charts.altivar21 import Altivar21Chart
 from .charts.families import CHARTS
-from .errors import SimulatorError
-from .plant.fault_history import FaultHistory, fault_raw
+from .plant.fault_history import fault_raw
 from .plant.first_values import first_values
 from .plant.load import Load, Wanderer
 from .plant.memory import SettingsMemory
 from .plant.models import model_words
 from .plant.monitoring import show_motor
 from .plant.motor import MotorDemand, MotorState, Stop, rating_of, step
-from .plant.watch import Consequence, SilenceWatch
-from .registers import Registers
+from .plant.terminals import BY_KIND, COMPACT, Terminals
+from .plant.watch import SilenceWatch
+from .registers import Registers, typed_raw
 from .rules import traits_of
 from .server.access import DriveWords
 from .server.answering import Answering
 from .server.functions import Server, identity_of
 from .server.station import Station
 from .spec import DriveSpec, LineTiming
+from .tripping import Tripping
 
 WATCH_STARTERS = frozenset({"command_word", "command_frequency", "command_speed"})
 """Orders that start the watch where it needs one."""
@@ -67,14 +67,19 @@ class SimulatedDrive:
             traits,
             self.registers,
             rating,
+            terminals=Terminals(COMPACT if traits.access_levels else BY_KIND[traits.kind]),
             motor=MotorState(run_hours=hours, on_hours=1.6 * hours, energy=hours * rating.power),
         )
+        self.terminals = self._body.terminals
         self._chart = CHARTS[traits.kind](self._body)
         self._watch = SilenceWatch(self._body)
-        self._history = FaultHistory(self._body)
+        self._tripping = Tripping(self._body, self._chart, self._watch)
         self._memory = SettingsMemory(self._body)
         self._load = Load(random)
         self._wanderer = Wanderer(random)
+        self._starters = {way.parameter for way in profile.data.references} | {
+            chart.command for chart in profile.data.charts
+        }
         functions = {f.code: f for f in profile.data.functions}
         words = DriveWords(
             profile, traits, self.registers, blocked=self._blocked, written=self._written
@@ -107,7 +112,7 @@ class SimulatedDrive:
             if not self.registers.named(code) and self.line_side.put_card_word(code, raw):
                 return
             parameter = self.profile.find(code)
-            self.registers.settle(parameter, _typed(parameter, raw))
+            self.registers.settle(parameter, typed_raw(parameter, raw))
             if parameter.access == "r":
                 self.registers.hold(parameter)
 
@@ -127,6 +132,7 @@ class SimulatedDrive:
             body.line_orders.forget()
             body.saving = 0.0
             body.fallback = None
+            body.earlier_hz = None
             if body.fault is not None and not body.fault.persists:
                 body.fault = None
             self.server.counters.reset()
@@ -135,7 +141,6 @@ class SimulatedDrive:
             self._chart.power_up()
             if body.fault is not None:
                 self._chart.trip(Stop.FREEWHEEL)
-            body.terminal_hz = None
             body.motor = replace(body.motor, mains=self._mains())
             if self.spec.run_hz and body.fault is None:
                 self.run(self.spec.run_hz, wander=self.spec.wander)
@@ -164,24 +169,38 @@ class SimulatedDrive:
         return self._body.fault
 
     def run(self, hz: float, *, wander: bool = False) -> None:
-        """Run the motor as if an order came from the terminals, at a reference in Hz.
+        """Run the motor at a reference in Hz without anything that is sent from now on.
 
-        With `wander` the reference changes now and then. The line takes over with its next
-        command where the drive's channels let it.
+        Its run input is closed where the terminals command; where the line does, it runs as
+        another master left it. With `wander` the reference changes now and then, until the line
+        gives one.
         """
         with self._lock:
             if self._body.fault is None:
-                self._body.terminal_hz = hz
                 self._wanderer.begin(hz if wander else None)
-                self._chart.terminal_order()
+                self._chart.run(hz)
                 self._refresh()
 
     def halt(self) -> None:
-        """End the run order at the terminals."""
+        """Open the run inputs, and end what another master left."""
         with self._lock:
-            self._body.terminal_hz = None
+            self._chart.halt()
             self._wanderer.begin(None)
             self._refresh()
+
+    def set_input(self, name: str, text: str) -> str:
+        """Set an input by name, to what a person types: `1`, `0`, `5V`, `12mA`, `50%`.
+
+        Returns what it is now. It stays so, through trips, resets and power-downs. Raises
+        SimulatorError for an input that the drive does not have, or a value that it cannot take.
+        """
+        with self._lock:
+            told = self._body.terminals.set(name, text)
+            self._wanderer.begin(None)
+            if self._body.powered:
+                self._chart.follow()
+                self._refresh()
+            return told
 
     def provoke(self, fault: str | int, *, persists: bool = False) -> None:
         """Trip the drive with a fault given by code or raw value.
@@ -190,7 +209,8 @@ class SimulatedDrive:
         SimulatorError for a code that the profile does not know.
         """
         with self._lock:
-            self._trip(fault_raw(self.profile, fault), Stop.FREEWHEEL, persists)
+            raw = fault_raw(self.profile, fault)
+            self._tripping.trip(raw, Stop.FREEWHEEL, persists=persists)
             self._refresh()
 
     def clear_cause(self) -> None:
@@ -206,15 +226,6 @@ class SimulatedDrive:
             self._body.alarms = word
             self._refresh()
 
-    def _trip(self, raw: int, stop: Stop, persists: bool = False) -> None:
-        body = self._body
-        if body.fault is not None:
-            return
-        self._history.enter(raw, persists=persists)
-        body.terminal_hz = None
-        self._wanderer.begin(None)
-        self._chart.trip(stop)
-
     # Time
 
     def step(self, dt: float) -> None:
@@ -225,13 +236,11 @@ class SimulatedDrive:
                 body.motor = step(body.motor, body.rating, MotorDemand(), 0.0, 0.0, dt)
                 return
             body.saving = max(0.0, body.saving - dt)
-            if consequence := self._watch.step(dt):
-                self._suffer(consequence)
-            if (hz := self._wanderer.step(dt)) is not None and body.terminal_hz is not None:
-                body.terminal_hz = hz
+            if (hz := self._wanderer.step(dt)) is not None:
+                self._chart.refer(hz)
+            self._chart.follow()
             self._load.step(dt)
-            if isinstance(self._chart, Altivar21Chart) and self._chart.emergency:
-                self._trip(EMERGENCY_FAULT, self._watch.consequence().trip or Stop.FREEWHEEL)
+            self._tripping.step(dt)
             order = self._chart.order()
             load = self._load.torque
             body.motor = step(body.motor, body.rating, order, load, self._mains(), dt)
@@ -242,22 +251,18 @@ class SimulatedDrive:
     def _mains(self) -> float:
         return self._body.rating.voltage * self._load.mains
 
-    def _suffer(self, consequence: Consequence) -> None:
-        if consequence.trip is not None:
-            self._trip(self._watch.fault or 0, consequence.trip)
-        else:
-            self._body.fallback = consequence.fallback
-
     def _refresh(self) -> None:
         """Bring motor and shown words up to date without letting time pass."""
         body = self._body
+        if body.powered:
+            self._tripping.look()
         order = self._chart.order()
         mains = self._mains() if body.powered else 0.0
         body.motor = step(body.motor, body.rating, order, self._load.torque, mains, 0.0)
         self._show()
 
     def _show(self) -> None:
-        self._history.show()
+        self._tripping.show()
         self._chart.show()
         frozen = self._body.traits.kind == "altivar21" and self._body.fault is not None
         if not frozen:
@@ -276,19 +281,8 @@ class SimulatedDrive:
         return parameter.access == "rw-stopped" and self._chart.running
 
     def _written(self, parameter: Parameter) -> None:
-        if parameter.quantity in WATCH_STARTERS:
+        if parameter.quantity in WATCH_STARTERS or parameter.code in self._starters:
             self._body.line_orders.note(parameter)
         self._memory.written(parameter)
         self._chart.written(parameter)
         self._refresh()
-
-
-def _typed(parameter: Parameter, raw: int) -> int:
-    """A raw value as the parameter's type has it, whether given signed or as a word."""
-    low, high = type_range(parameter)
-    span = high - low + 1
-    if not -span // 2 <= raw < span:
-        raise SimulatorError(f"{parameter.code}: {raw} does not fit {parameter.type}.")
-    if raw > high:
-        return raw - span
-    return raw + span if raw < low else raw

@@ -8,6 +8,8 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
 from tui.drive.values import from_words, to_words, type_range, word_count
 
+from .errors import SimulatorError
+
 UNKEPT_QUANTITIES = frozenset(
     {
         "command_word",
@@ -109,10 +111,11 @@ class Registers:
             if address not in self._volatile and address not in self._own:
                 self._saved[address] = word
 
-    def restore(self) -> None:
-        """Take the saved words as the present ones, as at power-up."""
-        self._words.update(self._saved)
-        self._in_force.update(self._saved)
+    def restore(self, *, volatile_only: bool = False) -> None:
+        """Take the saved words as the present ones, as at power-up; or only those not kept."""
+        saved = {a: w for a, w in self._saved.items() if a in self._volatile or not volatile_only}
+        self._words.update(saved)
+        self._in_force.update(saved)
 
     def recall(self, keep: frozenset[str]) -> None:
         """Take the saved words as the present ones, except those whose code is kept."""
@@ -149,6 +152,20 @@ def is_volatile(parameter: Parameter) -> bool:
 
 INPUT_REGISTERS = 0x10000
 """What is added to the address of an input register (function 4), a space of its own."""
+
+
+def typed_raw(parameter: Parameter, raw: int) -> int:
+    """A raw value as the parameter's type has it, whether given signed or as a word.
+
+    Raises SimulatorError where it does not fit.
+    """
+    low, high = type_range(parameter)
+    span = high - low + 1
+    if not -span // 2 <= raw < span:
+        raise SimulatorError(f"{parameter.code}: {raw} does not fit {parameter.type}.")
+    if raw > high:
+        return raw - span
+    return raw + span if raw < low else raw
 
 
 def _addresses(parameter: Parameter) -> range:

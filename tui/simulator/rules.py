@@ -7,14 +7,15 @@ responses; PX-MODBUS manual 5.9 (no exception is documented: silence).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 from tui.drive.profile.profile import Profile
 
-ChartKind = Literal["drivecom", "altivar21", "leroy-somer"]
+ChartKind = Literal["drivecom", "altivar21", "leroy-somer", "own"]
 
 MODBUS_REFERENCE = 164
+FIRST_CHANNEL = 96
 MODBUS_COMMAND = 10
 
 
@@ -59,11 +60,19 @@ class Traits:
     """Status bit 9 tells only that no forced local is on (ATV31/312)."""
     max_hz_high_resolution: float | None = None
     """Frequency of 32767 with CMI bit 9 set; None: the maximum frequency TFR (ATV71)."""
+    limits: Mapping[str, str] = field(default_factory=dict)
+    """Words that the drive itself limits by another, in the same counts, by their codes."""
     first_values: Mapping[str, int] = field(default_factory=dict)
     """Settings of a simulated drive that was commissioned for the line, by code."""
 
 
-_LINE_CONTROL = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND, "CHCF": 1}
+_LINE_CONTROL = {
+    "FR1": MODBUS_REFERENCE,
+    "CD1": MODBUS_COMMAND,
+    "CHCF": 1,
+    "RFC": FIRST_CHANNEL,
+    "TCT": 0,
+}
 
 _COMPACT = Traits(
     "drivecom",
@@ -77,6 +86,12 @@ _COMPACT = Traits(
     max_hz_high_resolution=600.0,
     first_values={**_LINE_CONTROL, "LAC": 2},
 )
+_LEROY_SOMER = Traits(
+    "leroy-somer",
+    SILENT,
+    # 1.06 as in the example frame of the manual
+    first_values={"1.06": 1500, "1.21": 900},
+)
 TRAITS: Mapping[str, Traits] = {
     "atv71": Traits(
         "drivecom",
@@ -88,16 +103,30 @@ TRAITS: Mapping[str, Traits] = {
     ),
     "atv31": _COMPACT,
     "atv312": _COMPACT,
-    "atv21": Traits("altivar21", ALTIVAR_21),
-    "powerdrive": Traits("leroy-somer", SILENT),
-    "proxidrive": Traits("leroy-somer", SILENT),
-    "varmeca": Traits("leroy-somer", SILENT),
+    "atv21": Traits(
+        "altivar21",
+        ALTIVAR_21,
+        limits={"FA01": "FH"},
+        first_values={"FH": 8000, "F111": 2, "F112": 6, "F113": 10, "F130": 4},
+    ),
+    "powerdrive": _LEROY_SOMER,
+    "proxidrive": _LEROY_SOMER,
+    "varmeca": _LEROY_SOMER,
 }
 _BY_KIND: Mapping[ChartKind, Traits] = {
     "drivecom": Traits("drivecom", ALTIVAR, limits_follow=True, first_values=_LINE_CONTROL),
     "altivar21": TRAITS["atv21"],
     "leroy-somer": TRAITS["powerdrive"],
+    "own": Traits("own", Refusals(1, 2, 2, 3, 4, 3)),
 }
+PLAYED_BY: Mapping[ChartKind, tuple[str, ...]] = {
+    "drivecom": (),
+    "altivar21": ("FA00", "FD01"),
+    "leroy-somer": ("6.42", "6.43", "10.40"),
+}
+"""Words that a drive must have to be played as one of a family; others go by their own chart."""
+LINE_WORDS = ("modbus", "line", "serial", "rs485", "rs-485")
+"""What the sources of a profile call the line."""
 
 
 def traits_of(profile: Profile) -> Traits:
@@ -105,7 +134,27 @@ def traits_of(profile: Profile) -> Traits:
     if known := TRAITS.get(profile.id):
         return known
     kinds = {chart.kind for chart in profile.data.charts}
-    for kind in ("altivar21", "leroy-somer"):
-        if kind in kinds:
+    codes = {parameter.code for parameter in profile.parameters}
+    for kind, words in PLAYED_BY.items():
+        if kind in kinds and codes.issuperset(words):
             return _BY_KIND[kind]
-    return _BY_KIND["drivecom"]
+    return replace(_BY_KIND["own"], first_values=commissioned(profile))
+
+
+def commissioned(profile: Profile) -> Mapping[str, int]:
+    """Settings by code with which the line commands a drive, as far as its profile tells them.
+
+    The first configuration whose only source of commands is the line, and what the interlocks
+    want of words that can be set.
+    """
+    values: dict[str, int] = {}
+    for source in profile.data.control_sources:
+        name = source.command.sources[0].casefold()
+        if len(source.command.sources) == 1 and any(word in name for word in LINE_WORDS):
+            values |= {setting.parameter: setting.value for setting in source.settings}
+            break
+    for lock in (lock for chart in profile.data.charts for lock in chart.interlocks):
+        wanted = profile.find(lock.parameter)
+        if wanted.access.startswith("rw") and wanted.code not in values and not lock.when:
+            values[wanted.code] = lock.values[0]
+    return values

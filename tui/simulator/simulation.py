@@ -12,6 +12,7 @@ from tui.drive.profile.profile import Profile
 
 from .drive import SimulatedDrive
 from .errors import SimulatorError
+from .server.client_settings import ClientSettings
 from .server.conversation import Conversation, RtuConversation, TcpConversation
 from .server.endpoints import ByteStream, Endpoint, PtyEndpoint, StreamEndpoint, TcpEndpoint
 from .server.faults import FaultPlan
@@ -27,8 +28,9 @@ class Simulation:
 
     The drives' time passes from `start` to `stop`, in a thread of its own; every endpoint has
     a thread too. `profiles` takes the place of the installed profiles, by id; the drives' time is
-    that of `clock`, in s. Raises SimulatorError for two drives with one address, UnknownProfile,
-    UnknownParameter.
+    that of `clock`, in s. With `any_settings` it does not matter what baud and stop bits a client
+    sets on a pseudo-terminal. Raises SimulatorError for two drives with one address,
+    UnknownProfile, UnknownParameter.
     """
 
     def __init__(
@@ -40,7 +42,9 @@ class Simulation:
         seed: int = 0,
         profiles: Mapping[str, Profile] | None = None,
         clock: Callable[[], float] = time.monotonic,
+        any_settings: bool = False,
     ) -> None:
+        self._any_settings = any_settings
         self.timing = timing or LineTiming()
         addresses = [spec.address for spec in drives]
         twice = next((a for a in addresses if addresses.count(a) > 1), None)
@@ -103,10 +107,12 @@ class Simulation:
     def serve_pty(self, link: str | None = None) -> str:
         """Serve the line on a pseudo-terminal; returns the path to open.
 
-        That path is a symbolic link, made at `link` if given, taken away at the end. Raises
+        That path is a symbolic link, made at `link` if given, taken away at the end. It begins
+        with the settings of the first drive. Raises
         SimulatorError where the system has no pseudo-terminals or the path is taken.
         """
-        endpoint = PtyEndpoint(self._rtu, link)
+        first = self.drives[0].station.own(self.timing) if self.drives else self.timing
+        endpoint = PtyEndpoint(self._rtu, link, first, any_settings=self._any_settings)
         self._add(endpoint)
         return endpoint.path
 
@@ -124,19 +130,28 @@ class Simulation:
 
         Raises SimulatorError where the port cannot be had.
         """
-        endpoint = TcpEndpoint(self._rtu, host, port)
+        endpoint = TcpEndpoint(self._rtu_unseen, host, port)
         self._add(endpoint)
         return endpoint.address
 
-    def serve_stream(self, stream: ByteStream) -> None:
-        """Serve the line on an opened port, which is closed at the end."""
-        self._add(StreamEndpoint(self._paced_rtu, stream))
+    def serve_stream(
+        self, stream: ByteStream, client: Callable[[], ClientSettings] | None = None
+    ) -> None:
+        """Serve the line on an opened port, which is closed at the end.
 
-    def _rtu(self) -> Conversation:
-        return RtuConversation(self.line, self.faults)
+        `client` tells what the other side of it is set to, where that can be seen.
+        """
 
-    def _paced_rtu(self) -> Conversation:
-        return RtuConversation(self.line, self.faults, paced=True)
+        def paced() -> Conversation:
+            return RtuConversation(self.line, self.faults, paced=True, client=client)
+
+        self._add(StreamEndpoint(paced, stream))
+
+    def _rtu(self, client: Callable[[], ClientSettings] | None) -> Conversation:
+        return RtuConversation(self.line, self.faults, client=client)
+
+    def _rtu_unseen(self) -> Conversation:
+        return self._rtu(None)
 
     def _add(self, endpoint: Endpoint) -> None:
         self.start()
@@ -146,6 +161,16 @@ class Simulation:
     def drive(self, address: int) -> SimulatedDrive:
         """The drive that has this address now; raises SimulatorError."""
         return self.line.drive(address)
+
+    @property
+    def only_drive(self) -> SimulatedDrive:
+        """The drive of a line that has one; raises SimulatorError where it has several."""
+        if len(self.drives) != 1:
+            known = ", ".join(str(drive.address) for drive in self.drives)
+            raise SimulatorError(
+                f"Say which drive: its address and a colon first. It has: {known}."
+            )
+        return self.drives[0]
 
     @property
     def drives(self) -> tuple[SimulatedDrive, ...]:

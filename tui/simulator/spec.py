@@ -20,8 +20,9 @@ class DriveSpec:
     `sets` are raw values by parameter code (or number, or address) in force from power-up; a
     monitored word among them keeps its value. `%MW20` and `IPC1`..`IPC4` set words of an
     Altivar 71's cards. `protects` names parameters that the line cannot see. `identity`
-    replaces objects of function 43 by their id. `run_hz` starts the motor at power-up as if a
-    run order came from the terminals; with `wander` that reference changes now and then.
+    replaces objects of function 43 by their id. `run_hz` starts the motor at power-up, by its run
+    input where the terminals command, else as another master left it; with `wander` that
+    reference changes now and then.
     """
 
     profile: str

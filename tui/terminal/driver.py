@@ -18,6 +18,7 @@ from textual._xterm_parser import XTermParser
 from textual.driver import Driver
 from textual.message import Message
 
+from .loop import soon_in_loop
 from .reader import KeyReader, Pressed, Stops, TerminalInput
 from .stroke import attach
 from .tokens import Report
@@ -50,6 +51,13 @@ class WithMouse(Protocol):
     """Whether the terminal is to report its mouse and to speak the kitty protocol."""
 
 
+class Drawing(Protocol):
+    """What the driver tells the app, in the app's loop."""
+
+    def picture_taken(self, at: float) -> None:
+        """The terminal has drawn a frame, and said so at this time."""
+
+
 @lru_cache(maxsize=1)
 def with_own_keys(driver: type[Driver]) -> type[Driver]:
     """The driver of this platform, asking for less and reading keys the panel's way."""
@@ -69,6 +77,14 @@ def _quiet(driver: type[Driver]) -> type[Driver]:
             if not self.wanted and data.startswith(UNASKED):
                 return
             super().write(NO_REPORTS if data == ASK_FOR_FOCUS and not self.wanted else data)
+
+        def process_message(self, message: Message) -> None:
+            """Where the cursor stands is asked only to know what the terminal has drawn."""
+            if isinstance(message, events.CursorPosition):
+                drawing = cast("Drawing", self._app)
+                soon_in_loop(self._app, drawing.picture_taken, time.monotonic())
+                return
+            super().process_message(message)
 
     return QuietDriver
 

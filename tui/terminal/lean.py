@@ -1,88 +1,136 @@
-"""Updates that send to the terminal only the cells that look different.
+"""What the terminal is to show and what it shows; only the cells that differ are sent.
 
 Textual 8.2 sends a changed part of a widget from its left edge on, a new screen as a whole and
 several times over, and sets every colour anew for each piece of text; over a slow link that is
-most of what a panel sends.
+most of what a panel sends. Here its updates come together in one picture, and what goes to the
+terminal is the difference at the moment at which the terminal can take it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import cast
 
 from rich.cells import get_character_cell_size
 from rich.color import ColorSystem
-from rich.console import Console, RenderableType
-from textual._compositor import ChopsUpdate, CompositorUpdate, LayoutUpdate
-from textual.app import App
-from textual.screen import Screen
+from rich.console import RenderableType
+from textual._compositor import ChopsUpdate, LayoutUpdate
 from textual.strip import Strip
 
 from tui.drive.plain import commands
 
+from .sgr import change, erasable
+
 Cell = tuple[str, str]
 """A character and its colours; none where the one to the left takes two cells."""
+
+Placed = tuple[int, int, Strip]
+"""A strip at a column and a row."""
 
 CURSOR_MOVE = 8
 """Bytes that moving the cursor takes: cells that stay the same between others are sent again."""
 
+ERASE = 5
+"""Bytes that erasing cells takes."""
 
-class Shown:
-    """What the terminal shows, as far as the updates sent so far tell."""
+FIRST_ROWS, LAST_ROWS = 2, 2
+"""Rows at the top and at the bottom that are drawn first: what the motor does and where the keys
+lead, message and keys."""
 
-    def __init__(self) -> None:
-        self._rows: dict[int, list[Cell | None]] = {}
+
+class Picture:
+    """What the terminal is to show, and what it shows as far as the frames so far tell.
+
+    With `erases` the terminal erases cells in the colour that is set.
+    """
+
+    def __init__(self, *, erases: bool = False) -> None:
+        self._erases = erases
+        self._wanted: dict[int, list[Cell | None]] = {}
+        self._shown: dict[int, list[Cell | None]] = {}
+        self._changed: dict[int, tuple[int, int]] = {}
+
+    @property
+    def is_shown(self) -> bool:
+        """Whether the terminal shows all that it is to show."""
+        return not self._changed
 
     def forget(self) -> None:
-        """The terminal may show something else: it was resized, or others have written to it."""
-        self._rows.clear()
+        """The terminal may show something else: others have written to it."""
+        self._shown.clear()
+        self._changed = {y: (0, len(row)) for y, row in self._wanted.items()}
 
-    def put(self, x: int, y: int, cells: Sequence[Cell]) -> list[tuple[int, int]]:
-        """Take cells that are to be shown from a place on; the runs of them that must be sent."""
-        row = self._rows.setdefault(y, [])
-        row.extend([None] * (x + len(cells) - len(row)))
-        found: list[tuple[int, int]] = []
-        for place, cell in enumerate(cells):
-            if row[x + place] == cell:
-                continue
-            row[x + place] = cell
-            # the second half of a wide character is sent with the first
-            first = place if cell[0] else max(0, place - 1)
-            if found and first - found[-1][1] < CURSOR_MOVE:
-                found[-1] = (found[-1][0], place + 1)
-            else:
-                found.append((first, place + 1))
-        return found
+    def clear(self) -> None:
+        """The terminal has another size: what it is to show is told anew."""
+        self._wanted.clear()
+        self.forget()
 
-
-def lean(update: RenderableType | None, shown: Shown) -> RenderableType | None:
-    """The same update in fewer bytes, given what the terminal shows."""
-    if isinstance(update, ChopsUpdate):
-        return cast("RenderableType", LeanUpdate(list(_of_spans(update)), shown))
-    if isinstance(update, LayoutUpdate):
-        return cast("RenderableType", LeanUpdate(list(_of_lines(update)), shown))
-    return update
-
-
-class LeanUpdate(CompositorUpdate):
-    """Strips at their places, cut to the cells that changed."""
-
-    def __init__(self, strips: list[tuple[int, int, Strip]], shown: Shown) -> None:
-        self._strips = strips
-        self._shown = shown
-
-    def render_segments(self, console: Console) -> str:
-        """What goes to the terminal, which shows it from then on."""
-        colours = console._color_system or ColorSystem.TRUECOLOR
-        pen = Pen()
-        for x, y, strip in self._strips:
+    def want(self, strips: Sequence[Placed], colours: ColorSystem) -> None:
+        """Take strips that are to be shown from now on."""
+        for x, y, strip in strips:
             cells = cells_of(strip, colours)
-            for first, end in self._shown.put(x, y, cells):
-                pen.write(x + first, y, cells[first:end])
+            end = x + len(cells)
+            row = self._wanted.setdefault(y, [])
+            row.extend([None] * (end - len(row)))
+            row[x:end] = cells
+            first, last = self._changed.get(y, (x, end))
+            self._changed[y] = min(first, x), max(last, end)
+
+    def frame(self, room: int) -> str:
+        """What goes to the terminal, which shows it from then on.
+
+        It ends with the row in which it gets longer than `room` bytes. Rows come in the order in
+        which a person needs them: the first ones, the last ones, then from the top.
+        """
+        pen = Pen(erases=self._erases)
+        for y in self._in_order():
+            if pen.size > room:
+                break
+            self._draw(pen, y)
         return pen.text()
 
+    def _in_order(self) -> list[int]:
+        bottom = max(self._wanted, default=0) - LAST_ROWS
+        return sorted(self._changed, key=lambda y: (FIRST_ROWS <= y <= bottom, y))
 
-def _of_spans(update: ChopsUpdate) -> Iterator[tuple[int, int, Strip]]:
+    def _draw(self, pen: Pen, y: int) -> None:
+        """Write what differs in a row."""
+        first, last = self._changed.pop(y)
+        wanted = self._wanted[y]
+        shown = self._shown.setdefault(y, [])
+        shown.extend([None] * (len(wanted) - len(shown)))
+        for start, end in different(shown, wanted, first, last):
+            pen.write(start, y, wanted[start:end])
+        shown[first:last] = wanted[first:last]
+
+
+def different(
+    shown: Sequence[Cell | None], wanted: Sequence[Cell | None], first: int, last: int
+) -> list[tuple[int, int]]:
+    """The runs of cells of a row that must be sent; a wide character is sent as a whole."""
+    found: list[tuple[int, int]] = []
+    for place in range(first, last):
+        cell = wanted[place]
+        if cell is None or shown[place] == cell:
+            continue
+        start = place if cell[0] else max(0, place - 1)
+        gap = wanted[found[-1][1] : start] if found else ()
+        if found and len(gap) < CURSOR_MOVE and None not in gap:
+            found[-1] = (found[-1][0], place + 1)
+        else:
+            found.append((start, place + 1))
+    return found
+
+
+def strips_of(update: RenderableType | None) -> list[Placed] | None:
+    """The strips of an update of Textual's; None for anything else."""
+    if isinstance(update, ChopsUpdate):
+        return list(_of_spans(update))
+    if isinstance(update, LayoutUpdate):
+        return list(_of_lines(update))
+    return None
+
+
+def _of_spans(update: ChopsUpdate) -> Iterator[Placed]:
     """The changed spans of some lines, column and row first."""
     for y, first, last in update.spans:
         line = update.chops[y]
@@ -93,7 +141,7 @@ def _of_spans(update: ChopsUpdate) -> Iterator[tuple[int, int, Strip]]:
             yield left, y, strip.crop(left - x, min(end, last) - x)
 
 
-def _of_lines(update: LayoutUpdate) -> Iterator[tuple[int, int, Strip]]:
+def _of_lines(update: LayoutUpdate) -> Iterator[Placed]:
     """Whole lines of a part of the screen, column and row first."""
     for y, line in enumerate(update.strips, update.region.y):
         x = update.region.x
@@ -109,6 +157,9 @@ def cells_of(strip: Strip, colours: ColorSystem) -> list[Cell]:
         if control:
             continue
         ansi = Strip.render_ansi(style, colours) if style is not None else ""
+        if text.isascii() and text.isprintable():
+            found += [(character, ansi) for character in text]
+            continue
         for character in text:
             width = get_character_cell_size(character)
             if width:
@@ -119,51 +170,52 @@ def cells_of(strip: Strip, colours: ColorSystem) -> list[Cell]:
 
 
 class Pen:
-    """Writes cells; moves and changes colour only where it has to."""
+    """Writes cells; moves and changes colour only where it has to.
 
-    def __init__(self) -> None:
+    With `erases` the terminal erases cells in the colour that is set.
+    """
+
+    def __init__(self, *, erases: bool = False) -> None:
+        self._erases = erases
         self._parts: list[str] = []
         self._at: tuple[int, int] | None = None
         self._ansi = ""
+        self.size = 0
+        """Characters written so far; nearly all of them take one byte."""
 
-    def write(self, x: int, y: int, cells: Sequence[Cell]) -> None:
+    def write(self, x: int, y: int, cells: Sequence[Cell | None]) -> None:
         """Write cells from a place on."""
         if self._at != (x, y):
-            self._parts.append(f"\x1b[{y + 1};{x + 1}H")
-        for text, ansi in cells:
-            if ansi != self._ansi:
-                self._parts.append(f"\x1b[0;{ansi}m" if ansi else "\x1b[0m")
-                self._ansi = ansi
-            self._parts.append(text)
-        self._at = (x + len(cells), y)
+            self._put(f"\x1b[{y + 1};{x + 1}H")
+        place, moved = 0, True
+        while place < len(cells):
+            text, ansi = cells[place] or (" ", "")
+            if not moved:
+                self._put(f"\x1b[{y + 1};{x + place + 1}H")
+            self._put(change(self._ansi, ansi))
+            self._ansi = ansi
+            blank = self._blank(cells, place)
+            self._put(f"\x1b[{blank}X" if blank else text)
+            place, moved = place + (blank or 1), not blank
+        self._at = (x + len(cells), y) if moved else None
+
+    def _blank(self, cells: Sequence[Cell | None], place: int) -> int:
+        """How many cells from here on are erased rather than written."""
+        cell = cells[place]
+        if not self._erases or cell is None or cell[0] != " " or not erasable(cell[1]):
+            return 0
+        end = place
+        while end < len(cells) and cells[end] == cell:
+            end += 1
+        return end - place if end - place > CURSOR_MOVE + ERASE else 0
+
+    def _put(self, text: str) -> None:
+        self._parts.append(text)
+        self.size += len(text)
 
     def text(self) -> str:
         """All that was written, with colours as they were before."""
         if self._ansi:
-            self._parts.append("\x1b[0m")
+            self._put("\x1b[0m")
             self._ansi = ""
         return "".join(self._parts)
-
-
-class LeanApp(App[None]):
-    """An app that sends what changed in as few bytes as that takes."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self._terminal = Shown()
-
-    def _display(self, screen: Screen[object], renderable: RenderableType | None) -> None:
-        super()._display(screen, lean(renderable, self._terminal))
-
-    def on_mount(self) -> None:
-        """A terminal that was left for a while may show something else."""
-        self.app_resume_signal.subscribe(self, lambda _: self._terminal.forget())
-
-    def on_resize(self) -> None:
-        """What a terminal of another size shows is not known."""
-        self._terminal.forget()
-
-    def action_redraw(self) -> None:
-        """Draw the whole screen anew: something else may have written to the terminal."""
-        self._terminal.forget()
-        self.refresh()

@@ -23,6 +23,22 @@ GLYPHS: Mapping[str, tuple[str, str, str]] = {
     " ": (" ", " ", " "),
 }
 """By character, its three rows; a minus is two cells wide, a point one."""
+PLAIN_GLYPHS: Mapping[str, tuple[str, str, str]] = {
+    "0": (" _ ", "| |", "|_|"),
+    "1": ("   ", "  |", "  |"),
+    "2": (" _ ", " _|", "|_ "),
+    "3": (" _ ", " _|", " _|"),
+    "4": ("   ", "|_|", "  |"),
+    "5": (" _ ", "|_ ", " _|"),
+    "6": (" _ ", "|_ ", "|_|"),
+    "7": (" _ ", "  |", "  |"),
+    "8": (" _ ", "|_|", "|_|"),
+    "9": (" _ ", "|_|", " _|"),
+    "-": ("  ", "_ ", "  "),
+    ".": (" ", " ", "."),
+    " ": (" ", " ", " "),
+}
+"""The same in ASCII, for terminals that have no more."""
 DASH = ("   ", "╶─╴", "   ")
 """One place of a number that is not there."""
 
@@ -33,14 +49,15 @@ def readout_cells(decimals: int, *, signed: bool, whole: int = 3) -> int:
     return (2 if signed else 0) + DIGIT_CELLS * whole + point
 
 
-def big(text: str, width: int) -> list[str]:
+def big(text: str, width: int, *, plain: bool = False) -> list[str]:
     """A number in three rows, to the right of exactly so many cells.
 
     What is too wide loses decimals first; what is no number, or is too wide still, stands in
-    the lowest row as it is.
+    the lowest row as it is. With `plain` it is drawn in ASCII.
     """
+    glyphs = PLAIN_GLYPHS if plain else GLYPHS
     for shown in _shorter(text):
-        rows = ["".join(GLYPHS[character][row] for character in shown) for row in range(ROWS)]
+        rows = ["".join(glyphs[character][row] for character in shown) for row in range(ROWS)]
         if len(rows[0]) <= width:
             return [row.rjust(width) for row in rows]
     return [" " * width, " " * width, text[:width].rjust(width)]

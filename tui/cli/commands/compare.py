@@ -69,8 +69,9 @@ def compare(
             USAGE,
         )
     profile = library.load(ids.pop())
+    drive = next(found for found in sets if found is not None)
     sides = [
-        factory_side(profile) if found is None else side_of(text, found)
+        factory_side(profile, drive) if found is None else side_of(text, found)
         for text, found in zip((a, b), sets, strict=True)
     ]
     rows = rows_of(profile, *sides, all_rows=all_rows)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+import asyncio
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -29,13 +31,14 @@ def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> Non
 
     from ..shared.output import print_json
 
-    async def work(opened: OpenLine) -> DriveIdentity:
-        return await ask(opened.line, device)
+    async def work(opened: OpenLine) -> tuple[DriveIdentity, Mapping[str, int]]:
+        identity = await ask(opened.line, device)
+        return identity, await _model_words(opened, identity)
 
-    found = on_line(line_text, work, read_only=read_only)
+    found, words = on_line(line_text, work, read_only=read_only)
     if as_json:
         keys = ("device", "vendor", "reference", "version", "name", "profile")
-        print_json({key: getattr(found, key) for key in keys})
+        print_json({**{key: getattr(found, key) for key in keys}, "model": _model(found, words)})
         return
     say(f"Device     {found.device}")
     for title, text in (
@@ -44,8 +47,55 @@ def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> Non
         ("Version", found.version_text),
         ("Name", found.name),
         ("Profile", found.profile or _choices(found)),
+        *_model_row(found, words),
     ):
         say(f"{title:<10} {plain(text) or '-----'}")
+
+
+async def _model_words(opened: OpenLine, identity: DriveIdentity) -> Mapping[str, int]:
+    """Raw values of the words that tell the model, where its family has them."""
+    if identity.profile is None:
+        return {}
+    from tui.bus.errors import LineError
+    from tui.drive.errors import DriveError
+    from tui.drive.model import model_codes
+    from tui.drive.profile import library
+    from tui.session.drive import DriveSession
+    from tui.session.read.reader import Reader
+
+    try:
+        profile = await asyncio.to_thread(library.load, identity.profile)
+        if not (codes := model_codes(profile)):
+            return {}
+        found = await Reader(DriveSession(opened.line, identity.device, profile)).read(codes)
+    except (DriveError, LineError):
+        return {}  # who it is was asked for and is known; its model is more than that
+    return {code: one.raw for code, one in found.items() if one.raw is not None}
+
+
+def _model(identity: DriveIdentity, words: Mapping[str, int]) -> dict[str, Any] | None:
+    """The model by the drive's own code word; null where there is none."""
+    if identity.profile is None or not words:
+        return None
+    from tui.drive.model import model_of, model_told
+    from tui.drive.profile import library
+
+    profile = library.load(identity.profile)
+    model = model_of(profile, words)
+    return {
+        "code": words.get(profile.data.identification.model_parameter),
+        "text": model_told(profile, words),
+        "reference": (model.reference or None) if model else None,
+        "voltage": (model.voltage or None) if model else None,
+        "power_kw": (model.power_kw or None) if model else None,
+        "variant": (model.variant or None) if model else None,
+        "class_b": model.class_b if model else None,
+    }
+
+
+def _model_row(identity: DriveIdentity, words: Mapping[str, int]) -> list[tuple[str, str]]:
+    model = _model(identity, words)
+    return [("Model", model["text"])] if model else []
 
 
 def _choices(found: DriveIdentity) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from tui.drive.orders import OrderRefused
+from tui.drive.orders import OrderRefused, chart_in_force, follows_from
 from tui.session.work import Outcome, OutcomeKind
 
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
@@ -251,9 +251,15 @@ def reset(
     need_arming(arm, "reset writes the drive's command word and ends its fault")
 
     async def work(console: DriveConsole) -> str:
+        session = console.session
+        chart = chart_in_force(session.profile, session.image.raws)
+        if chart is not None and (besides := follows_from(chart, "reset")):
+            say(besides)
         outcome = await carried_out(console.commander, lambda: console.commander.order("reset"))
         await _out_of_fault(console, outcome)
-        return f"{outcome.text.partition(':')[0]}: {latest_of(console).state.headline}"
+        name, _, came = outcome.text.partition(":")
+        now = came.partition(";")[2]
+        return f"{name}: {latest_of(console).state.headline}{';' * bool(now)}{now}"
 
     _ordered(target, read_only, work)
 

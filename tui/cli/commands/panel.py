@@ -34,6 +34,7 @@ def run_panel(
     on_hangup: str = STOP,
     mouse: bool = False,
     bell: bool = True,
+    ascii: bool | None = None,
 ) -> None:
     """Run the panel until it is left."""
     if trouble := _terminal_trouble():
@@ -42,6 +43,7 @@ def run_panel(
     os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
     from tui.app import DrivePanelApp
     from tui.session.connect.open_line import open_line
+    from tui.terminal.abilities import abilities_of, given_environment
 
     app = DrivePanelApp(
         open_line=_open_with_demo if start == DEMO_LINE else open_line,
@@ -52,6 +54,9 @@ def run_panel(
         leave_running=on_hangup == LEAVE_RUNNING,
         mouse=mouse,
         bell=bell,
+        abilities=abilities_of(
+            given_environment(os.environ), written_as=sys.stderr.encoding, ascii=ascii
+        ),
         on_shown=_collect_garbage,
     )
     with ending_by_signal(app, stop=on_hangup == STOP):
@@ -105,6 +110,11 @@ mouse_option = click.option(
 bell_option = click.option(
     "--bell/--no-bell", default=True, show_default=True, help="Ring once for a new fault."
 )
+ascii_option = click.option(
+    "--ascii/--no-ascii",
+    default=None,
+    help="Draw with plain signs only; what the locale says otherwise.",
+)
 
 
 @click.command()
@@ -112,8 +122,9 @@ bell_option = click.option(
 @on_hangup_option
 @mouse_option
 @bell_option
+@ascii_option
 @told
-def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool) -> None:
+def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bool | None) -> None:
     """Open the panel on one simulated line with five running drives."""
     run_panel(
         DEMO_LINE,
@@ -122,6 +133,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool) -> None:
         on_hangup=on_hangup,
         mouse=mouse,
         bell=bell,
+        ascii=ascii,
     )
 
 
@@ -139,6 +151,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool) -> None:
 @on_hangup_option
 @mouse_option
 @bell_option
+@ascii_option
 @told
 def panel(
     line_text: str | None,
@@ -148,6 +161,7 @@ def panel(
     on_hangup: str,
     mouse: bool,
     bell: bool,
+    ascii: bool | None,
 ) -> None:
     """Open the panel."""
     if device is not None and line_text is None:
@@ -160,4 +174,5 @@ def panel(
         on_hangup=on_hangup,
         mouse=mouse,
         bell=bell,
+        ascii=ascii,
     )

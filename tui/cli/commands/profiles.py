@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING
 
 import click
 
+from tui.drive.plain import plain
+
 from ..shared.errors import told
 from ..shared.options import json_option
 from ..shared.say import say
@@ -28,6 +30,12 @@ if TYPE_CHECKING:
 )
 @click.option("--from", "origin", metavar="ID", help="With new: the profile that it begins as.")
 @click.option("--schema", is_flag=True, help="Print the JSON schema: every field, described.")
+@click.option(
+    "--wiring",
+    is_flag=True,
+    help="Of the profile: warnings, waiting time, pins, rules of the line, addresses, lamps,"
+    " command words, and where the manuals are wrong.",
+)
 @json_option
 @told
 def profiles(
@@ -36,12 +44,15 @@ def profiles(
     file: Path | None,
     origin: str | None,
     schema: bool,
+    wiring: bool,
     as_json: bool,
 ) -> None:
     """List the profiles, show one, check files, or begin one of your own.
 
     `path` tells the folder for profiles of your own, `new NEW-ID --from ID` begins one there.
     """
+    if wiring and (profile_id in (None, "new", "path")):
+        raise click.UsageError("--wiring is of one profile: name its ID.")
     from tui.drive.profile import library
 
     words = (*((profile_id,) if profile_id is not None else ()), *more)
@@ -57,6 +68,8 @@ def profiles(
         raise click.UsageError("Say one ID, or: profiles new NEW-ID --from ID.")
     elif profile_id == "path":
         say(str(library.user_folder()))
+    elif profile_id is not None and wiring:
+        _show_wiring(library.load(profile_id), as_json)
     elif profile_id is not None:
         _show(library.load(profile_id), as_json)
     else:
@@ -69,7 +82,7 @@ def check_files(files: list[Path], as_json: bool) -> None:
 
     from ..shared.output import print_json
 
-    found = {path: library.faults_of(path) for path in dict.fromkeys(files)}
+    found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
     if as_json:
         print_json([{"file": str(path), "faults": faults} for path, faults in found.items()])
     else:
@@ -149,6 +162,25 @@ def _remark(listing: Listing) -> str:
     if faults:
         return f"your own, broken: {faults[0].splitlines()[0]}"
     return "your own"
+
+
+def _show_wiring(profile: Profile, as_json: bool) -> None:
+    from shutil import get_terminal_size
+
+    from tui.drive.family_page import family_page, page_lines
+
+    from ..shared.output import print_json
+
+    sections = family_page(profile)
+    if as_json:
+        import msgspec
+
+        told = [msgspec.to_builtins(section) for section in sections]
+        print_json({"id": profile.id, "name": profile.name, "sections": told})
+        return
+    say(plain(f"{profile.vendor} {profile.name}"))
+    for line in page_lines(sections, min(100, get_terminal_size().columns)):
+        say(f"{line.head}{line.text}".rstrip())
 
 
 def _show(profile: Profile, as_json: bool) -> None:

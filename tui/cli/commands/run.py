@@ -38,6 +38,11 @@ from .orders import arm_option, need_arming
     is_flag=True,
     help="Run even where the start cannot be put on record in the state folder.",
 )
+@click.option(
+    "--take-control",
+    is_flag=True,
+    help="Take the control from the drive's terminals first; their stop counts no more then.",
+)
 @read_only_option
 @json_option
 @told
@@ -49,6 +54,7 @@ def run(
     arm: bool,
     leave_running: bool,
     unrecorded: bool,
+    take_control: bool,
     read_only: bool,
     as_json: bool,
 ) -> None:
@@ -58,6 +64,12 @@ def run(
     """
     need_arming(arm, "run starts the motor")
     wish = Wish(
-        "reverse" if reverse else "forward", reference, seconds, leave_running, unrecorded, as_json
+        "reverse" if reverse else "forward",
+        reference,
+        seconds,
+        leave_running,
+        unrecorded,
+        as_json,
+        take_control,
     )
     on_line(target, lambda opened: run_motor(opened, target, wish), read_only=read_only)

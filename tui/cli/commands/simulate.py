@@ -12,6 +12,7 @@ import click
 
 from ..shared.errors import told
 from ..shared.say import say
+from ..shared.standard_input import stay_in_background, typed_lines
 
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, FaultRates, Simulation
@@ -27,6 +28,11 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
 @click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="RTU over TCP.")
 @click.option("--baud", type=click.IntRange(min=300), default=19200, show_default=True)
 @click.option("--format", "form", default="8E1", show_default=True, metavar="8E1|8N2|...")
+@click.option(
+    "--any-settings",
+    is_flag=True,
+    help="Answer whatever baud and stop bits a client sets on the pseudo-terminal.",
+)
 @click.option("--real-time", is_flag=True, help="Keep the time of the line's characters.")
 @click.option(
     "--set",
@@ -56,7 +62,7 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
     type=float,
     default=0.0,
     metavar="HZ",
-    help="Motors run at this frequency, as if ordered at the terminals.",
+    help="Motors run at this frequency: by their inputs, or as another master left them.",
 )
 @told
 def simulate(
@@ -67,6 +73,7 @@ def simulate(
     rtu_tcp: str | None,
     baud: int,
     form: str,
+    any_settings: bool,
     real_time: bool,
     sets: tuple[str, ...],
     protects: tuple[str, ...],
@@ -74,7 +81,11 @@ def simulate(
     seed: int,
     run_hz: float,
 ) -> None:
-    """Serve simulated drives until Ctrl-C or SIGTERM."""
+    """Serve simulated drives until Ctrl-C or SIGTERM.
+
+    Lines such as "2: LI1=1, AI1=5V" on standard input set the inputs of the drive at address 2;
+    "2:" tells them.
+    """
     from tui.simulator import LineTiming, Simulation, parse_drives
 
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
@@ -88,6 +99,7 @@ def simulate(
         timing=LineTiming(baud, form.upper(), real_time),
         faults=_rates(faults),
         seed=seed,
+        any_settings=any_settings,
     )
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -96,7 +108,21 @@ def simulate(
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
         say(f"Ready: {names} on {where}. Ctrl-C ends it.")
+        stay_in_background()
+        threading.Thread(target=_follow, args=(simulation,), name="inputs", daemon=True).start()
         stop.wait()
+
+
+def _follow(simulation: Simulation) -> None:
+    """Set inputs as the lines of standard input say; a line that is wrong is told of."""
+    from tui.simulator import SimulatorError, set_inputs
+
+    for line in typed_lines():
+        if line.strip():
+            try:
+                say(set_inputs(simulation, line))
+            except SimulatorError as error:
+                say(str(error), err=True)
 
 
 def _serve(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +10,9 @@ import click
 
 from tui.drive.plain import plain
 
+from ..shared.control import control_json, control_row
 from ..shared.errors import told
+from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
 from ..shared.options import (
     Target,
     connect_drive,
@@ -51,15 +53,20 @@ class Status:
     state: DriveState
     readings: Mapping[str, Reading]
     channels: Mapping[str, str]
+    switches: Sequence[str]
+    """What can bring another channel into force, as sentences."""
     refused: str
-    """Why a run order from here would have no effect; empty where it would have one."""
+    """Why a run command from here would have no effect; empty where it would have one."""
     watch: TimeoutWatch | None
+    finding: FaultFinding | None = None
+    """What its fault or its alarm points at; None where it has neither."""
 
 
 def shown_codes(profile: Profile) -> list[str]:
-    """Codes of what is SHOWN, as far as the profile has them."""
+    """Codes of what is SHOWN, as far as the profile has them, and of what was taught."""
     found = (profile.quantity(quantity) for quantity in SHOWN_QUANTITIES)
-    return [parameter.code for parameter in found if parameter is not None]
+    codes = [parameter.code for parameter in found if parameter is not None]
+    return [*codes, *(code for code in profile.taught if code not in codes)]
 
 
 def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, str]:
@@ -69,13 +76,16 @@ def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str,
         parameter = profile.quantity(quantity)
         if parameter is not None:
             values[name] = _text(readings.get(parameter.code))
+    for code in profile.taught:
+        values[code] = f"{profile[code].name} {_text(readings.get(code))}"
     return values
 
 
 def _text(reading: Reading | None) -> str:
     if reading is None or reading.raw is None or reading.quality != "good":
         return "-----"
-    return f"{reading.text} {reading.unit}".strip()
+    mark = " taught" if reading.value is not None and reading.value.taught else ""
+    return f"{reading.text} {reading.unit}".strip() + mark
 
 
 def fault_text(state: DriveState) -> str:
@@ -85,6 +95,7 @@ def fault_text(state: DriveState) -> str:
 
 async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     """Read all that `status` tells. Raises the line's errors."""
+    from tui.drive.channel import switch_texts
     from tui.session.drive_state import drive_state
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
@@ -97,20 +108,25 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     try:
         readings = await console.read(_codes(profile))
         watch = await watch_of(fleet, console)
+        state = drive_state(profile, readings)
+        finding = await find_out(console, state, readings)
     finally:
         fleet.forget()
-    state = drive_state(profile, readings)
     channels = _channels(profile, readings, state)
-    return Status(session, state, readings, channels, _refused(session), watch)
+    switches = switch_texts(profile, session.image.raws)
+    refused = _refused(session)
+    return Status(session, state, readings, channels, switches, refused, watch, finding)
 
 
 def _codes(profile: Profile) -> list[str]:
     from tui.drive.chart import watched_codes
+    from tui.drive.hints import alarm_words
     from tui.drive.orders import deciding_codes, interlock_codes
 
     channels = [profile.quantity(quantity) for quantity in CHANNEL_NAMES]
     codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
     codes += [parameter.code for parameter in channels if parameter is not None]
+    codes += alarm_words(profile)
     codes += deciding_codes(profile)
     for chart in profile.data.charts:
         codes += interlock_codes(chart)
@@ -126,13 +142,16 @@ def _channels(
     for quantity, name in CHANNEL_NAMES.items():
         parameter = profile.quantity(quantity)
         found[name] = channel_text(parameter, readings.get(parameter.code)) if parameter else ""
-    # some families tell who commands in their status word
+    # some families tell who commands by several words
     found["Commanded by"] = state.channel or found["Commanded by"]
+    found["Reference from"] = state.reference or found["Reference from"]
     return found
 
 
 def _refused(session: DriveSession) -> str:
-    from tui.drive.orders import chart_in_force, interlock
+    from tui.drive.held_back import held_back, state_refusal
+    from tui.drive.orders import chart_in_force
+    from tui.session.command.way_out import told_anywhere
 
     raws = session.image.raws
     chart = chart_in_force(session.profile, raws)
@@ -142,25 +161,29 @@ def _refused(session: DriveSession) -> str:
         return f"This drive is not commanded from here: {chart.name}."
     if session.line.read_only:
         return "The line is read-only: nothing is written."
-    return interlock(chart, "forward", raws)
+    held = held_back(session.profile, chart, "forward", raws)
+    if held is not None:
+        return told_anywhere(held)
+    return state_refusal(session.profile, chart, "forward", raws)
 
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
     """The object that `status --json` prints."""
     state, watch = status.state, status.watch
-    fault = state.fault
     return {
         "line": line_text,
         "device": status.session.device,
         "profile": status.session.profile.id,
         "state": {"id": state.id, "name": state.name, "kind": state.kind},
         "direction": state.direction,
-        "fault": {"raw": fault.raw, "code": fault.code, "name": fault.name} if fault else None,
+        "fault": fault_json(state, status.finding),
         "alarms": [bit.name for bit in state.alarms],
         "commanded_by": status.channels["Commanded by"] or None,
         "reference_from": status.channels["Reference from"] or None,
+        "switched_by": list(status.switches),
         "commandable": not status.refused,
         "why_not": status.refused or None,
+        "control": control_json(status.session),
         "watch": watch_json(watch),
         "values": values_json(status.session.profile, status.readings),
     }
@@ -179,7 +202,10 @@ def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
 
 
 def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
-    """What is SHOWN, by quantity; null where the family does not tell it or it was not read."""
+    """What is SHOWN, by quantity; null where the family does not tell it or it was not read.
+
+    What was taught stands there by its code.
+    """
     from ..shared.output import reading_json
 
     values: dict[str, Any] = {}
@@ -187,21 +213,29 @@ def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, 
         parameter = profile.quantity(quantity)
         reading = readings.get(parameter.code) if parameter else None
         values[quantity] = reading_json(reading) if reading is not None else None
+    for code in profile.taught:
+        values[code] = reading_json(readings[code]) if code in readings else None
     return values
 
 
 def status_table(status: Status) -> list[tuple[str, str]]:
     """Titles and texts of `status` for a person."""
     state, profile = status.state, status.session.profile
+    found = fault_rows(status.finding)
+    of_alarm = status.finding is not None and bool(status.finding.alarm)
     return [
         ("Device", f"{status.session.device}, {profile.name}"),
         ("State", f"{state.headline} ({state.name})"),
         ("Direction", state.direction or ""),
         ("Fault", fault_text(state) or "none"),
+        *([] if of_alarm else found),
         ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
+        *(found if of_alarm else []),
         *status.channels.items(),
-        ("From here", status.refused or "orders can have an effect"),
+        *(("Besides", text) for text in status.switches),
+        ("From here", status.refused or "commands can have an effect"),
         ("Line watch", _watch_text(status)),
+        *control_row(status.session),
         *shown_values(profile, status.readings).items(),
     ]
 

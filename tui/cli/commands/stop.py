@@ -47,6 +47,13 @@ STOP_POLL_INTERVAL = 0.05
 )
 @click.option("--quick", is_flag=True, help="By the drive's quick stop.")
 @click.option("--freewheel", is_flag=True, help="Let the motor coast.")
+@click.option(
+    "--give-back",
+    is_flag=True,
+    help="Then give the control back to the terminals; a run command waiting there starts the"
+    " motor, so this part wants --arm.",
+)
+@click.option("--arm", is_flag=True, help="Let --give-back write to the drive; no stop needs it.")
 @read_only_option
 @told
 def stop(
@@ -55,6 +62,8 @@ def stop(
     addresses: str | None,
     quick: bool,
     freewheel: bool,
+    give_back: bool,
+    arm: bool,
     read_only: bool,
 ) -> None:
     """Stop a motor on its ramp and wait until it stands. Needs no arming."""
@@ -62,6 +71,8 @@ def stop(
         raise click.UsageError("Either --quick or --freewheel.")
     if addresses and not every:
         raise click.UsageError("--addresses goes with --all.")
+    if give_back and every:
+        raise click.UsageError("--give-back is for one drive, not for --all.")
     if read_only:
         raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
@@ -69,7 +80,13 @@ def stop(
 
     async def work(opened: OpenLine) -> int:
         if not every:
-            return await _stop_one(opened, await _wanted(opened, target), order)
+            found = await _wanted(opened, target)
+            status = await _stop_one(opened, found, order)
+            if give_back and not status:
+                from ..running.giving_back import give_control_back
+
+                await give_control_back(found.session, arm=arm)
+            return status
         wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
         return await _stop_all(opened, wanted, order, target.profile_id)
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.errors import DONE, told
+from ..shared.errors import DONE, REFUSED_HERE, told
 from ..shared.options import (
     Target,
     connect_drive,
@@ -65,9 +65,13 @@ def write(
         session = await connect_drive(opened, target)
         edits = await _staged(session, typed)
         if dry_run:
+            told = await _past_limits(session, edits)
             for edit in edits:
-                say(f"write  {edit.code}: {edit.old_text} -> {edit.text}")
-            return DONE
+                if edit.code in told:
+                    say(f"refuse {told[edit.code]}")
+                else:
+                    say(f"write  {edit.code}: {edit.old_text} -> {edit.text}")
+            return REFUSED_HERE if told else DONE
         return await _write(session, edits, confirmed, save=save)
 
     status = on_line(target, work, read_only=read_only or dry_run)
@@ -110,6 +114,18 @@ async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
     for text in consequences(profile, edits, retrying.raws, retrying.lacking):
         say(text)
     return edits
+
+
+async def _past_limits(session: DriveSession, edits: Edits) -> dict[str, str]:
+    """By code, why an edit would be refused: a limit that another parameter sets."""
+    from tui.drive.settings.limits import edit_problems, limit_sources
+    from tui.drive.shown import depends_on
+    from tui.session.read.retrying_reader import RetryingReader
+
+    profile, codes = session.profile, {edit.code for edit in edits}
+    codes |= limit_sources(profile, codes)
+    codes |= {code for one in codes for code in depends_on(profile[one])}
+    return edit_problems(profile, edits, await RetryingReader(session).ask_many(sorted(codes)))
 
 
 async def _write(

@@ -22,6 +22,7 @@ from ..commands.orders import (
     watched,
 )
 from ..commands.status import fault_text
+from ..shared.control import GIVE_BACK_OPTION, taking_of, way_to_take
 from ..shared.errors import DRIVE_REFUSED, REFUSED_HERE, Failure
 from ..shared.options import Target
 from .ending import Ending
@@ -53,6 +54,8 @@ class Wish:
     leave_running: bool
     unrecorded: bool
     as_json: bool
+    take_control: bool = False
+    """Whether the control is taken from the terminals first."""
 
 
 @dataclass(slots=True)
@@ -101,6 +104,8 @@ class Run:
     async def _start(self) -> None:
         commander, wish = self.console.commander, self.wish
         arm_drive(self.console)
+        if wish.take_control:
+            await self._take_control()
         if wish.reference is not None:
             text = wish.reference
             outcome = await carried_out(commander, lambda: commander.refer(text))
@@ -109,11 +114,31 @@ class Run:
         self.ordering = True
         try:
             outcome = await carried_out(commander, lambda: commander.order(wish.order))
+        except Failure as failure:
+            self.ordering = False
+            way = way_to_take(self.console.session)
+            raise Failure(failure.message + way, failure.status) from failure
         except Exception:
             self.ordering = False
             raise
         self.ordering = False
         self.telling.tell("order", outcome.text)
+
+    async def _take_control(self) -> None:
+        """Take the control from the terminals, unless the line has it; raises Failure."""
+        session = self.console.session
+        found = taking_of(session)
+        if found is None or not found.can_take:
+            name = session.profile.name
+            raise Failure(f"{name} has no control to take: run without that option.", REFUSED_HERE)
+        if found.taken:
+            return
+        commander = self.console.commander
+        outcome = await carried_out(commander, lambda: commander.order("take-control"))
+        text = (
+            f"{outcome.text}. It stays with the line after this: {GIVE_BACK_OPTION} gives it back."
+        )
+        self.telling.tell("control", text)
 
     async def _follow(self) -> None:
         """Tell about the motor until the end; raises Failure where it stops by itself."""
@@ -195,7 +220,8 @@ class Run:
     def _stands(self) -> bool:
         """Whether the motor is seen at rest, though the drive did not take the stop."""
         latest = latest_of(self.console)
-        return self._at_rest(latest) and self._frequency(latest) == 0
+        enabled = latest.state.motion == "running"
+        return self._at_rest(latest) and not enabled and self._frequency(latest) == 0
 
     async def _line_was_bad(self, since: float) -> bool:
         """Wait until the drive answers; whether it failed to at any time since."""

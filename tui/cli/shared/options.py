@@ -177,8 +177,21 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
         if profile_id is None:
             raise unidentified(identity)
     session = DriveSession(opened.line, target.device, library.load(profile_id), identity)
+    await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session
+
+
+def _recall(session: DriveSession) -> None:
+    """Go by what was taught of the drive; that it cannot be read is said and hinders nothing."""
+    from tui.session.teaching.teacher import Teacher
+
+    from .say import say
+
+    teacher = Teacher(session)
+    teacher.recall()
+    if teacher.trouble:
+        say(f"drivepanel: {teacher.trouble}", err=True)
 
 
 def _rate(session: DriveSession, rated_current: float | None) -> None:

@@ -67,7 +67,8 @@ def readings_json(
 def reading_json(reading: Reading) -> dict[str, Any]:
     """One value; `raw` and `value` are null where there is none.
 
-    The value of a name or a bit word is its raw number.
+    The value of a name or a bit word is its raw number. `unsure` is there where no document says
+    what so high a raw value means.
     """
     number = reading.value.number if reading.value else None
     value = reading.raw if number is None else _plain(number)
@@ -77,7 +78,9 @@ def reading_json(reading: Reading) -> dict[str, Any]:
         "value": value,
         "unit": reading.unit,
         "text": reading.text,
+        "taught": reading.value.taught if reading.value else False,
         "quality": str(reading.quality),
+        **({"unsure": True} if reading.value is not None and reading.value.unsure else {}),
     }
 
 
@@ -175,4 +178,6 @@ def _remark(reading: Reading) -> str:
         return "no value"
     if reading.quality != "good":
         return str(reading.quality)
+    if reading.value is not None and reading.value.taught:
+        return "taught"
     return reading.physical.display if reading.physical else ""

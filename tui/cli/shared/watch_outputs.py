@@ -77,7 +77,9 @@ class CsvOutput:
         self._file = file
         self._rows = csv.writer(file)
         self._units = {code: session.profile[code].unit for code in codes}
-        titles = [f"{code} [{unit}]" if unit else code for code, unit in self._units.items()]
+        taught = session.profile.taught
+        marked = {c: f"{u}, taught" if c in taught and u else u for c, u in self._units.items()}
+        titles = [f"{code} [{unit}]" if unit else code for code, unit in marked.items()]
         self._rows.writerow(["time", *titles, "error"])
 
     def take(self, snapshot: Snapshot) -> None:
@@ -123,4 +125,6 @@ def _clock(snapshot: Snapshot) -> str:
 
 def _shown(code: str, reading: Reading) -> str:
     text = f"{reading.text} {reading.unit}".rstrip() if reading.value else reading.text
+    if reading.value is not None and reading.value.taught:
+        text += " taught"
     return f"{code} {text}" if reading.quality == "good" else f"{code} ({text}, {reading.quality})"

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import msgspec
 
 from ..errors import ProfileError
-from .form import form_faults
+from .form import form_faults, place_label
 from .rules import RULES
 from .schema import ProfileData
 from .shared_rows import ProfileTables, read_tables
@@ -61,7 +60,8 @@ def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
     """Faults of form, and those of the rest as far as that can be told."""
     form, mended = form_faults(sources.tables)
     told = [
-        (path, f"{_label(sources.tables, path)}: {text.rstrip('.')}.") for path, text in form.found
+        (path, f"{place_label(sources.tables, path)}: {text.rstrip('.')}.")
+        for path, text in form.found
     ]
     try:
         data = msgspec.convert(mended, ProfileData)
@@ -88,18 +88,3 @@ def _placed(sources: ProfileTables, found: list[tuple[TomlPath, str]]) -> Iterat
 
 def _in_order(faults: Iterator[ProfileFault]) -> list[ProfileFault]:
     return sorted(dict.fromkeys(faults), key=lambda fault: (fault.file, fault.line))
-
-
-def _label(tables: dict[str, Any], path: TomlPath) -> str:
-    """A place in words: keys, rows by number, and the code of the row in brackets."""
-    steps = ".".join(str(s) if isinstance(s, str) else f"#{s + 1}" for s in path)
-    node: Any = tables
-    owner = ""
-    for step in path:
-        try:
-            node = node[step]
-        except (KeyError, IndexError, TypeError):
-            break
-        if isinstance(node, dict):
-            owner = str(node.get("code") or node.get("id") or owner)
-    return f"{steps or 'the file'}{f' ({owner})' if owner else ''}"

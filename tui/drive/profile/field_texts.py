@@ -186,10 +186,16 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "cause": "What made it.",
     },
     "LookAt": {"why": "What it tells about this fault."},
-    "FaultHelp": {
+    "Hint": {
         "check": "What to check, one thing each.",
         "look_at": "Parameters to look at, and why.",
     },
+    "FamilyWarning": {"text": "The warning, as a sentence."},
+    "Lamp": {"tells": "What it tells."},
+    "SignalName": {"signal": "The signal as this profile calls it."},
+    "StartUpStep": {"stopped_only": "True where the motor must be at rest."},
+    "FactoryBy": {"raws": "The factory setting by the other parameter's raw value, in decimal."},
+    "Multiple": {"times": "How many times that parameter, a decimal in quotes."},
     "Faults": {
         "history": "Codes of the past faults, the latest first.",
         "codes": "What each raw fault code means.",
@@ -225,6 +231,8 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "min": "Lowest raw value.",
         "max": "Highest raw value.",
         "min_from": "Parameter below which it must not be.",
+        "min_of": "Lowest value, where it is so many times another parameter.",
+        "factory_of": "Factory setting that is so many times another parameter.",
         "factory": "Raw value as the drive leaves the factory.",
         "enumeration": "Id of the names of its raw values.",
         "bits": "Its bits, for a bit word.",
@@ -247,13 +255,17 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "charts": "State charts with their commands.",
         "command_examples": "Whole command words and what they do.",
         "references": "Ways to give the drive its frequency or speed.",
+        "teachable_references": "Words of unknown scale that may take the reference once taught.",
+        "channels": "Which words tell who commands and who gives the reference now.",
         "faults": "Where faults are read and what they mean.",
         "monitoring": "What is watched.",
         "control_sources": "Who commands and who gives the reference.",
         "communication_fault": "The drive's watch over the line.",
         "memory": "Words that save and recall settings.",
+        "start_up": "The first commissioning, a step a table, in its order.",
         "connectors": "Connectors and their pins.",
         "line_rules": "Rules for the wiring.",
+        "wiring": "What to know before touching the line or the drive.",
         "groups": "What the parameters of a group are.",
         "enumerations": "Names of raw values that several parameters share.",
         "parameters": "Last in the file, one table a parameter.",
@@ -280,5 +292,8 @@ def field_text(table: str, field: str) -> str:
     """What a field of a table is; empty where nobody has said it."""
     schema = sys.modules["tui.drive.profile.schema"]
     struct = getattr(schema, table, None)
-    written = _written_below(struct) if isinstance(struct, type) else {}
-    return written.get(field) or OWN.get(table, {}).get(field) or COMMON.get(field, "")
+    kinds = struct.__mro__ if isinstance(struct, type) else ()
+    for kind in (one for one in kinds if one.__module__.startswith(schema.__name__)):
+        if text := _written_below(kind).get(field) or OWN.get(kind.__name__, {}).get(field):
+            return text
+    return COMMON.get(field, "")

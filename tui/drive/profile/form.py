@@ -191,3 +191,18 @@ def _invented(shape: shapes.Type) -> Any:
         case shapes.StrType(pattern=pattern):
             return {r"^8[NEO][12]$": "8E1", r"^[0-9]+(\.[0-9]+)?$": "1"}.get(pattern or "", "x")
     return None
+
+
+def place_label(tables: dict[str, Any], path: TomlPath) -> str:
+    """A place in words: keys, rows by number, and the code of the row in brackets."""
+    steps = ".".join(str(s) if isinstance(s, str) else f"#{s + 1}" for s in path)
+    node: Any = tables
+    owner = ""
+    for step in path:
+        try:
+            node = node[step]
+        except (KeyError, IndexError, TypeError):
+            break
+        if isinstance(node, dict):
+            owner = str(node.get("code") or node.get("id") or owner)
+    return f"{steps or 'the file'}{f' ({owner})' if owner else ''}"

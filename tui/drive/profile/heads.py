@@ -16,7 +16,7 @@ from typing import Any
 
 from ..errors import ProfileError
 
-BEGINNING = 4096
+HEAD_BYTES = 4096
 """Characters in which a head stands."""
 _HEADER = re.compile(r"^\[+[ \t]*([\w-]+)[^\n]*", re.MULTILINE)
 _PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
@@ -63,7 +63,7 @@ def quick_head(path: Path) -> ProfileFileHead:
     """The head of a file out of its first characters; empty where it is not there alone."""
     try:
         with path.open(encoding="utf-8") as file:
-            text = file.read(BEGINNING)
+            text = file.read(HEAD_BYTES)
     except (OSError, UnicodeDecodeError):
         return ProfileFileHead()
     return ProfileFileHead(_section(text, "profile") or {})

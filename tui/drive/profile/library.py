@@ -18,6 +18,7 @@ from .heads import asked_of, file_head, quick_head
 
 if TYPE_CHECKING:
     from .profile import Profile
+    from .schema import HelpData
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,32 @@ def load_file(path: Path) -> Profile:
     from .check import checked_data
     from .profile import Profile
 
-    return Profile(checked_data(path, packaged_folder()))
+    data = checked_data(path, packaged_folder())
+
+    def read_help() -> HelpData:
+        from .help_file import read_help
+
+        return read_help(data, (path.resolve().parent, packaged_folder()))
+
+    return Profile(data, read_help)
+
+
+def all_faults_of(path: Path) -> list[str]:
+    """Every fault of a profile file and of the help of its faults; it can do without the help."""
+    from .check import examined
+    from .help_file import read_help
+
+    try:
+        data, faults = examined(path, packaged_folder())
+    except ProfileError as error:
+        return [str(error)]
+    told = [str(fault) for fault in faults]
+    try:
+        if data is not None:
+            read_help(data, (path.resolve().parent, packaged_folder()))
+    except ProfileError as error:
+        told += str(error).splitlines()
+    return told
 
 
 def faults_of(path: Path) -> list[str]:

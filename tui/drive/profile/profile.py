@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import difflib
 import re
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
 from functools import cached_property, lru_cache
 
 from ..errors import UnknownParameter
+from ..teaching import TaughtScale
+from .guide import FaultGuide
 from .schema import (
     Chart,
     FaultCode,
-    FaultHelp,
     Function,
+    HelpData,
     Parameter,
     ParameterGroup,
     ProfileData,
@@ -34,8 +36,18 @@ def is_verified(parameter: Parameter) -> bool:
 class Profile:
     """A drive family's description, with the look-ups that the rest of the panel needs."""
 
-    def __init__(self, data: ProfileData) -> None:
+    def __init__(
+        self,
+        data: ProfileData,
+        read_help: Callable[[], HelpData] | None = None,
+        *,
+        taught: Mapping[str, TaughtScale] | None = None,
+    ) -> None:
         self.data = data
+        self.read_help = read_help
+        self.guide = FaultGuide(data, read_help)
+        self.taught: Mapping[str, TaughtScale] = taught or {}
+        """By code, what a person has taught of this one drive; no file of a family says it."""
         self.parameters = tuple(data.parameters)
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)
@@ -100,14 +112,6 @@ class Profile:
         return self._faults.get(raw)
 
     @cached_property
-    def _help(self) -> Mapping[int, FaultHelp]:
-        return {one.raw: one for one in self.data.faults.help}
-
-    def fault_help(self, raw: int) -> FaultHelp | None:
-        """What a fault points at, by its raw code; None where nothing is known."""
-        return self._help.get(raw)
-
-    @cached_property
     def groups(self) -> tuple[str, ...]:
         """Groups of parameters in the order of the profile."""
         return tuple(dict.fromkeys(p.group for p in self.parameters))
@@ -144,7 +148,7 @@ class Profile:
         for chart in self.data.charts:
             if chart.when is None:
                 fallback = fallback or chart
-            elif raws.get(chart.when.parameter) in chart.when.values:
+            elif chart.when.holds(raws):
                 return chart
         return fallback or (self.data.charts[0] if self.data.charts else None)
 
@@ -174,6 +178,13 @@ class Profile:
         if word is None:
             return "raw"
         return told.units.get(str(word >> told.shift & told.mask), "raw")
+
+
+def mark_of(profile: Profile, parameter: Parameter) -> str:
+    """What stands beside a value that no document tells for sure: `taught` or `?`."""
+    if parameter.code in profile.taught:
+        return "taught"
+    return "" if is_verified(parameter) else "?"
 
 
 # a profile stays as it was loaded, and every row of a table asks

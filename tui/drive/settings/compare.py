@@ -13,6 +13,7 @@ from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import shown
 from ..values import Value
+from .factory import factory_is_sure, factory_raw
 from .parameter_set import ParameterSet, lacking
 from .writable import is_setting
 
@@ -30,6 +31,8 @@ class Side:
     """Codes without a value, and why."""
     texts: Mapping[str, str] = field(default_factory=dict)
     """What stands for a value that is no number: a factory setting that depends on the rating."""
+    unsure: Mapping[str, str] = field(default_factory=dict)
+    """Codes of values that no document of the family tells, and how that is said."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,13 +55,32 @@ def side_of(label: str, values: ParameterSet) -> Side:
     return Side(label, values.raws, values.absent)
 
 
-def factory_side(profile: Profile) -> Side:
-    """The factory settings of a profile as a side."""
-    return Side(
-        "factory",
-        {p.code: p.factory for p in profile.parameters if p.factory is not None},
-        texts={p.code: p.factory_text for p in profile.parameters if p.factory_text},
-    )
+def factory_side(profile: Profile, other: ParameterSet) -> Side:
+    """The factory settings of a profile as a side, on the drive whose other values are these."""
+    raws: dict[str, int] = {}
+    texts = {p.code: p.factory_text for p in profile.parameters if p.factory_text}
+    absent = lacking(profile, other.raws)
+    for parameter in profile.parameters:
+        raw = factory_raw(profile, parameter, other.raws, absent)
+        if raw is None:
+            continue
+        if parameter.set_by_drive:
+            texts[parameter.code] = "set by the drive itself"
+        elif parameter.factory_of is not None and _nearly(raw, other.raws.get(parameter.code)):
+            raws[parameter.code] = other.raws[parameter.code]
+        else:
+            raws[parameter.code] = raw
+    unsure = {
+        p.code: "factory setting unverified"
+        for p in profile.parameters
+        if p.code in raws and not factory_is_sure(p)
+    }
+    return Side("factory", raws, texts=texts, unsure=unsure)
+
+
+def _nearly(factory: int, held: int | None) -> bool:
+    """A product of the drive's current is within a count: the drive may round it otherwise."""
+    return held is not None and abs(held - factory) <= 1
 
 
 def compare_settings(
@@ -90,6 +112,8 @@ def _row(profile: Profile, parameter: Parameter, a: Side, b: Side) -> ComparedRo
         differs = known
     else:
         differs = setting and not _same(*values)
+    if differs and not note:
+        note = next((side.unsure[code] for side in (a, b) if code in side.unsure), "")
     return ComparedRow(
         code, parameter.name, parameter.group, texts[0], texts[1],
         a.raws.get(code), b.raws.get(code), differs, note,
@@ -109,7 +133,7 @@ def _value(profile: Profile, parameter: Parameter, side: Side) -> Value | None:
 
 def _text(parameter: Parameter, side: Side, value: Value | None) -> str:
     if value is not None:
-        return value.display
+        return f"{value.display} ?" if parameter.code in side.unsure else value.display
     return side.texts.get(parameter.code) or NOTHING
 
 

@@ -7,7 +7,8 @@ from collections.abc import Collection, Mapping
 from ..profile.profile import Profile
 from ..shown import number_of
 from .edits import Edit, Edits
-from .limits import limit_pairs
+from .limits import limit_pairs, multiple_limits, number_in, passed_side
+from .multiple import value_of
 
 
 def builds_on(
@@ -41,5 +42,15 @@ def builds_on(
             for code in (low, high)
         )
         if least is not None and most is not None and least > most:
+            return other
+    for parameter, of in multiple_limits(profile):
+        other = of.parameter if edit.code == parameter.code else parameter.code
+        if edit.code not in (parameter.code, of.parameter) or other not in missed:
+            continue
+        number = number_in(profile, parameter.code, after)
+        limit = value_of(profile, parameter, of, after)
+        if number is None or limit is None:
+            continue
+        if passed_side(parameter, of, number, limit):
             return other
     return ""

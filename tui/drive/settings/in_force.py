@@ -11,7 +11,8 @@ from ..profile.schema import Parameter
 from ..shown import number_of
 from ..values import is_enumeration, raw_range
 from .edits import Edits
-from .limits import edit_problems, limit_pairs
+from .limits import edit_problems, limit_pairs, limits_are_sure
+from .multiple import value_of
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,17 +27,24 @@ class LimitsInForce:
     low_by: str = ""
     """The parameter whose value the lowest is; empty where it is the parameter's own."""
     high_by: str = ""
+    sure: bool = True
+    """False where no document of the family tells them: marked with a ?."""
 
     @property
     def text(self) -> str:
         """From the lowest to the highest, with what sets them."""
         if self.low is None and self.high is None:
             return ""
-        low, high = ("" if one is None else f"{one:f}" for one in (self.low, self.high))
-        unit = f" {self.unit}" if self.unit else ""
-        first = f"{low} ({self.low_by})" if self.low_by else low
-        last = f"{high}{unit} ({self.high_by})" if self.high_by else f"{high}{unit}"
-        return f"{first} .. {last}".strip()
+        # the mark before what sets them: it stays where the end is cut off
+        unit = (f" {self.unit}" if self.unit else "") + ("" if self.sure else " ?")
+        by_low, by_high = (f" ({by})" if by else "" for by in (self.low_by, self.high_by))
+        if self.low is None:
+            return f"up to {self.high:f}{unit}{by_high}"
+        if self.high is None:
+            return f"from {self.low:f}{unit}{by_low}"
+        # what sets both stands once, behind them
+        first = f"{self.low:f}" if by_low == by_high else f"{self.low:f}{by_low}"
+        return f"{first} .. {self.high:f}{unit}{by_high}"
 
 
 def limits_in_force(
@@ -61,7 +69,16 @@ def limits_in_force(
             high, high_by = value, over
         if other == under and (low is None or value > low):
             low, low_by = value, under
-    return LimitsInForce(low, high, profile.unit(parameter, raws), scale, low_by, high_by)
+    least, most = (
+        None if of is None else value_of(profile, parameter, of, raws, absent)
+        for of in (parameter.min_of, parameter.max_of)
+    )
+    if parameter.max_of and most is not None and (high is None or most < high):
+        high, high_by = most, parameter.max_of.parameter
+    if parameter.min_of and least is not None and (low is None or least > low):
+        low, low_by = least, parameter.min_of.parameter
+    unit, sure = profile.unit(parameter, raws), limits_are_sure(parameter)
+    return LimitsInForce(low, high, unit, scale, low_by, high_by, sure)
 
 
 def limit_passed(profile: Profile, before: Edits, after: Edits, raws: Mapping[str, int]) -> str:

@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from decimal import Decimal
 from functools import lru_cache
 
-from ..profile.profile import Profile
+from ..profile.profile import UNVERIFIED, Profile
+from ..profile.schema import Multiple, Parameter
 from ..shown import number_of, shown
 from .edits import Edits
+from .multiple import formula_of, value_of
+from .writable import is_order
 
 
 # a profile stays as it was loaded, and every row of a table asks
@@ -21,7 +24,43 @@ def limit_pairs(profile: Profile) -> tuple[tuple[str, str], ...]:
             pairs[parameter.min_from, parameter.code] = None
         if parameter.max_from:
             pairs[parameter.code, parameter.max_from] = None
-    return tuple(pair for pair in pairs if profile[pair[0]].unit == profile[pair[1]].unit)
+    return tuple(pair for pair in pairs if _comparable(profile, *pair))
+
+
+def _comparable(profile: Profile, low: str, high: str) -> bool:
+    """Whether both are settings of one unit: what a line commands is checked with the command."""
+    pair = profile[low], profile[high]
+    return pair[0].unit == pair[1].unit and not any(is_order(profile, one) for one in pair)
+
+
+@lru_cache(maxsize=32)
+def multiple_limits(profile: Profile) -> tuple[tuple[Parameter, Multiple], ...]:
+    """What is limited by so many times another parameter; of each its lowest, then its highest."""
+    return tuple(
+        (parameter, of)
+        for parameter in profile.parameters
+        for of in (parameter.min_of, parameter.max_of)
+        if of is not None
+    )
+
+
+def limit_sources(profile: Profile, codes: Iterable[str]) -> set[str]:
+    """Codes that must be known to check these against their limits, and what they limit."""
+    wanted, found = set(codes), set[str]()
+    for low, high in limit_pairs(profile):
+        if {low, high} & wanted:
+            found |= {low, high}
+    for parameter, of in multiple_limits(profile):
+        if {parameter.code, of.parameter} & wanted:
+            found |= {parameter.code, of.parameter}
+    return found - wanted
+
+
+def limits_are_sure(parameter: Parameter) -> bool:
+    """Whether a document of this family tells the limits."""
+    grounds = parameter.limit_grounds
+    known = parameter.confidence if grounds is None else grounds.confidence
+    return known not in UNVERIFIED
 
 
 def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, str]:
@@ -40,7 +79,35 @@ def edit_problems(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> di
             f"{code} = {texts[0]} would be {side} {other} = {texts[1]}: change {other} too,"
             " or another value."
         )
+    found.update(_past_multiples(profile, edits, after))
     return found
+
+
+def _past_multiples(
+    profile: Profile, edits: Edits, after: Mapping[str, int]
+) -> Iterator[tuple[str, str]]:
+    """Edits past a limit that is so many times another parameter."""
+    for parameter, of in multiple_limits(profile):
+        code = parameter.code
+        if code not in edits and of.parameter not in edits:
+            continue
+        number, limit = number_in(profile, code, after), value_of(profile, parameter, of, after)
+        if number is None or limit is None:
+            continue
+        if (side := passed_side(parameter, of, number, limit)) == "":
+            continue
+        held = shown(profile, parameter, after[code], after).display
+        told = f"{code} = {held} would be {side} {limit:f} {parameter.unit}".rstrip()
+        sure = limits_are_sure(parameter)
+        doubt = "" if sure else ", a limit that no document of this family tells"
+        yield code if code in edits else of.parameter, f"{told} ({formula_of(of)}{doubt})."
+
+
+def passed_side(parameter: Parameter, of: Multiple, number: Decimal, limit: Decimal) -> str:
+    """On which side of this limit a number is, where it passed it: `below`, `above`, or nothing."""
+    if of is parameter.min_of and number < limit:
+        return "below"
+    return "above" if of is parameter.max_of and number > limit else ""
 
 
 def number_in(profile: Profile, code: str, raws: Mapping[str, int]) -> Decimal | None:

@@ -9,10 +9,12 @@ from typing import Literal
 from ..profile.profile import Profile, is_verified, notations
 from ..profile.schema import Parameter, Quantity
 from .edits import Edits
+from .factory import not_factory
 from .writable import is_setting
 
 FilterId = Literal[
     "all",
+    "start-up",
     "settings",
     "staged",
     "not factory",
@@ -25,6 +27,7 @@ FilterId = Literal[
 ]
 FILTERS: tuple[FilterId, ...] = (
     "all",
+    "start-up",
     "settings",
     "staged",
     "not factory",
@@ -61,12 +64,19 @@ class FilterContext:
     recent: tuple[str, ...] = ()
     other: Mapping[str, int] = field(default_factory=dict)
     """Raw values of the parameter set that the drive is compared with."""
+    absent: Collection[str] = ()
+    """Codes that the drive does not have."""
 
 
 def group_order(profile: Profile) -> list[str]:
     """The profile's groups in its order, those with settings before those that are only read."""
     settings = {p.group for p in profile.parameters if is_setting(profile, p)}
     return sorted(profile.groups, key=lambda group: group not in settings)
+
+
+def start_up_codes(profile: Profile) -> list[str]:
+    """What a first commissioning sets and looks at, in the order of its steps."""
+    return [code for step in profile.data.start_up for code in step.parameters]
 
 
 def home_group(profile: Profile) -> str:
@@ -85,13 +95,15 @@ def chosen_codes(facts: FilterContext, choice: Choice) -> list[str]:
 def rows(facts: FilterContext, chosen: FilterId, search: str = "") -> list[str]:
     """Codes of what is shown: the best matches first, settings among them, then by the profile.
 
-    Of the recent ones the last edited comes first.
+    Of the recent ones the last edited comes first; a start-up keeps the order of its steps.
     """
     words = search.casefold().split()
     profile = facts.profile
     parameters = list(profile.parameters)
     if chosen == "recent":
         parameters = [p for code in facts.recent if (p := profile.get(code)) is not None]
+    if chosen == "start-up":
+        parameters = [profile[code] for code in start_up_codes(profile)]
     found = [
         (rank, bool(words) and not is_setting(profile, p), p.code)
         for p in parameters
@@ -110,7 +122,7 @@ def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool
         case "staged":
             return code in facts.edits
         case "not factory":
-            return not_factory(profile, parameter, raw)
+            return not_factory(profile, parameter, facts.raws, facts.absent)
         case "differs":
             other = facts.other.get(code)
             return is_setting(profile, parameter) and other is not None and other != raw
@@ -124,12 +136,6 @@ def passes(facts: FilterContext, chosen: FilterId, parameter: Parameter) -> bool
             return code in facts.favourites
         case _:
             return True
-
-
-def not_factory(profile: Profile, parameter: Parameter, raw: int | None) -> bool:
-    """Whether a setting surely holds something else than its factory value."""
-    known = raw is not None and parameter.factory is not None
-    return known and raw != parameter.factory and is_setting(profile, parameter)
 
 
 def match(profile: Profile, parameter: Parameter, words: Collection[str]) -> int | None:

@@ -7,7 +7,7 @@ from collections.abc import Collection, Mapping
 from ..profile.profile import Profile
 from ..shown import scale_sources
 from .edits import Edit, Edits
-from .limits import limit_pairs, number_in
+from .limits import limit_pairs, multiple_limits, number_in
 from .writable import line_setting
 
 LAST_OF_THOSE = 9
@@ -68,4 +68,12 @@ def _before(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str
             found.setdefault(high, set()).add(low)
         else:
             found.setdefault(low, set()).add(high)
+    for parameter, of in multiple_limits(profile):
+        # of two that share a sum the one that shrinks comes first
+        pair = (parameter.code, of.parameter)
+        if of.times.startswith("-") and all(code in edits for code in pair):
+            old, new = number_in(profile, pair[1], raws), number_in(profile, pair[1], after)
+            grows = old is None or new is None or new > old
+            first, then = pair if grows else pair[::-1]
+            found.setdefault(then, set()).add(first)
     return found

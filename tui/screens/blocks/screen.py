@@ -31,6 +31,11 @@ from .block_keys import BlockKeys
 LINES_BESIDE_SLOTS = 16
 """Lines that are no slots: the frame, headings, details, cost, words, keys."""
 
+ROWS_FOR = {"#words": 24, "#cost": 22}
+"""Rows of the terminal from which user words and cost are shown: the slots come first."""
+ROWS_FOR_DETAIL, SHORT_DETAIL = 18, 3
+"""Rows from which all is told of a slot, and how many lines there are below that."""
+
 
 class BlocksScreen(BlockKeys):
     """Two tables side by side; the block editor reads, and writes when it is told so."""
@@ -78,6 +83,8 @@ class BlocksScreen(BlockKeys):
         super().draw(width)
         self.put("words", user_word_lines(self.block_editor, self.block_editor.words, width))
         if self.block_editor.proposals.blocks:
+            for id, rows in ROWS_FOR.items():
+                self.query_one(id).display = self.size.height >= rows
             self._show_tables(width)
         else:
             self._show_neighbours(width - 1)  # the table's margin
@@ -95,7 +102,7 @@ class BlocksScreen(BlockKeys):
             rule("Slot", width, self._proposed()),
             *slot_lines(block_editor, block, self._at, width),
         ]
-        self.put("detail", detail)
+        self.put("detail", detail if self.size.height >= ROWS_FOR_DETAIL else detail[:SHORT_DETAIL])
         self.put("cost", cost_lines(block_editor, block, block_editor.proposals.saving(), width))
 
     def _proposed(self) -> str:

@@ -6,12 +6,12 @@ from collections.abc import Callable
 from decimal import Decimal
 from functools import partial
 
-from tui.drive.orders import OrderRefused, chart_in_force
+from tui.drive.orders import OrderRefused, chart_in_force, follows_from
 from tui.drive.profile.schema import CommandOption, OrderId
 from tui.session.work import Outcome
 
-from .arming import ArmingKeys
 from .control import Control, hindrance
+from .teaching import PickWord, TeachKeys, words_to_teach
 
 SHOWN_DONE = 8.0
 SHOWN_REFUSED = 20.0
@@ -33,7 +33,7 @@ STOPS_THAT_ASK = {
 """Question, what follows and the yes of the stops that need no arming but ask."""
 
 
-class OrderKeys(ArmingKeys):
+class OrderKeys(TeachKeys):
     """The actions of the keys; everything else is the commander's."""
 
     _asked: Outcome | None = None
@@ -60,7 +60,7 @@ class OrderKeys(ArmingKeys):
         starts, latest = self.session.starts, self.console.latest
         if starts is None or latest is None or latest.error:
             return ""
-        said = starts.offered(self.session, runs=latest.state.kind == "running")
+        said = starts.offered(self.session, runs=latest.state.motion == "running")
         return f"{said[0].upper()}{said[1:]}. T takes over." if said else ""
 
     def action_take_over(self) -> None:
@@ -95,7 +95,10 @@ class OrderKeys(ArmingKeys):
     def action_reset(self) -> None:
         """Reset a fault, after saying what that needs."""
         if self._armed_or_told():
-            follows = "The cause must be gone. Nothing runs by itself: command it anew afterwards."
+            chart = chart_in_force(self.session.profile, self.session.image.raws)
+            besides = follows_from(chart, "reset") if chart is not None else ""
+            besides = besides or "Nothing runs by itself: command it anew afterwards."
+            follows = f"The cause must be gone. {besides}"
             work = partial(self.commander.order, "reset")
             self._ask("Reset the fault?", follows, "resets it", "leaves it", work)
 
@@ -140,6 +143,34 @@ class OrderKeys(ArmingKeys):
         question, follows, yes = STOPS_THAT_ASK[id]
         stop = partial(self.app.stop_drive, self.console, id)
         self._ask(question, follows, yes, "does not", lambda _stamp: stop())
+
+    def action_teach(self) -> None:
+        """Choose a raw value of this screen, and say what the drive's display shows for it."""
+        profile = self.session.profile
+        watched = [value.parameter for value in profile.data.monitoring.values]
+        codes = words_to_teach(profile, watched)
+        if not codes:
+            self._refuse("Nothing here is shown raw: every value has its scale from a document.")
+            return
+
+        def chosen(code: str | None) -> None:
+            if code is not None:
+                self.ask_look(code)
+
+        self.app.push_screen(PickWord(self.console, codes, self.motor_now()), chosen)
+
+    def action_reference_by(self) -> None:
+        """Let a taught preset take the reference, or no more, after saying what that means."""
+        from tui.session.command.reference import no_place
+
+        if code := self.teacher.reference:
+            self.ask_no_reference(code)
+        elif code := self.teacher.proposal():
+            self.ask_reference(code)
+        elif self.session.profile.data.teachable_references:
+            self._refuse(no_place(self.session.profile, "Hz"))
+        else:
+            self._refuse(f"{self.session.profile.name} takes no reference that has to be taught.")
 
     def action_options(self) -> None:
         """Choose a ramp, a preset speed, a motor, an output."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from tui.drive.orders import chart_in_force, locked_by, order_target, unmet
+from tui.drive.held_back import held_back
+from tui.drive.orders import chart_in_force
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Chart
+from tui.session.command.way_out import way_by_key
 from tui.session.work import Outcome
 
 
@@ -47,42 +48,9 @@ class Control:
 UNARMED = Control()
 """Nothing is known yet."""
 
-OPENS_CONTROL = "6 opens Control."
-TAKES_CONTROL = "t takes the control."
-
 
 def hindrance(profile: Profile, raws: Mapping[str, int]) -> Hindrance | None:
     """What stands against a run command now, as far as that is known."""
     chart = chart_in_force(profile, raws)
-    if chart is None:
-        return None
-    if (lock := locked_by(chart, "forward", raws)) is not None:
-        if lock.parameter not in raws:
-            return Hindrance(f"{lock.parameter}, which decides, is not read yet: {lock.text}", "")
-        channel = _is_set_up_on_control(profile, lock.parameter)
-        return Hindrance(lock.text, OPENS_CONTROL if channel else lock.remedy, channel)
-    if (when := unmet(chart, "forward", raws)) is not None:
-        shown = _shown(profile, when.parameter, raws[when.parameter])
-        way = TAKES_CONTROL if _takes_control_by(profile, chart, when.parameter) else ""
-        return Hindrance(f"The drive is not commanded by Modbus: {shown}.", way, of_channel=True)
-    return None
-
-
-def _is_set_up_on_control(profile: Profile, code: str) -> bool:
-    """Whether a way of commanding the drive, as the screen Control writes it, sets this word."""
-    sources = profile.data.control_sources
-    written = {setting.parameter for source in sources for setting in source.settings}
-    return code in written or profile[code].quantity == "command_channel"
-
-
-def _takes_control_by(profile: Profile, chart: Chart, code: str) -> bool:
-    return any(
-        order.id == "take-control" and order_target(profile, chart, order).code == code
-        for order in chart.orders
-    )
-
-
-def _shown(profile: Profile, code: str, raw: int) -> str:
-    """A word and what it says, as a person reads it."""
-    name = profile.names(profile[code]).get(raw, str(raw))
-    return f"{code} is {name}"
+    held = held_back(profile, chart, "forward", raws) if chart is not None else None
+    return Hindrance(held.text, way_by_key(held), held.of_channel) if held else None

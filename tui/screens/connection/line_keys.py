@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import suppress
 
 from textual import work
+from textual.worker import WorkerError
 
 from tui.bus.errors import LineError, LinkSyntaxError
 from tui.drive.errors import DriveError
 
+from ..opening import leave_opening
 from .choices import LineChoice, fault_of_line, line_forms, same_line
 from .line_form import ADDRESSES
 from .scanning import Scanning
@@ -93,14 +96,18 @@ class LineKeys(Scanning):
     async def start(self, text: str, device: int | None) -> None:
         """Open a line; with a device, watch that drive as soon as it is known."""
         self._point_at(text)
-        if not await self._opens(text):
-            return
-        if device is None:
-            self.action_scan()
-            return
-        await self.scan([device]).wait()
-        if device in self.found:
-            self.open_drive(device)
+        try:
+            if not await self._opens(text):
+                return
+            if device is None:
+                self.action_scan()
+                return
+            with suppress(WorkerError):  # ended by a key, or told where it failed
+                await self.scan([device]).wait()
+                if device in self.found:
+                    await self.open_drive(device).wait()
+        finally:
+            leave_opening(self.app)
 
     async def _opens(self, text: str) -> bool:
         """Whether the line could be opened; if not, why is shown."""

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 from textual.widgets import Input, OptionList
 
 from ..keys.table import CONNECTION, bindings
 from .line_keys import LineKeys
+
+if TYPE_CHECKING:
+    from tui.session.console import DriveConsole
 
 
 class ConnectionScreen(LineKeys):
@@ -40,6 +43,12 @@ class ConnectionScreen(LineKeys):
             return
         if self.action_scan():
             self.lines.focus()
+
+    @property
+    def pointed(self) -> DriveConsole | None:
+        """The drive under the cursor, where it is known what it is."""
+        drive = self.found.get(self.drives.chosen or 0)
+        return drive.console if drive else None
 
     def action_open_chosen(self) -> None:
         """What Enter does in the lists; a field hands Enter over to the list of lines."""

@@ -10,6 +10,7 @@ from textual.app import ComposeResult
 from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
+from tui.drive.channel import channel_codes, switch_texts
 from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
 from tui.session.console import DriveConsole
@@ -54,7 +55,9 @@ class ControlSourceScreen(OrderKeys):
 
     async def _read(self) -> None:
         try:
-            readings = await self.console.read(source_codes(self.session.profile))
+            profile = self.session.profile
+            codes = [*source_codes(profile), *channel_codes(profile)]
+            readings = await self.console.read(dict.fromkeys(codes))
         except LineError as error:
             self._trouble = str(error)
         else:
@@ -108,7 +111,8 @@ class ControlSourceScreen(OrderKeys):
 
     def _now(self, width: int) -> list[Text]:
         profile, latest = self.session.profile, self.console.latest
-        return now_lines(profile, self._today(), latest, self._trouble, width)
+        switches = switch_texts(profile, self._raws)
+        return now_lines(profile, self._today(), latest, self._trouble, switches, width)
 
     def _today(self) -> ControlSource | None:
         """The configuration in force, as far as it was read."""

@@ -25,9 +25,13 @@ def now_lines(
     today: ControlSource | None,
     latest: Snapshot | None,
     trouble: str,
+    switches: Sequence[str],
     width: int,
 ) -> list[Text]:
-    """Who commands the drive now, by its own words, and by which configuration; three lines."""
+    """Who commands the drive now, by its own words, by which configuration, and who else may.
+
+    Three lines.
+    """
     lines = [Text("")]
     state = latest.state if latest is not None and not latest.error else None
     text = Text("  Commanded by  ", FAINT, no_wrap=True)
@@ -39,7 +43,12 @@ def now_lines(
     else:
         text.append(f"   set up: {today.name}", FAINT)
     text.truncate(width, overflow="ellipsis")
-    return [*lines, text, Text("")]
+    told = (
+        "; ".join(one.partition(":")[0] for one in switches)
+        if len(switches) > 1
+        else "".join(switches)
+    )
+    return [*lines, text, Text(cut(f"  {told}", width).rstrip(), ATTENTION, no_wrap=True)]
 
 
 def _channel(profile: Profile, latest: Snapshot | None) -> str:

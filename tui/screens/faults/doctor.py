@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import FaultCode, FaultHelp, LookAt, Quantity
+from tui.drive.hints import reset_text
+from tui.drive.plain import plain
+from tui.drive.profile.profile import is_verified
+from tui.drive.profile.schema import FaultHelp, Quantity
 from tui.drive.values import NOT_AVAILABLE
-from tui.session.monitor.fault_record import FaultRecord
 from tui.session.reading import Reading
 from tui.widgets.drawing import cut, cut_at_word, wrapped
 from tui.widgets.palette import (
+    ALARM_BLOCK,
     CURSOR,
     FAINT,
     FAULT,
@@ -26,17 +27,15 @@ from tui.widgets.palette import (
     STRONG,
 )
 
+from .doctor_view import DoctorView
+
 LABEL = 13
 """Columns of the headings at the left."""
+TRUST_WIDTH = 11
+"""Columns at the right that say how surely a thing is known."""
 CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
-TRUST: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
-"""How surely the causes are known, in a word."""
-RESETS: Mapping[str, str] = {
-    "after-cause": "x, once the cause is gone; nothing runs by itself",
-    "automatic": "x, once the cause is gone; by the drive itself where that is set",
-    "power-cycle": "switch the drive off and on, once the cause is gone; x does not reset it",
-    "": "x, once the cause is gone",
-}
+TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
+"""How surely the first cause is known, in a word; `practice` is general practice."""
 TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
     "output_frequency": "",
     "motor_current": "",
@@ -44,38 +43,6 @@ TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
 }
 STORED_UNITS = ("Hz", "A", "h")
 """What is told of a fault of the history, where the drive stores it."""
-
-
-@dataclass(frozen=True, slots=True)
-class DoctorView:
-    """What the Faults screen shows at one moment."""
-
-    profile: Profile
-    fault: FaultCode | None
-    present: bool
-    """Whether the drive is in this fault now."""
-    record: FaultRecord | None
-    """The trip as the panel saw it, where it did and this is the fault."""
-    readings: Mapping[str, Reading]
-    at: int = 0
-    """The row of the cursor: parameters to look at first, then the history."""
-    unread: bool = False
-    """Whether the history is being read yet."""
-
-    @property
-    def help(self) -> FaultHelp | None:
-        """What the fault points at."""
-        return self.profile.fault_help(self.fault.raw) if self.fault else None
-
-    @property
-    def look_at(self) -> Sequence[LookAt]:
-        """The parameters to look at."""
-        return self.help.look_at if self.help else ()
-
-    @property
-    def history(self) -> list[str]:
-        """The codes of the drive's history, the newest first."""
-        return self.profile.data.faults.history
 
 
 def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
@@ -87,8 +54,9 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
         _checks(view, width),
         _reset(view, width),
     ]
-    parts = [part for part in parts if part]
     least = min(3, max(1, _told(view)))
+    _shorten(parts, sum(map(len, parts)) + least - height)
+    parts = [part for part in parts if part]
     spare = height - sum(len(part) for part in parts) - max(least, _told(view))
     lines: list[Text] = [Text("")] if spare > len(parts) else []
     spare -= len(lines)
@@ -99,6 +67,17 @@ def doctor_lines(view: DoctorView, width: int, height: int) -> list[Text]:
             spare -= 1
     lines = lines[: max(1, height - least)]
     return lines + _history(view, width, height - len(lines))
+
+
+def _shorten(parts: list[list[Text]], lines: int) -> None:
+    """Take so many lines away where room is short: checks, then causes, then parameters.
+
+    How the fault ends stays: it says what may start the motor.
+    """
+    for part in (parts[3], parts[1], parts[2]):
+        away = max(0, min(lines, len(part) - 1))
+        del part[len(part) - away :]
+        lines -= away
 
 
 def _told(view: DoctorView) -> int:
@@ -114,7 +93,14 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
     text.append("  ")
     if fault is None:
         if view.present:
-            text.append(" ■ FAULT, its code was not read ", FAULT_BLOCK)
+            unknown = "its code was not read" if view.profile.data.faults.codes else "no number"
+            text.append(f" ■ FAULT, {unknown} ", FAULT_BLOCK)
+            text.append(f"   {_tripped(view)}", PLAIN)
+        elif view.alarm is not None:
+            text.append(f" ▲ {plain(view.alarm[2]).upper()} ", ALARM_BLOCK)
+            text.append("   alarm, no fault", PLAIN)
+            more = len(view.alarms) - 1
+            text.append(f"   and {more} more" if more else "", PLAIN)
         else:
             text.append("No fault now.", STRONG)
             text.append("   reading the history" if view.unread else "", FAINT)
@@ -155,16 +141,25 @@ def _labelled(label: str, lines: Sequence[Text]) -> list[Text]:
     ]
 
 
+def _told_in(texts: Sequence[str], width: int) -> list[Text]:
+    """A text a line, the first with room behind it for how surely it is known."""
+    rooms = [max(10, width - LABEL - (TRUST_WIDTH if not n else 1)) for n in range(len(texts))]
+    return [Text(cut(text, room), PLAIN) for text, room in zip(texts, rooms, strict=True)]
+
+
 def _probable(view: DoctorView, width: int) -> list[Text]:
-    fault, help_ = view.fault, view.help
-    if fault is None:
+    fault, help_ = view.fault, view.hint
+    room = max(10, width - LABEL - TRUST_WIDTH)
+    if help_ is None and fault is None and view.alarm is None:
         return []
-    room = max(10, width - LABEL - 12)
     if help_ is None:
-        cause = fault.cause or "The manual in hand gives no cause."
+        cause = fault.cause if fault else ""
+        cause = cause or view.profile.guide.trouble or "The manual in hand gives no cause."
         return _labelled("Probably", [Text(part, PLAIN) for part in wrapped(cause, room, 3)])
-    lines = [Text(cut(cause, room), PLAIN) for cause in help_.probable]
-    lines[0].append(f" {TRUST[help_.confidence]:>10}", FAINT)
+    lines = _told_in(help_.probable, width)
+    lines[0].append(f" {TRUST_MARKS[help_.confidence]:>8}", FAINT)
+    if isinstance(help_, FaultHelp) and help_.name:
+        lines.insert(0, Text(cut(help_.name, width - LABEL), PLAIN))
     return _labelled("Probably", lines)
 
 
@@ -174,13 +169,15 @@ def _look_at(view: DoctorView, width: int) -> list[Text]:
         reading = view.readings.get(look.code)
         chosen = number == view.at
         text = Text(no_wrap=True)
-        text.append(f"{look.code:<{CODE_WIDTH}}", STRONG)
+        unsure = "" if is_verified(view.profile[look.code]) else "?"
+        text.append(look.code, STRONG)
+        text.append(f"{unsure:<{max(1, CODE_WIDTH - len(look.code))}}", STALE)
         value, style = _value(reading)
         text.append(f"{cut(value, LOOK_VALUE_WIDTH)} ", style)
-        hint = "Enter opens" if chosen else ""
-        room = max(4, width - LABEL - text.cell_len - 14)
-        text.append(cut(look.why, room), PLAIN if chosen else FAINT)
-        text.append(f" {hint:<12}", FAINT)
+        room = max(4, width - LABEL - text.cell_len - 1)
+        hint = "Enter opens " if chosen and len(look.why) < room - 12 else ""
+        text.append(cut(look.why, room - len(hint)), PLAIN if chosen else FAINT)
+        text.append(hint, FAINT)
         if chosen:
             text.stylize(CURSOR)
         lines.append(text)
@@ -197,10 +194,13 @@ def _value(reading: Reading | None) -> tuple[str, Style]:
 
 
 def _checks(view: DoctorView, width: int) -> list[Text]:
-    fault, help_ = view.fault, view.help
-    room = max(10, width - LABEL - 1)
+    fault, help_ = view.fault, view.hint
+    room = max(10, width - LABEL - TRUST_WIDTH)
     if help_ is not None and help_.check:
-        return _labelled("Check", [Text(cut(check, room), PLAIN) for check in help_.check])
+        lines = _told_in(help_.check, width)
+        if help_.confidence != "practice":  # checks are practice whatever the cause rests on
+            lines[0].append(f" {TRUST_MARKS['practice']:>8}", FAINT)
+        return _labelled("Check", lines)
     if fault is not None and fault.remedy:
         return _labelled("Check", [Text(part, PLAIN) for part in wrapped(fault.remedy, room, 3)])
     return []
@@ -209,16 +209,14 @@ def _checks(view: DoctorView, width: int) -> list[Text]:
 def _reset(view: DoctorView, width: int) -> list[Text]:
     if not view.present:
         return []
-    said = RESETS[view.help.reset if view.help else ""]
-    key, _, rest = said.partition(", ")
-    text = Text(no_wrap=True)
-    if key == "x":
-        text.append("x", KEY)
-        text.append(f", {rest}", PLAIN)
-    else:
-        text.append(said, PLAIN)
-    text.truncate(max(1, width - LABEL), overflow="ellipsis")
-    return _labelled("Reset", [text])
+    said = reset_text(view.help, view.ready, "x")
+    room = max(10, width - LABEL - TRUST_WIDTH)
+    # in as many lines as it takes: what may start the motor is never cut off
+    lines = [Text(cut(part, room), PLAIN) for part in wrapped(said.text, room, 4)]
+    if lines[0].plain.startswith("x "):
+        lines[0].stylize(KEY, 0, 1)
+    lines[0].append("" if said.told_by_drive else f" {TRUST_MARKS['practice']:>8}", FAINT)
+    return _labelled("Reset", lines)
 
 
 def _history(view: DoctorView, width: int, height: int) -> list[Text]:

@@ -9,6 +9,7 @@ from rich.text import Text
 from textual.app import ComposeResult
 
 from tui.bus.errors import LineError
+from tui.drive.hints import alarms_on, codes_to_read
 from tui.drive.profile.schema import FaultCode
 from tui.session.console import DriveConsole
 from tui.session.monitor.fault_record import FaultRecord, Recorder, record_name, record_text
@@ -20,7 +21,8 @@ from tui.widgets.lines import Lines
 from ..command.command_keys import OrderKeys
 from ..dialogs.files import fault_of_new
 from ..keys.table import FAULTS, bindings
-from .doctor import DoctorView, doctor_lines
+from .doctor import doctor_lines
+from .doctor_view import DoctorView
 from .view import record_lines, stored_lines
 
 STORED = 52
@@ -29,6 +31,8 @@ STEP = 5
 """Rows of the record that a key moves by."""
 READ_AGAIN = 2.0
 """Seconds between two looks at the parameters that a fault points at."""
+OLD = 3 * READ_AGAIN
+"""Seconds after which a value that was read is shown as an old one."""
 BESIDE = 36
 """Rows from which on the seconds before the trip stand below the doctor."""
 DOCTOR_ROWS = 24
@@ -79,11 +83,15 @@ class FaultsScreen(OrderKeys):
 
     def _read_again(self) -> None:
         if self.is_current:
-            self.run_worker(self._read(), exclusive=True, group="faults")
+            # the method, not its coroutine: one that is replaced before it began would warn
+            self.run_worker(self._read, exclusive=True, group="faults")  # type: ignore[arg-type]
 
     async def _read(self) -> None:
         faults = self.session.profile.data.faults
-        codes = [look.code for look in self.doctor().look_at]
+        view = self.doctor()
+        codes = []
+        if view.present or view.hint is not None:
+            codes = codes_to_read(self.session.profile, view.hint)
         if self._unread:
             codes += [*faults.history, *(code for stored in faults.stored for code in stored)]
         if not codes:
@@ -105,19 +113,33 @@ class FaultsScreen(OrderKeys):
         fault = latest.state.fault if latest is not None and present else None
         if fault is None and not present:
             fault = record.fault if record else None
+        alarms = self._alarms()
+        if alarms and not present:
+            fault = None  # a warning of now comes before the trip that was
         if self._chosen is not None:
             present = present and fault is not None and fault.raw == self._chosen.raw
             fault = self._chosen
-        same = record is not None and record.fault is not None and fault is not None
+        now = self.app.clock.monotonic()
+        if record is not None and (record.fault != fault or not (fault or present)):
+            record = None
         return DoctorView(
             profile=self.session.profile,
             fault=fault,
             present=present,
-            record=record if same and record and record.fault.raw == fault.raw else None,  # type: ignore[union-attr]
-            readings=self._readings,
+            record=record,
+            readings={code: one.aged(now, OLD) for code, one in self._readings.items()},
             at=self._at,
             unread=self._unread,
+            alarms=alarms,
         )
+
+    def _alarms(self) -> list[tuple[str, int, str]]:
+        """Alarms that are on in the values of the monitor."""
+        latest = self.console.monitor.latest
+        if latest is None or latest.error:
+            return []
+        raws = {c: r.raw for c, r in latest.readings.items() if r.raw is not None}
+        return alarms_on(self.session.profile, raws)
 
     def draw(self, width: int) -> None:
         """Show what there is; a new trip counts as seen."""
@@ -136,7 +158,9 @@ class FaultsScreen(OrderKeys):
             doctor, below = DOCTOR_ROWS, rows - DOCTOR_ROWS
         self.query_one("#doctor", Lines).display = doctor > 0
         self.query_one("#record", Lines).display = below > 0
-        self.put("doctor", doctor_lines(self.doctor(), width, doctor) if doctor else [])
+        lines = doctor_lines(self.doctor(), width, doctor) if doctor else []
+        # so many rows however much there is to tell: what stands below them does not move
+        self.put("doctor", [*lines, *[Text("")] * (doctor - len(lines))])
         self.put("record", self._past(width, below) if below else [])
 
     def _past(self, width: int, rows: int) -> list[Text]:
@@ -224,9 +248,10 @@ class FaultsScreen(OrderKeys):
             for code in (stored[0] if stored else [])
             if (reading := self._readings.get(code)) is not None
         ]
+        values = {c: f"{r.text} {r.unit}".rstrip() for c, r in self._readings.items()}
         try:
             path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_text(record_text(self.session, record, rows), encoding="utf-8")
+            path.write_text(record_text(self.session, record, rows, values), encoding="utf-8")
         except OSError as error:
             self.app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
         else:

@@ -6,8 +6,21 @@ from dataclasses import dataclass
 
 CONNECTION, MONITOR, FRAMES = "line", "monitor", "frames"
 SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
-BLOCKS, MESSAGES = "scanner", "messages"
-EVERYWHERE = (CONNECTION, MONITOR, FRAMES, SOURCES, FAULTS, PARAMETERS, BLOCKS, MESSAGES)
+BLOCKS, MESSAGES, WIRING = "scanner", "messages", "wiring"
+OPENING = "opening"
+"""Monitor while its drive is not known yet."""
+EVERYWHERE = (
+    CONNECTION,
+    MONITOR,
+    FRAMES,
+    SOURCES,
+    FAULTS,
+    PARAMETERS,
+    BLOCKS,
+    MESSAGES,
+    WIRING,
+    OPENING,
+)
 
 KEY_NAMES = {
     "escape": "Esc",

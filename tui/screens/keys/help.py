@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator
 from typing import ClassVar
 
-from rich.table import Table
+from rich.style import Style
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
 from textual.containers import VerticalScroll
 from textual.screen import ModalScreen
 
+from tui.widgets.drawing import wrapped
+from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, KEY, PLAIN, RUNNING, TITLE
-from tui.widgets.plain import Plain
 
 from ..frame import Framed
 from .table import of_screen
@@ -32,6 +34,9 @@ SIGNS: tuple[tuple[str, str, str], ...] = (
     ("S", "amber", "of a setting: lost when the drive is off, until S keeps it in its EEPROM"),
     ("R", "amber", "of a setting: in force only after a reset of the drive"),
 )
+HELP_WIDTH, BESIDE_HELP = 76, 5
+"""Columns of the list at most, and those of its border, its margin and its scroll bar."""
+SENTENCE_LINES = 6
 WITHOUT_KEY = "^p"
 """Where an action without a key of its own is found: in the list of all."""
 HELP_STYLES = {
@@ -62,23 +67,31 @@ class HelpScreen(Framed, ModalScreen[None]):
         yield from self.dialog()
 
     def dialog(self) -> ComposeResult:
-        """One text that scrolls where the terminal is small."""
+        """Lines that scroll where the terminal is small."""
+        keys = Lines()
+        keys.show(help_lines(self._of, min(HELP_WIDTH, self.app.size.width) - BESIDE_HELP))
         with VerticalScroll(id="help"):
-            yield Plain(help_text(self._of))
+            yield keys
 
 
-def help_text(screen: str) -> Table:
+def help_lines(screen: str, width: int) -> list[Text]:
     """Keys and signs of a screen, each sentence in a column of its own."""
-    table = Table.grid(padding=(0, 2, 0, 0))
-    table.add_row(
-        Text("", no_wrap=True),
-        Text.assemble((f"Keys on {screen.capitalize()}", TITLE), ("   Esc closes", FAINT)),
-    )
-    for action in of_screen(screen):
-        key = action.shown or WITHOUT_KEY
-        table.add_row(Text(key, KEY, no_wrap=True), Text(action.help, PLAIN))
-    table.add_row("", "")
-    table.add_row("", Text("Signs", TITLE))
-    for sign, colour, meaning in SIGNS:
-        table.add_row(Text(sign, HELP_STYLES[colour], no_wrap=True), Text(meaning, PLAIN))
-    return table
+    keys = [(action.shown or WITHOUT_KEY, KEY, action.help) for action in of_screen(screen)]
+    signs = [(sign, HELP_STYLES[colour], meaning) for sign, colour, meaning in SIGNS]
+    column = max(len(key) for key, _, _ in (*keys, *signs)) + 2
+    title = Text(" " * column).append(f"Keys on {screen.capitalize()}", TITLE)
+    return [
+        title.append("   Esc closes", FAINT),
+        *_rows(keys, column, width),
+        Text(""),
+        Text(" " * column).append("Signs", TITLE),
+        *_rows(signs, column, width),
+    ]
+
+
+def _rows(rows: Iterable[tuple[str, Style, str]], column: int, width: int) -> Iterator[Text]:
+    """Each with its sentence on as many lines as that takes."""
+    for head, style, sentence in rows:
+        for number, part in enumerate(wrapped(sentence, width - column, SENTENCE_LINES)):
+            line = Text(f"{'' if number else head:<{column}}", style, no_wrap=True)
+            yield line.append(part, PLAIN)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .action import FAULTS, MONITOR, on
+from .action import FAULTS, MONITOR, PARAMETERS, on
 
 RUN = "Run forward: opens a line with the reference, Enter runs."
 REVERSE = "Run reverse: opens a line with the reference, Enter runs."
@@ -14,7 +14,11 @@ COAST = "Let the motor coast; asks, needs no arming. A coasting hoist falls."
 BRAKE = "Brake by direct current, where the drive has that; asks, needs no arming."
 TAKE = "Take the control from the terminals, where a drive has that; armed, locked only, asks."
 HAND_BACK = "Give the control back to the terminals; a run command waiting there counts then; asks."
+TEACH = "Teach the scale of a raw value: type what the drive's own display shows."
+GIVE_BY = "Give the reference by a preset whose scale was taught, or no more; asks."
 TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
+
+INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V. Never on a real line."
 
 COMMAND_ACTIONS = (
     *on(
@@ -48,7 +52,12 @@ COMMAND_ACTIONS = (
         ("take_control", "t", "", TAKE),
         ("hand_back", "g", "", HAND_BACK),
         ("take_over", "T", "", TAKE_OVER),
+        ("inputs", "D", "", INPUTS),
     ),
+)
+TEACH_ACTIONS = (
+    *on((MONITOR, PARAMETERS), ("teach", "L", "", TEACH)),
+    *on((MONITOR,), ("reference_by", "R", "", GIVE_BY)),
 )
 WATCH_ACTIONS = on(
     (MONITOR,),

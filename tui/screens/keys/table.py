@@ -19,13 +19,15 @@ from .action import (
     FRAMES,
     MESSAGES,
     MONITOR,
+    OPENING,
     PARAMETERS,
     SOURCES,
+    WIRING,
     Action,
     on,
 )
 from .block_actions import BLOCK_ACTIONS
-from .monitor_actions import COMMAND_ACTIONS, WATCH_ACTIONS
+from .monitor_actions import COMMAND_ACTIONS, TEACH_ACTIONS, WATCH_ACTIONS
 from .parameter_actions import PARAMETER_ACTIONS
 
 of_app = partial(Action, app=True)
@@ -42,6 +44,7 @@ WRITE_SOURCE = "Write the chosen configuration; armed, motor at rest, asks."
 SAVE = "Save what is shown to a file: a backup, an assignment, the record of a trip."
 OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
 FIND = "Find a parameter by code, name, address or value, from anywhere."
+WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
 PLACES: tuple[tuple[str, str, str], ...] = (
@@ -85,6 +88,7 @@ ACTIONS: tuple[Action, ...] = (
     ),
     *on((SOURCES,), ("leave", "escape", "back", "Go back to Monitor.")),
     *PARAMETER_ACTIONS,
+    *TEACH_ACTIONS,
     *BLOCK_ACTIONS,
     *WATCH_ACTIONS,
     *on(
@@ -101,11 +105,23 @@ ACTIONS: tuple[Action, ...] = (
         ("scroll(10)", "pagedown", "", "Ten lines older."),
         ("leave", "escape", "back", "Go back."),
     ),
+    *on((OPENING,), ("leave", "escape", "Line", "Go to Line; the drive is asked on.")),
+    *on(
+        (WIRING,),
+        ("scroll(-1)", "up", "", "One line up."),
+        ("scroll(1)", "down", "scroll", "One line down."),
+        ("page(-1)", "pageup", "", "A page up."),
+        ("page(1)", "pagedown", "", "A page down."),
+        ("section(1)", "tab", "next", "The next section."),
+        ("section(-1)", "shift+tab", "", "The section before."),
+        ("leave", "escape", "back", "Go back."),
+    ),
     *(of_app(f"goto({place!r})", key, "", f"Go to {name}.") for place, key, name in PLACES),
     of_app("step_drive(-1)", "[", "", "The drive before on this line."),
     of_app("step_drive(1)", "]", "", "The next drive on this line."),
     of_app("find", "/", "", FIND),
     of_app("messages", "m", "", "Messages: everything that was said, with its time."),
+    of_app("wiring", "I", "", WIRING_HELP),
     of_app("save_shown", "ctrl+s", "", SAVE),
     of_app("open_file", "ctrl+o", "", OPEN),
     of_app("eeprom", "S", "", EEPROM),
@@ -176,8 +192,10 @@ __all__ = [
     "FRAMES",
     "MESSAGES",
     "MONITOR",
+    "OPENING",
     "PARAMETERS",
     "SOURCES",
+    "WIRING",
     "Action",
     "bindings",
     "keys_line",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from rich.text import Text
 
-from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.profile import Profile, is_verified, mark_of
 from tui.drive.profile.schema import MonitoringValue, Quantity
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
 from tui.session.reading import Quality
@@ -92,7 +92,7 @@ def _value(view: View, value: MonitoringValue, cells: int, barred: bool) -> Text
     """Its name, its number to the right, its unit; behind it a bar where there is room."""
     parameter = view.profile[value.parameter]
     columns = value_cells(cells, barred)
-    mark = "" if is_verified(parameter) else " ?"
+    mark = f" {mark_of(view.profile, parameter)}".rstrip()
     name = LABELS.get(parameter.quantity) if parameter.quantity else None
     room = columns - NUMBER_CELLS - UNIT_CELLS - 1
     label = short(name or parameter.name, room - len(mark)) + mark

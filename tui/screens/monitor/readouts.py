@@ -5,7 +5,7 @@ from __future__ import annotations
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.profile.profile import is_verified
+from tui.drive.profile.profile import mark_of
 from tui.drive.profile.schema import Parameter, Quantity
 from tui.drive.values import NOT_AVAILABLE
 from tui.session.reading import Quality, Reading
@@ -58,7 +58,7 @@ def _readout(view: View, quantity: Quantity, cells: int) -> list[Text]:
     text, unit, style = _shown(view, quantity, parameter)
     unit = short(unit, 4)
     field = min(_field(parameter, quantity), cells - len(unit) - 2)
-    drawn = dashes(field) if text == NOT_AVAILABLE else big(text, field)
+    drawn = dashes(field) if text == NOT_AVAILABLE else big(text, field, plain=view.plain)
     rows = [_heading(view, quantity, parameter, field + 1 + len(unit))]
     for number, part in enumerate(drawn):
         row = Text(no_wrap=True).append(part, style)
@@ -98,8 +98,8 @@ def _field(parameter: Parameter | None, quantity: Quantity) -> int:
 def _heading(view: View, quantity: Quantity, parameter: Parameter | None, cells: int) -> Text:
     """The name; behind it the reference, or the age of a value that is not the present."""
     title = TITLES[quantity]
-    if parameter is not None and not is_verified(parameter):
-        title += " ?"
+    if parameter is not None and (mark := mark_of(view.profile, parameter)):
+        title += f" {mark}"
     text = Text(title, FAINT, no_wrap=True)
     reading = view.reading(parameter.code) if parameter else None
     right, style = "", FAINT

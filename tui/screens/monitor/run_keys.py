@@ -158,7 +158,7 @@ class RunKeys(OrderKeys):
     def _would_start(self) -> bool:
         """Whether the drive is enabled and stands at 0 Hz: a reference turns the motor."""
         latest = self.console.latest
-        if latest is None or latest.state.kind != "running":
+        if latest is None or latest.state.motion != "running":
             return False
         frequency = self.session.profile.quantity("output_frequency")
         reading = latest.readings.get(frequency.code) if frequency else None

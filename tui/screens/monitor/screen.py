@@ -22,8 +22,8 @@ from ..keys.table import MONITOR, bindings, keys_line
 from .arrange import Arrangement, arrange
 from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words
 from .commands import order_keys
+from .input_keys import InputKeys
 from .motor import other_values
-from .run_keys import RunKeys
 from .source import ViewSource
 from .view import SPANS, USUAL_SPAN, View
 
@@ -38,7 +38,7 @@ PLACED = frozenset({"top", "motor", "trend", "words", "state", "said"})
 """Parts whose rows depend on the room there is."""
 
 
-class MonitorScreen(RunKeys):
+class MonitorScreen(InputKeys):
     """One drive, watched live; the screen only looks at what the line's worker brought."""
 
     CSS_PATH = "monitor.tcss"

@@ -45,6 +45,7 @@ class ViewSource:
             now=now,
             read_only=app.read_only,
             low_bandwidth=app.low_bandwidth,
+            plain=app.plain_signs,
             watch=fleet.line_watch.watch(session.device) if fleet else None,
             heard=session.line.device_state(session.device).heard,
             control=control,
@@ -76,5 +77,5 @@ class ViewSource:
         outcome, latest = self._console.session.work.outcome, self._console.latest
         if outcome is not None and outcome.time > report.since:
             return True
-        runs = latest is not None and not latest.error and latest.state.kind == "running"
+        runs = latest is not None and not latest.error and latest.state.motion == "running"
         return runs and report.phase is Phase.STOPPED

@@ -155,8 +155,15 @@ def _pair(label: str, text: str, style: Style, width: int) -> Text:
 
 def _channel(view: View, label: str, quantity: Quantity, width: int) -> Text:
     """Who gives the command or the reference."""
-    told = view.snapshot.state.channel if view.snapshot and not view.lost else ""
-    if quantity == "command_channel" and told:
+    state = view.snapshot.state if view.snapshot and not view.lost else None
+    told = (
+        ""
+        if state is None
+        else state.channel
+        if quantity == "command_channel"
+        else (state.reference)
+    )
+    if told:
         return _pair(label, told, PLAIN, width)
     parameter = view.profile.quantity(quantity)
     if parameter is None:

@@ -35,6 +35,8 @@ class View:
     read_only: bool = False
     low_bandwidth: bool = False
     """Whether the trend is left out and the screen looked at less often."""
+    plain: bool = False
+    """Whether it is drawn in signs of ASCII."""
     watch: TimeoutWatch | None = None
     """The drive's watch over the line, where it has one that runs."""
     heard: float | None = None

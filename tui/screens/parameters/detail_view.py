@@ -5,8 +5,9 @@ from __future__ import annotations
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter
-from tui.drive.settings.selection import not_factory
+from tui.drive.settings.factory import factory_is_sure
 from tui.drive.settings.writable import needs_standstill, waits_for_reset
+from tui.drive.taught_profile import why_not_taught
 from tui.drive.values import NOT_AVAILABLE, is_enumeration, set_bits
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import wrapped
@@ -15,6 +16,7 @@ from tui.widgets.palette import ALARM, ATTENTION, FAINT, KEY, LINE, PLAIN, STALE
 from .value_text import (
     CONFIDENCE_WORDS,
     factory_text,
+    is_changed,
     limits_now,
     old_text,
     range_text,
@@ -29,23 +31,28 @@ TALL_FROM = 32
 """Rows of a terminal that has."""
 
 
-def parameter_lines(editor: Editor, code: str, width: int, height: int) -> list[Text]:
-    """What one parameter is, on so many lines, the last for what happened to it."""
+def parameter_lines(
+    editor: Editor, code: str, width: int, height: int, step: str = ""
+) -> list[Text]:
+    """What one parameter is, on so many lines, the last for what happened to it.
+
+    `step` is what a first commissioning does with it, where that is what is looked at.
+    """
     parameter = editor.session.profile[code]
     news = _news(editor, parameter)
     # what warns is told whole, at the cost of help
     most = 3 if height > SHORT else 1 if news.style == PLAIN else 2
     told = wrapped(news.plain, max(20, width - 3), most)
-    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)))
+    lines = _help(editor, parameter, width, height - 2 - max(1, len(told)), step)
     lines += [_limits(editor, parameter, width), _place(editor, parameter, width)]
     lines += [Text(f" {line}", news.style, no_wrap=True) for line in told]
     return [*lines, *([Text("")] * (height - len(lines)))]
 
 
-def _help(editor: Editor, parameter: Parameter, width: int, room: int) -> list[Text]:
+def _help(editor: Editor, parameter: Parameter, width: int, room: int, step: str) -> list[Text]:
     """Code, whole name, what it does; as many lines as there is room for."""
     head = f"{parameter.code}  {parameter.name}"
-    told = _help_parts(editor, parameter)
+    told = [*([step] if step else []), *_help_parts(editor, parameter)]
     words = " ".join(part if part.endswith(".") else f"{part}." for part in told)
     parts = wrapped(f"{head}. {words}" if words else head, max(20, width - 3), room)
     lines = [Text(f" {part}", FAINT, no_wrap=True) for part in parts]
@@ -64,8 +71,10 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
     if parameter.bits and raw is not None:
         names = ", ".join(bit.on or bit.name for bit in set_bits(parameter.bits, raw))
         found.append(f"Now: {names or 'no bit set'}")
-    if parameter.note:
+    # a profile's note on a word without a scale says that it is shown raw
+    if parameter.note and parameter.code not in editor.session.profile.taught:
         found.append(parameter.note)
+    found += _taught(editor, parameter)
     if parameter.base:
         found.append(f"In percent of {parameter.base}")
     if parameter.scale_by is not None and parameter.scale_by.parameter not in parameter.note:
@@ -74,6 +83,16 @@ def _help_parts(editor: Editor, parameter: Parameter) -> list[str]:
         choices = dict.fromkeys(editor.session.profile.names(parameter).values())
         found.append(f"One of: {', '.join(choices)}")
     return found
+
+
+def _taught(editor: Editor, parameter: Parameter) -> list[str]:
+    """What a person has taught of it, or that it can be taught."""
+    session = editor.session
+    if (scale := session.profile.taught.get(parameter.code)) is not None:
+        return [f"Taught: {scale.text}; L looks again"]
+    if parameter.access != "r" or why_not_taught(session.family, parameter.code):
+        return []
+    return ["L or Enter teaches its scale by the drive's display"]
 
 
 def _limits(editor: Editor, parameter: Parameter, width: int) -> Text:
@@ -159,9 +178,18 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
         return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
     if refused is not None and refused.reason != "read-only":
         return Text(refused.text, FAINT)
-    if not_factory(editor.session.profile, parameter, editor.values.raws[code]):
-        return Text(f"Not the factory value, {factory_text(editor, parameter)}.", FAINT)
+    if is_changed(editor, parameter):
+        return Text(_not_factory_text(editor, parameter), FAINT)
     return Text("")
+
+
+def _not_factory_text(editor: Editor, parameter: Parameter) -> str:
+    """What a changed setting was, and how surely that is known."""
+    said = f"Not the factory value, {factory_text(editor, parameter)}"
+    grounds = parameter.factory_grounds
+    if grounds is None or factory_is_sure(parameter):
+        return f"{said}."
+    return f"{said}: from {CONFIDENCE_WORDS[grounds.confidence]}, unverified."
 
 
 def status_line(editor: Editor, where: str, width: int) -> Text:

@@ -14,6 +14,7 @@ from textual.widgets import Input, OptionList
 
 from tui.drive.errors import DriveError
 from tui.drive.profile.schema import Parameter
+from tui.drive.settings.factory import factory_is_sure, factory_raw
 from tui.drive.settings.in_force import limit_passed
 from tui.drive.values import encode
 from tui.session.settings.editor import Editor
@@ -137,7 +138,9 @@ class PickValue(KeyQuestion[int | None]):
     def __init__(self, editor: Editor, parameter: Parameter, now: MotorsNow | None = None) -> None:
         super().__init__(now)
         self._editor, self._parameter = editor, parameter
-        self._names = sorted(editor.session.profile.names(parameter).items())
+        profile, values = editor.session.profile, editor.values
+        self._names = sorted(profile.names(parameter).items())
+        self._factory = factory_raw(profile, parameter, values.raws, values.lacking)
 
     def dialog(self) -> ComposeResult:
         """The list with the held value marked."""
@@ -165,8 +168,9 @@ class PickValue(KeyQuestion[int | None]):
         text.append(" ● " if held else " · ", STRONG if held else FAINT)
         text.append(f"{raw:>5}  ", FAINT)
         text.append(name, STRONG if held else PLAIN)
-        if raw == self._parameter.factory:
-            text.append("   factory", FAINT)
+        if raw == self._factory:
+            sure = factory_is_sure(self._parameter)
+            text.append("   factory" if sure else "   factory ?", FAINT)
         return text
 
     def on_option_list_option_selected(self, event: OptionList.OptionSelected) -> None:

@@ -13,6 +13,7 @@ from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, PLAIN, STRONG
 
 FILTER_LABELS: dict[str, str] = {
     "not factory": "Changed",
+    "start-up": "Simply start",
     "favourites": "Favourites",
     "staged": "Staged",
     "differs": "Differs",
@@ -61,7 +62,8 @@ def group_lines(entries: Sequence[GroupEntry], chosen: Choice, width: int, room:
 
 def _line(entry: GroupEntry, chosen: Choice, width: int) -> Text:
     here = entry.choice == chosen
-    style = STRONG if here else PLAIN if entry.count or entry.choice.group else FAINT
+    group = entry.choice.group or entry.choice.filter == "start-up"
+    style = STRONG if here else PLAIN if entry.count or group else FAINT
     if entry.count and not here:
         style = STYLES.get(entry.choice.filter, style)
     label = entry.label if len(entry.label) < width - 1 else cut_at_word(entry.label, width - 2)

@@ -7,11 +7,11 @@ from textual.widgets import Input
 from tui.session.console import DriveConsole
 from tui.session.settings.editor import Editor
 
-from ..command.arming import ArmingKeys
+from ..command.teaching import TeachKeys
 from .parameter_list import ParameterList
 
 
-class ParameterKeys(ArmingKeys):
+class ParameterKeys(TeachKeys):
     """The base of the keys that stage, write and handle parameter sets."""
 
     def __init__(self, console: DriveConsole) -> None:

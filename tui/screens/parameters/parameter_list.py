@@ -18,6 +18,7 @@ from tui.drive.settings.selection import (
 from tui.session.settings.editor import Editor
 
 from .group_view import GroupEntry
+from .start_up_view import start_up_items
 from .table_view import TableLine, items_of
 
 FIRST: tuple[FilterId, ...] = ("not factory", "favourites", "staged", "unsaved")
@@ -77,6 +78,8 @@ class ParameterList:
         headings = not self.searched and self.chosen.filter in ("all", "settings")
         headings = headings and not self.chosen.group
         self.items = items_of(editor, codes, headings=headings)
+        if shows_steps(self):
+            self.items = start_up_items(profile)
         found = [at for at, item in enumerate(self.items) if item.code and item.code == before]
         self.at = found[0] if found else self._first_row(0, 1)
 
@@ -94,6 +97,8 @@ class ParameterList:
         if facts.other:
             first.append(GroupEntry(Choice("differs"), len(rows(facts, "differs")), pinned=True))
         groups = [GroupEntry(Choice(group=group)) for group in self.groups]
+        if facts.profile.data.start_up:
+            groups.insert(0, GroupEntry(Choice("start-up")))
         return [*first, *groups, *(GroupEntry(Choice(one)) for one in LAST)]
 
     def choose(self, choice: Choice) -> None:
@@ -142,8 +147,10 @@ class ParameterList:
         self.move_to(0 if to < 0 else len(self.items) - 1, -to)
 
     def window(self, room: int) -> Sequence[TableLine]:
-        """The lines that fit, the cursor's among them, with the heading just above it."""
-        first = self.at - 1 if self.at and self.items[self.at - 1].group else self.at
+        """The lines that fit, the cursor's among them, with the headings just above it."""
+        first = self.at
+        while first > max(0, self.at - room + 1) and not self.items[first - 1].code:
+            first -= 1
         self.top = min(max(self.top, self.at - room + 1), first) if self.items else 0
         return self.items[self.top : self.top + room]
 
@@ -155,3 +162,9 @@ class ParameterList:
         while 0 <= at < len(self.items) and not self.items[at].code:
             at += step
         return self._within(at)
+
+
+def shows_steps(listed: ParameterList) -> bool:
+    """Whether a list shows the steps of a first commissioning."""
+    chosen = listed.chosen
+    return chosen.filter == "start-up" and not chosen.group and not listed.searched

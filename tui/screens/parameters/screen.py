@@ -18,6 +18,8 @@ from tui.screens.parameters.detail_view import (
     status_line,
 )
 from tui.screens.parameters.group_view import FILTER_LABELS, group_lines
+from tui.screens.parameters.parameter_list import shows_steps
+from tui.screens.parameters.start_up_view import step_help
 from tui.screens.parameters.table_view import head_line, row_line
 from tui.widgets.fields import Field
 from tui.widgets.lines import Lines
@@ -98,7 +100,8 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         self._draw_groups()
         self.put("status", [status_line(editor, self._where(), width)])
         height = TALL if self.size.height >= TALL_FROM else SHORT
-        self.put("detail", parameter_lines(editor, code, width, height) if code else [])
+        step = step_help(self.session.profile, code) if shows_steps(self.listed) else ""
+        self.put("detail", parameter_lines(editor, code, width, height, step) if code else [])
 
     def _draw_groups(self) -> None:
         place = self.query_one("#groups")

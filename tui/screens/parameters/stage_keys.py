@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from tui.drive.errors import DriveError
 from tui.drive.settings.in_force import limit_passed
+from tui.drive.taught_profile import why_not_taught
 from tui.session.settings.editor import Editor
 
 from .parameter_keys import ParameterKeys
@@ -17,6 +18,9 @@ class StageKeys(ParameterKeys):
         from .edit_value import dialog_for
 
         code = self.listed.code
+        if code and self._only_teaches(code):
+            self.ask_look(code)
+            return
         if not code or not self._may_edit(code):
             return
 
@@ -28,6 +32,17 @@ class StageKeys(ParameterKeys):
         now = self.motor_now()
         dialog = dialog_for(self.editor, self.session.profile[code], now)()
         self.app.push_screen(dialog, told)
+
+    def _only_teaches(self, code: str) -> bool:
+        """Whether all that can be done to a parameter is to teach its scale."""
+        refused = self.editor.refusal(code)
+        read_only = refused is not None and refused.reason == "read-only"
+        return read_only and not why_not_taught(self.session.family, code)
+
+    def action_teach(self) -> None:
+        """Say what the drive's display shows for the parameter under the cursor."""
+        if self.listed.code:
+            self.ask_look(self.listed.code)
 
     def _may_edit(self, code: str) -> bool:
         """Whether it may be staged; a motor that runs hinders only the writing."""

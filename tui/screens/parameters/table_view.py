@@ -10,22 +10,22 @@ from rich.text import Text
 
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import Parameter
-from tui.drive.settings.selection import not_factory
 from tui.session.settings.editor import Editor
 from tui.widgets.drawing import cut_at_word, short
 from tui.widgets.palette import ALARM, ATTENTION, CURSOR, FAINT, LINE, PLAIN, STRONG, TITLE
 
-from .value_text import old_text, other_text, range_text, value_text
+from .value_text import is_changed, old_text, other_text, range_text, value_text
 
 LONGEST_NAME = 46
 
 
 @dataclass(frozen=True, slots=True)
 class TableLine:
-    """A line of the table: a parameter, or the heading of a group."""
+    """A line of the table: a parameter, the heading of a group or of a step, or text below it."""
 
     code: str = ""
     group: str = ""
+    text: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -99,6 +99,8 @@ def row_line(editor: Editor, item: TableLine, width: int, *, chosen: bool) -> Te
         text.append(f" {item.group} ", TITLE)
         text.append("─" * max(0, width - len(item.group) - 3), LINE)
         return text
+    if not item.code:
+        return Text(f"   {item.text}", FAINT, no_wrap=True)
     text = _row(editor, editor.session.profile[item.code], Columns.of(width))
     if chosen:
         text.append(" " * max(0, width - text.cell_len))
@@ -116,7 +118,7 @@ def _row(editor: Editor, parameter: Parameter, columns: Columns) -> Text:
         text.append(f"{short(parameter.number, columns.number - 1):<{columns.number}}", FAINT)
     name = cut_at_word(parameter.name, columns.name - 1)
     text.append(f"{name:<{columns.name}}", PLAIN if parameter.access != "r" else FAINT)
-    changed = not_factory(editor.session.profile, parameter, editor.values.raws.get(code))
+    changed = is_changed(editor, parameter)
     held = short(value_text(editor, code), columns.value)
     text.append(f"{held:>{columns.value}}", _value_style(editor, parameter, changed))
     text.append_text(_staged(editor, code, columns.staged))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from tui.drive.profile.schema import Confidence, Parameter
+from tui.drive.settings.factory import factory_is_sure, factory_value, not_factory
 from tui.drive.settings.in_force import LimitsInForce, limits_in_force
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, is_enumeration
@@ -34,10 +35,18 @@ def other_text(editor: Editor, parameter: Parameter) -> str:
 
 
 def factory_text(editor: Editor, parameter: Parameter) -> str:
-    """The factory value, or what is known of it in words."""
-    if parameter.factory is None:
+    """The factory value, with a ? where no document of the family tells it; or words for it."""
+    values = editor.values
+    value = factory_value(editor.session.profile, parameter, values.raws, values.lacking)
+    if value is None:
         return parameter.factory_text
-    return text_of(editor, parameter, parameter.factory)
+    return value.display if factory_is_sure(parameter) else f"{value.display} ?"
+
+
+def is_changed(editor: Editor, parameter: Parameter) -> bool:
+    """Whether a setting is not as from the factory."""
+    values = editor.values
+    return not_factory(editor.session.profile, parameter, values.raws, values.lacking)
 
 
 def text_of(editor: Editor, parameter: Parameter, raw: int) -> str:

@@ -136,7 +136,7 @@ class BlockEditor:
     def not_now(self, block: Block) -> str:
         """Why the slots of a block cannot be written in the state of now, as Monitor knows it."""
         latest = self.monitor.latest
-        if latest is None or latest.error or latest.state.kind in AT_REST:
+        if latest is None or latest.error or latest.state.motion in AT_REST:
             return ""
         return at_rest_only(block, latest.state.headline or latest.state.kind)
 

@@ -8,7 +8,8 @@ from dataclasses import dataclass, field
 from tui.drive.blocks.assignment import Assignment, describe, slot_target
 from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.blocks.wire_cost import reach
-from tui.drive.orders import chart_in_force, deciding_codes, interlock, interlock_codes
+from tui.drive.held_back import held_back
+from tui.drive.orders import chart_in_force, deciding_codes, interlock_codes
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import AT_REST, is_order
 from tui.drive.values import check_raw
@@ -75,8 +76,8 @@ class ExchangeChecks:
         found = chart_in_force(profile, raws)
         if found is None or not found.orders:
             raise AssignmentRefused("This drive is not commanded from here.")
-        if refused := interlock(found, "forward", raws):
-            raise AssignmentRefused(refused)
+        if (held := held_back(profile, found, "forward", raws)) is not None:
+            raise AssignmentRefused(f"{held.text} {held.remedy}".strip())
 
     def check_values(self, raws: Mapping[str, int]) -> None:
         """Raise ValueRefused for a value that its parameter cannot take."""

@@ -6,12 +6,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 from tui.bus.api import Priority
-from tui.drive.chart import state_of
+from tui.drive.chart import state_codes, state_now
+from tui.drive.held_back import held_back
 from tui.drive.orders import (
     OrderRefused,
     chart_in_force,
     deciding_codes,
-    interlock,
     interlock_codes,
     order_target,
     with_options,
@@ -26,6 +26,7 @@ from ..reading import Reading
 from ..settings.write import Writer
 from ..work import Permit
 from .given import GivenCommands
+from .way_out import told_anywhere
 
 STEP_TIME = 2.0
 """Seconds that a drive may take for one step of its chart."""
@@ -64,20 +65,21 @@ class CommandAccess:
         session = self.session
         codes = deciding_codes(session.profile)
         for chart in session.profile.data.charts:
-            codes += [chart.status, chart.command, *interlock_codes(chart)]
+            codes += [*state_codes(session.profile, chart), chart.command, *interlock_codes(chart)]
         await self.read([code for code in dict.fromkeys(codes) if code])
         found = chart_in_force(session.profile, self.raws)
         if found is None or not found.orders:
             name = found.name if found else "what decides about its commands was not read"
             raise OrderRefused(f"This drive is not commanded from here: {name}.")
-        if wanted is not None and (refused := interlock(found, wanted, self.raws)):
-            raise OrderRefused(refused)
+        held = held_back(session.profile, found, wanted, self.raws) if wanted is not None else None
+        if held is not None:
+            raise OrderRefused(told_anywhere(held))
         return found
 
     async def state(self, chart: Chart) -> State:
-        """The drive's state, read now."""
-        await self.read([chart.status])
-        return state_of(chart, self.raws[chart.status])
+        """The drive's state, read now with the word of its present fault."""
+        await self.read(state_codes(self.session.profile, chart))
+        return state_now(self.session.profile, chart, self.raws)
 
     async def wait_for(self, chart: Chart, goals: Collection[str]) -> State:
         """The state, as soon as it is one of those, or when its time is up."""

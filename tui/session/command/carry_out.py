@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from tui.drive.orders import OrderRefused, choose
-from tui.drive.profile.schema import CommandOption, OrderId
+from tui.drive.channel import channel_codes, reference_channel
+from tui.drive.chart import ENABLED_KINDS, state_of
+from tui.drive.orders import STOP_ORDERS, OrderRefused, choose
+from tui.drive.profile.schema import CommandOption, Order, OrderId
 from tui.drive.values import from_words
 
 from .access import CommandAccess
@@ -18,9 +20,29 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
     chart = await access.chart(id)
     if id in ("forward", "reverse"):
         return await MotorStart(access).carry_out(chart, id)
-    order = choose(chart, id, access.raws)
+    state = await access.state(chart)
+    # a fault holds no stop back: its word follows the status word alone
+    order = choose(chart, id, access.raws, None if id in STOP_ORDERS else state)
     await access.send(chart, order)
-    return f"{order.name}: {(await access.state(chart)).name}"
+    name = (await access.state(chart)).name
+    return f"{order.name}: {name}{await _cleared(access, order)}"
+
+
+async def _cleared(access: CommandAccess, order: Order) -> str:
+    """What the reference is now, where an order puts words back to their initial values."""
+    if not order.clears:
+        return ""
+    access.session.image.forget(order.clears)
+    readings = await access.read(order.clears)
+    wanted = access.given.wanted
+    now = readings.get(wanted.parameter.code) if wanted is not None else None
+    if wanted is not None and now is not None and now.raw != wanted.raw:
+        access.given.forget_reference()
+    parameter = access.session.profile.quantity("command_frequency")
+    reading = readings.get(parameter.code) if parameter is not None else None
+    if reading is None or reading.value is None:
+        return ""
+    return f"; the reference is {reading.value.display} now"
 
 
 async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | None) -> str:
@@ -28,13 +50,14 @@ async def run_at_reference(access: CommandAccess, id: OrderId, reference: str | 
     chart = await access.chart(id)
     if reference is not None:
         await give_reference(access, reference)
-    return await MotorStart(access).carry_out(chart, id)
+    done = await MotorStart(access).carry_out(chart, id)
+    return done if reference is None else f"{done}{_without_effect(access)}"
 
 
 async def give_reference(access: CommandAccess, text: str) -> str:
     """Write a reference as typed."""
     profile = access.session.profile
-    readings = await access.read(reference_codes(profile))
+    readings = await access.read([*reference_codes(profile), *channel_codes(profile)])
     return await _write_reference(access, parse_reference(profile, text, readings))
 
 
@@ -57,7 +80,16 @@ async def _write_reference(access: CommandAccess, reference: Reference) -> str:
     access.session.note_command()
     access.given.note_reference(reference)
     rounded = ", rounded to what the drive can hold" if reference.rounded else ""
-    return f"Reference {reference.text} ({reference.parameter.code}){rounded}"
+    without = _without_effect(access)
+    return f"Reference {reference.text} ({reference.parameter.code}){rounded}{without}"
+
+
+def _without_effect(access: CommandAccess) -> str:
+    """That a reference given from here changes nothing, where somebody else surely gives it."""
+    found = reference_channel(access.session.profile, access.raws)
+    if found is None or found.by_line is not False:
+        return ""
+    return f"; no effect from here: the reference comes from {found.text}"
 
 
 async def set_option(access: CommandAccess, option: CommandOption, bits: int) -> str:
@@ -67,8 +99,8 @@ async def set_option(access: CommandAccess, option: CommandOption, bits: int) ->
     reading = (await access.read([parameter.code]))[parameter.code]
     if reading.raw is None:
         raise OrderRefused(f"{parameter.code} cannot be read: {reading.error}")
-    running = {state.id for state in chart.states if state.kind in ("running", "stopping")}
-    if option.stopped_only and (await access.state(chart)).id in running:
+    await access.read([chart.status])
+    if option.stopped_only and state_of(chart, access.raws[chart.status]).kind in ENABLED_KINDS:
         raise OrderRefused(f"{option.name} is changed with the motor stopped only.")
     word = reading.raw & 0xFFFF & ~option.mask | bits
     await access.writer.write_parameter(

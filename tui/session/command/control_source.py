@@ -57,7 +57,7 @@ async def _at_rest(session: DriveSession) -> None:
         monitoring_codes(session.profile), priority=Priority.OPERATOR_READ
     )
     state = drive_state(session.profile, readings)
-    if state.kind in ("running", "stopping", "starting", "unknown"):
+    if state.motion in ("running", "stopping", "starting", "unknown"):
         raise OrderRefused(
             f"The control source is changed with the motor stopped only; now: {state.headline}."
         )

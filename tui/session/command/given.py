@@ -25,6 +25,10 @@ class GivenCommands:
         """A reference was given."""
         self._wanted = reference
 
+    def forget_reference(self) -> None:
+        """The drive has put it back: nothing may bring it anew."""
+        self._wanted = None
+
     def note_command(self, code: str, word: int) -> None:
         """A command word was written: it is watched from now on."""
         self._written, self._written_under = {code: word}, self._session.work.stops

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.drive.chart import read_chart
+from tui.drive.chart import ENABLED_KINDS, read_chart
+from tui.drive.held_back import IN_FAULT
 from tui.drive.orders import OrderRefused, choose, walk
 from tui.drive.profile.schema import Chart, Order, OrderId
 
@@ -35,7 +36,10 @@ class MotorStart:
         if not same:
             raise OrderRefused(f"The {chart.name} has no order {id!r}.")
         access = self.access
-        at_rest = (await access.state(chart)).kind not in ("running", "stopping")
+        state = await access.state(chart)
+        if state.kind == "fault":
+            raise OrderRefused(IN_FAULT)
+        at_rest = state.kind not in ENABLED_KINDS
         await record_start(self.session, "reverse" if id == "reverse" else "forward", access.permit)
         try:
             await self._write_reference_again()
@@ -100,8 +104,6 @@ class MotorStart:
         """From the state now to the running one, each state seen before the next command."""
         access = self.access
         state = await access.state(chart)
-        if state.kind == "fault":
-            raise OrderRefused("The drive is in fault: reset it first.")
         way = walk(chart, state.id, enabled)
         for goal, word in way:
             last = goal == enabled

@@ -101,7 +101,7 @@ class MotorStop:
         """What is surely held now: just read, or not to be changed since the motor has run."""
         session, image = self.session, self.session.image
         fresh, trusted = image.fresh(STATE_FRESH), image.trusted
-        turns = session.state(STATE_FRESH).kind in ("running", "stopping")
+        turns = session.state(STATE_FRESH).motion in ("running", "stopping")
         found = {}
         for code in codes:
             held = image.get(code)

@@ -10,6 +10,7 @@ from decimal import Decimal
 from tui.drive.errors import ValueRefused
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.taught_profile import reference_of
 from tui.drive.values import encode
 
 from ..reading import Reading
@@ -33,7 +34,41 @@ def reference_codes(profile: Profile) -> list[str]:
     """Codes of the words that a reference is checked against, and of the references."""
     wanted: tuple[Quantity, ...] = (*LIMITS, *SPEED_SOURCES, "command_frequency", "command_speed")
     found = (profile.quantity(quantity) for quantity in wanted)
-    return [parameter.code for parameter in found if parameter is not None]
+    codes = [parameter.code for parameter in found if parameter is not None]
+    return [*codes, *(limit.code for code in codes if (limit := taught_limit(profile, code)))]
+
+
+def taught_limit(profile: Profile, code: str) -> Parameter | None:
+    """The word with the highest reference that a taught one takes; None where it is in no unit.
+
+    It counts once it was taught too, in the unit of the reference.
+    """
+    way = reference_of(profile, code) if code in profile.taught else None
+    if way is None or way.most not in profile.taught:
+        return None
+    same = profile.taught[way.most].unit == profile.taught[code].unit
+    return profile[way.most] if same else None
+
+
+def no_place(profile: Profile, unit: str) -> str:
+    """Why a drive takes no reference in a unit from here, with the way out of that."""
+    other = "Hz" if unit == "rpm" else "rpm"
+    taken = profile.quantity("command_frequency" if unit == "rpm" else "command_speed")
+    if taken is not None and taken.code in profile.taught:
+        return f"{taken.code} was taught in {other}: write the reference like 900{other}."
+    text = f"Where {profile.name} takes a reference in {unit} is in no manual at hand"
+    ways = [one.parameter for one in profile.data.teachable_references]
+    if not ways:
+        return f"{text}; give it at the drive."
+    code = ways[0]
+    if code not in profile.taught:
+        return (
+            f"{text}. Give it at the drive, or teach {code}: L in the panel, or drivepanel teach."
+        )
+    return (
+        f"{text}. {code} was taught; R in the panel, or drivepanel teach {code} --reference, makes"
+        " it the reference."
+    )
 
 
 def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]) -> Reference:
@@ -49,17 +84,21 @@ def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]
     speed = (match[2] or "hz").casefold() != "hz"
     parameter = profile.quantity("command_speed" if speed else "command_frequency")
     if parameter is None:
-        raise ValueRefused(
-            f"Where {profile.name} takes a reference in {'rpm' if speed else 'Hz'} is in no"
-            " manual at hand; give it at the drive."
-        )
+        raise ValueRefused(no_place(profile, "rpm" if speed else "Hz"))
     if number < 0:
         raise ValueRefused("A reference is not negative; run reverse instead.")
     hertz = _hertz_of(profile, number, readings) if speed else number
     if hertz is not None:
         _check_limits(profile, hertz, readings)
+    if (limit := taught_limit(profile, parameter.code)) is not None:
+        _check_taught_limit(number, limit, readings)
     conversion = encode(parameter, str(number), profile.names(parameter), Decimal(parameter.scale))
     shown = conversion.raw * Decimal(parameter.scale)
+    taught = profile.taught.get(parameter.code)
+    if taught is not None and taught.number(conversion.raw) != shown:
+        raise ValueRefused(
+            f"{number:f} is past what is known of {parameter.code}: its sign is open."
+        )
     return Reference(parameter, conversion.raw, f"{shown:f} {parameter.unit}", conversion.rounded)
 
 
@@ -85,6 +124,18 @@ def _check_limits(profile: Profile, hertz: Decimal, readings: Mapping[str, Readi
         raise ValueRefused(
             f"{hertz:f} Hz is below {_code(profile, 'low_speed')} = {low:f} Hz: the drive would"
             " run at that."
+        )
+
+
+def _check_taught_limit(number: Decimal, limit: Parameter, readings: Mapping[str, Reading]) -> None:
+    """A highest reference that cannot be read holds nothing back: the drive has it anyway."""
+    reading = readings.get(limit.code)
+    value = reading.value if reading is not None else None
+    if value is None or value.number is None or not value.taught:
+        return
+    if number > abs(value.number):
+        raise ValueRefused(
+            f"{number:f} {value.unit} is above {limit.code} = {abs(value.number):f} {value.unit}."
         )
 
 

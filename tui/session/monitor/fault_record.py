@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 
+from tui.drive.hints import hint_markdown, reset_text
 from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
 
@@ -113,11 +114,15 @@ def _text(reading: Reading | None) -> str:
 
 
 def record_text(
-    session: DriveSession, record: FaultRecord, stored: Sequence[tuple[str, str, str]]
+    session: DriveSession,
+    record: FaultRecord,
+    stored: Sequence[tuple[str, str, str]],
+    values: Mapping[str, str] | None = None,
 ) -> str:
-    """A record as Markdown: the fault, what the drive stored, the values, the writes.
+    """A record as Markdown: the fault, what it points at, what the drive stored, values, writes.
 
-    `stored` is code, name and value of what the drive itself keeps of its last fault.
+    `stored` is code, name and value of what the drive itself keeps of its last fault, `values`
+    what parameters held when they were looked at, by code.
     """
     fault = record.fault
     name = (
@@ -134,6 +139,7 @@ def record_text(
     ]
     lines += [f"- Cause: {fault.cause}"] if fault and fault.cause else []
     lines += [f"- Remedy: {fault.remedy}"] if fault and fault.remedy else []
+    lines += _pointed_at(session, fault, values or {})
     if stored:
         lines += ["", "## Stored by the drive", "", "| code | name | value |", "|---|---|---|"]
         lines += [f"| {code} | {name} | {value} |" for code, name, value in stored]
@@ -151,6 +157,22 @@ def record_text(
         for e in record.writes
     ] or ["Nothing."]
     return "\n".join(lines) + "\n"
+
+
+def _pointed_at(
+    session: DriveSession, fault: FaultCode | None, values: Mapping[str, str]
+) -> list[str]:
+    """What the fault points at, where anything is known."""
+    help_ = session.profile.guide.fault(fault.raw if fault else None)
+    if help_ is None:
+        return []
+    told = hint_markdown(
+        session.profile,
+        help_,
+        lambda code: values.get(code, NOT_AVAILABLE),
+        reset_text(help_, None, "a fault reset").text,
+    )
+    return ["", "## What it points at", "", *told]
 
 
 def _clock(wall: float) -> str:

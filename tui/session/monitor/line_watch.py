@@ -13,6 +13,7 @@ from dataclasses import dataclass, field, replace
 
 from tui.bus.api import LineWorker, ModbusLine, Priority
 from tui.bus.errors import LineError
+from tui.drive.channel import channel_codes
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
@@ -100,7 +101,7 @@ class LineWatch:
     def _runs_by_the_line(self, kept: _Kept) -> bool:
         """Whether the motor runs by somebody's command over the line, whoever gave it."""
         state, _ = self._last_seen(kept)
-        return state is not None and state.kind == "running" and not state.local
+        return state is not None and state.motion == "running" and not state.local
 
     def left_alone(self) -> dict[int, TimeoutWatch]:
         """Drives that act on their communication time-out once nobody asks them, at rest too."""
@@ -130,7 +131,7 @@ class LineWatch:
     def runs(self, device: int) -> bool:
         """Whether a motor runs, as far as anybody saw it last."""
         state, _ = self._last_seen(self._kept[device])
-        return state is not None and state.kind == "running"
+        return state is not None and state.motion == "running"
 
     def _may_turn(self, kept: _Kept) -> bool:
         """Whether a motor runs, or may: not seen since the last order, or not understood."""
@@ -138,7 +139,7 @@ class LineWatch:
         ordered = kept.session.commanded_at
         if state is None or (ordered is not None and seen <= ordered):
             return True
-        return state.kind in MAY_TURN
+        return state.motion in MAY_TURN
 
     def _last_seen(self, kept: _Kept) -> tuple[DriveState | None, float]:
         """The newest state of a drive, by its own monitor or by a look; and when that was."""
@@ -242,8 +243,12 @@ class LineWatch:
         state, error, readings = None, "", {}
         try:
             codes = [*_state_codes(profile), *_glance_codes(profile), *unread_limit(kept.session)]
+            told = channel_codes(profile)
+            codes += [code for code in told if profile[code].access == "r"]
             readings = await kept.reader.read(codes, priority=Priority.POLL)
-            state = drive_state(profile, readings)
+            # settings are read with the time-out: another channel is set up at rest only
+            settings = {c: one for c in told if (one := kept.session.image.get(c)) is not None}
+            state = drive_state(profile, settings | readings)
         except LineError as fault:
             error = str(fault)
         watch = self._watch(kept)

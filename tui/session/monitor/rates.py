@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.drive.chart import watched_codes
+from tui.drive.chart import fault_code, watched_codes
 from tui.drive.profile.profile import Profile
 
 SLOW_FACTOR = 10
@@ -36,6 +36,8 @@ def rates_of(profile: Profile) -> Rates:
     changing = {profile.data.faults.parameter, *when} - {""}
     codes = monitoring_codes(profile)
     told = {code: rates.get(code, "on-change" if code in changing else "fast") for code in codes}
+    if code := fault_code(profile):
+        told[code] = "fast"  # it tells the state, and one that was reset must not stand beside it
     fast, change, slow = (
         tuple(code for code in codes if told[code] == rate)
         for rate in ("fast", "on-change", "slow")

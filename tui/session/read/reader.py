@@ -83,7 +83,7 @@ class Reader:
         image = self.session.image
         for code in status.intersection(codes):
             if (held := image.get(code)) is not None:
-                self.session.note_state(read_chart(self.profile, image.raws).kind, held.time)
+                self.session.note_state(read_chart(self.profile, image.raws).motion, held.time)
 
     def seconds(self, codes: Iterable[str]) -> float:
         """What reading these costs on the wire by plan, without retries."""

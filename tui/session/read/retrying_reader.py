@@ -97,9 +97,9 @@ class RetryingReader:
         return {code: one.raw for code, one in readings.items() if one.raw is not None}
 
     async def ask_state(self) -> StateKind:
-        """The kind of the drive's state now."""
+        """The kind of the drive's state now, for whoever needs a motor at rest."""
         profile = self.session.profile
         codes = [*watched_codes(profile), profile.data.faults.parameter]
         state = drive_state(profile, await self.ask(code for code in codes if code))
         self.headline = state.headline or state.kind
-        return state.kind
+        return state.motion

@@ -20,7 +20,7 @@ from tui.bus.errors import (
 from tui.drive.errors import DriveError
 from tui.drive.settings.dependence import builds_on
 from tui.drive.settings.edits import Edit, Edits
-from tui.drive.settings.limits import edit_problems, limit_pairs
+from tui.drive.settings.limits import edit_problems, limit_sources
 from tui.drive.settings.writable import cuts_line, option_code, waits_for_reset, write_refusal
 from tui.drive.settings.write_sequence import ordered
 from tui.drive.shown import shown
@@ -99,9 +99,7 @@ class _Work:
     async def look_at_all(self) -> None:
         """Read every parameter that the edits and their limits are about."""
         codes = {edit.code for edit in self.edits}
-        for low, high in limit_pairs(self.session.profile):
-            if {low, high} & codes:
-                codes |= {low, high}
+        codes |= limit_sources(self.session.profile, codes)
         await self.retrying.ask_many(self._with_sources(codes))
 
     def _with_sources(self, codes: Iterable[str]) -> list[str]:

@@ -78,13 +78,14 @@ class Editor:
             self.marks.favourites,
             self.marks.recent,
             self.other,
+            self.session.image.lacking,
         )
 
     @property
     def state(self) -> StateKind | None:
-        """The kind of the drive's state as it is watched; None while it is not known."""
+        """The kind of the drive's state as it is watched, by what its motor does; None: unknown."""
         state = self.watched()
-        return state.kind if state is not None else None
+        return state.motion if state is not None else None
 
     @property
     def busy(self) -> bool:

@@ -7,8 +7,10 @@ from collections.abc import Collection, Mapping
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import MemoryOrder
+from tui.drive.settings.factory import factory_is_sure, factory_sources, not_factory
 from tui.drive.settings.memory_orders import MemoryRefused, factory_order, save_order
 from tui.drive.settings.writable import AT_REST, is_setting, line_setting
+from tui.drive.shown import depends_on
 from tui.drive.values import from_words
 
 from ..drive import DriveSession
@@ -150,13 +152,20 @@ def _is_pending(order: MemoryOrder, raws: Mapping[str, int]) -> bool:
 async def _told(session: DriveSession, retrying: RetryingReader) -> str:
     """Which of the known factory settings the drive holds now."""
     profile = session.profile
-    wanted = {
-        p.code: p.factory
+    settings = [
+        p
         for p in profile.parameters
-        if p.factory is not None and is_setting(profile, p) and not line_setting(profile, p.code)
-    }
-    held = await retrying.ask_many(wanted)
-    other = [code for code, raw in held.items() if raw != wanted[code]]
+        if (p.factory is not None or p.factory_of is not None) and not p.set_by_drive
+        if is_setting(profile, p) and not line_setting(profile, p.code)
+    ]
+    sources = [code for p in settings for code in (*factory_sources(p), *depends_on(p))]
+    raws = await retrying.ask_many(dict.fromkeys([*(p.code for p in settings), *sources]))
+    held = [p for p in settings if p.code in raws]
+    other = [
+        p.code if factory_is_sure(p) else f"{p.code} ?"
+        for p in held
+        if not_factory(profile, p, raws, retrying.lacking)
+    ]
     text = f"{profile.name}: the factory settings are recalled in working memory"
     if not other:
         return f"{text}; {len(held)} settings were looked at."

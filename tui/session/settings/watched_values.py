@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from tui.bus.api import LineWorker, Priority
 from tui.bus.errors import LineError, NoAnswer
 from tui.drive.profile.schema import Parameter, StateKind
+from tui.drive.settings.factory import factory_sources
 from tui.drive.shown import scale_sources, shown
 from tui.drive.values import Value
 
@@ -94,7 +95,8 @@ class WatchedValues:
         profile = self.session.profile
         first = RetryingReader(self.session)
         later = RetryingReader(self.session, Priority.BACKGROUND)
-        rest = [*sorted(scale_sources(profile)), *readable_codes(profile)]
+        follow = {code for p in profile.parameters for code in factory_sources(p)}
+        rest = [*sorted(scale_sources(profile) | follow), *readable_codes(profile)]
         parts = iter(neighbours(profile, dict.fromkeys(rest)))
         waiting: list[tuple[str, ...]] = []
         while True:

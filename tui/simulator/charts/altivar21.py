@@ -11,8 +11,10 @@ from dataclasses import dataclass, replace
 from tui.drive.profile.schema import Parameter, Quantity
 
 from ..body import Body, Fallback
+from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
-from .altivar21_words import show_altivar21_words
+from .altivar21_inputs import FORCED_LOCAL, PRESET_INPUT, SECOND_REFERENCE, Altivar21Inputs
+from .altivar21_words import outputs, show_altivar21_words
 
 (PRESETS, RAMP_2, INJECTION, REVERSE, RUN, COAST, EMERGENCY, RESET, OWN_REFERENCE, OWN_COMMAND) = (
     0x0007,
@@ -65,6 +67,7 @@ class Altivar21Chart:
         self._latched = False
         """Whether the emergency stop is in force; a fault reset ends it."""
         self._target_hz = 0.0
+        self._inputs = Altivar21Inputs(body)
 
     def power_up(self) -> None:
         """Nothing is ordered by the line, nothing is latched."""
@@ -72,12 +75,26 @@ class Altivar21Chart:
         self._latched = False
         self._stop = Stop.RAMP
 
-    def terminal_order(self) -> None:
-        """A run order at the terminals acts as long as the line has not taken the command."""
+    def run(self, hz: float) -> None:
+        """Run by F, or R for the other direction, at a reference in Hz at VIA."""
+        self._inputs.run(hz)
+
+    def refer(self, hz: float) -> None:
+        """Change the reference at VIA, in Hz."""
+        self._inputs.refer(hz)
+
+    def halt(self) -> None:
+        """Open F and R."""
+        self._inputs.halt()
+
+    def follow(self) -> None:
+        """Look at the inputs: RES resets a fault."""
+        if self._inputs.resets():
+            self.reset_fault()
 
     def written(self, parameter: Parameter) -> None:
         """Follow a word that the line wrote."""
-        if parameter.quantity != "command_word":
+        if parameter is not self._body.parameter("command_word"):
             return
         word = self._word
         rising = word & ~self._last
@@ -87,10 +104,9 @@ class Altivar21Chart:
         if rising & RESET and self._sources().command:
             self.reset_fault()
 
-    @property
-    def emergency(self) -> bool:
-        """Whether an emergency stop was ordered that has not tripped the drive yet."""
-        return self._latched and self._body.fault is None
+    def raises(self) -> OwnFault | None:
+        """The fault of an emergency stop, which F603 makes stop as a silent line does."""
+        return OwnFault(EMERGENCY_FAULT, None) if self._latched else None
 
     @property
     def _word(self) -> int:
@@ -98,20 +114,31 @@ class Altivar21Chart:
 
     def _sources(self) -> Sources:
         word = self._word
+        if self._inputs.switched(FORCED_LOCAL):
+            return Sources(command=False, reference=False, preset=0)
         command = bool(word & OWN_COMMAND) or self._body.setting("CMOD", 0) == SERIAL_COMMAND
-        reference = bool(word & OWN_REFERENCE)
-        reference = reference or self._body.setting("FMOD", 1) == SERIAL_REFERENCE
-        return Sources(command, reference, word & PRESETS if command else 0)
+        chosen = self._body.setting("FMOD", 1)
+        if self._inputs.switched(SECOND_REFERENCE):
+            chosen = self._body.setting("F207", ANALOGUE_REFERENCE)
+        reference = bool(word & OWN_REFERENCE) or chosen == SERIAL_REFERENCE
+        wired = 1 if self._inputs.switched(PRESET_INPUT) else 0
+        return Sources(command, reference, word & PRESETS if command else wired)
 
     def trip(self, stop: Stop) -> None:
         """Stop the motor as the fault asks and show the fault."""
         self._stop = stop
 
     def reset_fault(self) -> None:
-        """Clear the fault if its cause is gone."""
+        """Clear the fault if its cause is gone; words in RAM go back to their first values.
+
+        With them go the priority bits: closed terminals command until the line takes over anew.
+        """
         fault = self._body.fault
         if fault is not None and not fault.persists:
             self._body.fault = None
+            self._body.registers.restore(volatile_only=True)
+            self._body.line_orders.forget()
+            self._last = 0
             self._latched = False
             self._stop = Stop.RAMP
 
@@ -128,18 +155,18 @@ class Altivar21Chart:
             return False
         if self._sources().command:
             return bool(self._word & RUN) and not self._word & COAST
-        return body.terminal_hz is not None
+        return self._inputs.run_ordered
 
     def _wanted(self) -> float:
         """The reference in Hz, signed by direction."""
         body = self._body
         sources = self._sources()
-        hz = body.terminal_hz or 0.0
+        hz = self._inputs.hz
         if sources.preset:
             hz = body.value(PRESET_QUANTITIES[sources.preset - 1], 5.0 * sources.preset)
         elif sources.reference:
             hz = self._line_reference()
-        reverse = sources.command and self._word & REVERSE
+        reverse = bool(self._word & REVERSE) if sources.command else self._inputs.reverse
         return -hz if reverse else hz
 
     def _line_reference(self) -> float:
@@ -208,8 +235,8 @@ class Altivar21Chart:
         body.show_raw("status_word_3", (1 << 12 | 1 << 13) if reached else 0)
         body.show_code("FE45", SERIAL_COMMAND if sources.command else 0)
         body.show_code("FE46", self._reference_source(sources))
-        body.show_code("FD06", 1 if body.terminal_hz is not None else 0)
-        body.show_code("FD07", self._outputs())
+        body.show_code("FD06", body.terminals.bits())
+        body.show_code("FD07", outputs(body))
         body.show("frequency_reference", abs(self._wanted()))
         body.show("ramp_output", abs(motor.frequency))
         body.show("output_frequency", abs(motor.frequency))
@@ -219,10 +246,6 @@ class Altivar21Chart:
             return PRESET_REFERENCE
         return SERIAL_REFERENCE if sources.reference else ANALOGUE_REFERENCE
 
-    def _outputs(self) -> int:
-        relay = self._body.setting("FA50", 0) & 1
-        return relay | (1 << 2 if self._body.fault else 0)
-
     def _status(self, alarms: int) -> int:
         body = self._body
         motor = body.motor
@@ -231,7 +254,8 @@ class Altivar21Chart:
         coast = remote and bool(self._word & COAST)
         ready = not fault and motor.mains > 0
         run = self._run_ordered() or motor.frequency != 0
-        reverse = motor.frequency < 0 or (remote and bool(self._word & REVERSE))
+        asked = bool(self._word & REVERSE) if remote else self._inputs.reverse
+        reverse = motor.frequency < 0 or asked
         marks = (
             (fault, 0),
             (fault, 1),

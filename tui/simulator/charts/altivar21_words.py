@@ -13,6 +13,18 @@ from ..body import Body
 
 ANALOGUE_FULL = 1023
 ANALOGUE_HZ = 50.0
+BY_LINE, BY_LINE_NEGATED = 38, 39
+"""Functions of an output that hand it to FA50, as it is or negated."""
+RELAY, FAULT_RELAY = 1 << 0, 1 << 2
+
+
+def outputs(body: Body) -> int:
+    """The outputs as FD07 shows them; RY follows FA50 where F130 hands it over."""
+    function, given = body.setting("F130", 0), body.setting("FA50", 0) & RELAY
+    relay = given if function == BY_LINE else 0
+    if function == BY_LINE_NEGATED:
+        relay = RELAY ^ given
+    return relay | (FAULT_RELAY if body.fault else 0)
 
 
 def show_altivar21_words(body: Body) -> None:
@@ -21,12 +33,12 @@ def show_altivar21_words(body: Body) -> None:
     rated = body.rating.current
     torque_current = motor.current * min(1.0, abs(motor.torque) / 100) if motor.energised else 0.0
     excitation = math.sqrt(max(0.0, motor.current**2 - torque_current**2))
-    reference = min(1.0, abs(body.terminal_hz or 0.0) / ANALOGUE_HZ)
     values: Mapping[str, float] = {
         "FE16": abs(motor.rotor),
         "FE20": 100 * torque_current / rated,
         "FE21": 100 * excitation / rated,
-        "FE35": ANALOGUE_FULL * reference,
+        "FE35": ANALOGUE_FULL * body.terminals.level("VIA"),
+        "FE36": ANALOGUE_FULL * body.terminals.level("VIB"),
         "FE76": motor.energy,
         "FE77": 0.93 * motor.energy,
     }

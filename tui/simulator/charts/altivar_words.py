@@ -9,7 +9,13 @@ from collections.abc import Mapping
 
 from ..body import Body
 from ..plant.motor import Stop
+from ..plant.terminals import FULL_VOLTS
+from .channels import ChannelsInForce, channel_bit, channel_marks
 
+INPUT_BITS = 0x003F
+"""Bits of IOLR that are inputs."""
+ANALOGUE_COUNTS = 1000
+"""Counts of AI1C in a volt."""
 VOLTAGES: Mapping[float, int] = {230.0: 4, 400.0: 6, 575.0: 8}
 """Raw values of VCAL on three phases, by the voltage of the motor in V."""
 
@@ -59,4 +65,25 @@ def show_altivar_words(body: Body, stop: Stop | None, *, disabled: bool, reached
         body.show_code("CNFS", 1)
         body.show_code("PPN", body.rating.poles // 2)
         body.show_code("VCAL", VOLTAGES.get(body.rating.voltage, 0))
-    body.show_code("IL1R", 1 if body.terminal_hz is not None else 0)
+    show_inputs(body)
+
+
+def show_inputs(body: Body) -> None:
+    """Put the inputs into IL1R or IOLR, and AI1C and its fellows (in mV)."""
+    body.show_code("IL1R", body.terminals.bits())
+    if outputs := body.registers.named("IOLR"):
+        kept = body.registers.present(outputs) & ~INPUT_BITS
+        body.registers.put(outputs, kept | (body.terminals.bits() & INPUT_BITS))
+    for name in body.terminals.names.analogue:
+        if analogue := body.registers.named(f"{name}C"):
+            volts = FULL_VOLTS * body.terminals.level(name)
+            body.registers.put(analogue, round(volts * ANALOGUE_COUNTS))
+
+
+def show_channels(body: Body, channels: ChannelsInForce, *, second_ramp: bool) -> None:
+    """Put the channels in force into CCC, CRC, LRS3 and LRS7."""
+    body.show_code("CCC", channel_bit(channels.command))
+    body.show_code("CRC", channel_bit(channels.reference))
+    third, seventh = channel_marks(channels, second_ramp=second_ramp)
+    body.show_code("LRS3", third)
+    body.show_code("LRS7", seventh)

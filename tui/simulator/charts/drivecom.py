@@ -11,153 +11,178 @@ from dataclasses import replace
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
+from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
-from ..rules import MODBUS_COMMAND, MODBUS_REFERENCE
-from .altivar_words import show_altivar_words
+from .channels import COPIES_COMMAND, COPIES_REFERENCE, ChannelPlace, ChannelsInForce
+from .drivecom_channels import DrivecomChannels
+from .drivecom_machine import DrivecomMachine
 from .drivecom_reference import DrivecomReference
-from .drivecom_states import TRANSITIONS, DrivecomCommand, DrivecomState, command_of
-from .drivecom_status import Appearance, extended_status_word, status_word
-from .io_profile import IoCommand, io_status, read_io_command
+from .drivecom_states import DrivecomCommand, DrivecomState, command_of
+from .drivecom_status import Appearance, show_drivecom
+from .drivecom_stops import commanded_stop, extended_command, external_fault, locked, stop_type
+from .io_profile import io_status
+from .line_command import LineCommand
+from .wiring import TerminalWiring
 
-FAULT_RESET, HALT, STOP_STT, INJECTION, FAST = (1 << bit for bit in (7, 8, 12, 13, 14))
-CMI_SECOND_RAMP, CMI_FAST, CMI_INJECTION, CMI_LOCKED = (1 << bit for bit in (4, 10, 11, 15))
-STT = {0: Stop.RAMP, 1: Stop.FAST, 2: Stop.FREEWHEEL, 3: Stop.INJECTION}
-IO_PROFILE, SEPARATE = 3, 2
+FAULT_RESET = 1 << 7
+CMI_SECOND_RAMP = 1 << 4
 DRIVECOM_REACHED_HZ = 0.1
-LINE, TERMINALS = 1 << 3, 1 << 0
-"""Channels in force, as CCC and CRC show them."""
-QSTD_LEAVES = 2
-COMMAND_BITS = 160
-"""Assignment of an input to bit 0 of the command word (RSF and others); bit 1 is one more."""
 
 
 class DrivecomChart:
-    """The chart of one drive."""
+    """The chart of one drive: who commands it, in which state it is, what its motor is told."""
 
     def __init__(self, body: Body) -> None:
         self._body = body
-        self.state = DrivecomState.DISABLED
-        self._network = False
-        """Whether the command word of the line is in force."""
-        self._leaving = False
-        """Whether a Disable operation waits for the motor to stop."""
-        self._stop = Stop.RAMP
-        self._last_command = 0
-        self._io = IoCommand()
-        self._target_hz = 0.0
+        self._machine = DrivecomMachine(body)
+        self._command = LineCommand(body)
         self._reference = DrivecomReference(body)
+        self._channels = DrivecomChannels(body)
+        self._wiring = TerminalWiring(body)
+        self._target_hz = 0.0
+        self._resets = False
+        """Whether the assigned fault reset was given at the last look."""
 
     # Orders from outside
 
     def power_up(self) -> None:
         """Start the chart: disabled, or enabled by itself below access level L3."""
-        self._network = self._leaving = False
-        self._last_command = 0
-        self._io = IoCommand()
-        self.state = DrivecomState.ENABLED if self._by_terminals() else DrivecomState.DISABLED
+        self._command.clear()
+        self._channels.power_up()
+        self._wiring.renew()
+        self._machine.start(enabled=self._channels.low_access)
+        self.follow()
 
-    def _by_terminals(self) -> bool:
-        return self._body.traits.access_levels and self._body.setting("LAC", 2) < 2
+    def run(self, hz: float) -> None:
+        """Run by the inputs where they command, else as another master ordered before."""
+        if self._channels.now.command is ChannelPlace.TERMINALS:
+            self._body.terminals.close("LI2" if hz < 0 else "LI1")
+        else:
+            self._command.enable(reverse=hz < 0)
+            self._machine.enable()
+        self._refer(hz)
+        self.follow()
 
-    def _io_profile(self) -> bool:
-        return self._body.setting("CHCF", 1) == IO_PROFILE
+    def refer(self, hz: float) -> None:
+        """Change the reference from outside, unless the line has given one since."""
+        if self._channels.now.reference is ChannelPlace.TERMINALS or self._reference.is_earlier:
+            self._refer(hz)
 
-    def terminal_order(self) -> None:
-        """Take a run order at the terminals into account."""
-        if self._body.fault is None:
-            self._network = self._leaving = False
-            self.state = DrivecomState.ENABLED
+    def _refer(self, hz: float) -> None:
+        if self._channels.now.reference is ChannelPlace.TERMINALS:
+            self._reference.wire(self._channels.now, abs(hz))
+        else:
+            self._reference.leave(abs(hz))
+
+    def halt(self) -> None:
+        """Open the inputs that run it, and end what another master ordered."""
+        for name in ("LI1", "LI2"):
+            self._body.terminals.close(name, closed=False)
+        self._body.earlier_hz = None
+        self.follow()
+        if self._by_line:
+            self._command.let_go()
+            if not self._command.is_io:
+                self._machine.leave()
+
+    def follow(self) -> None:
+        """Look at the inputs and at what they switch."""
+        self._wiring.follow()
+        before, now = self._channels.follow()
+        self._body.forced_local = now.local
+        if before.reference_2 != now.reference_2:
+            self._copy_reference(before, now)
+        if before.command is not now.command:
+            self._change_channel(before, now)
+        reset = self._channels.is_on(self._body.setting("RSF", 0))
+        if reset and not self._resets:
+            self.reset_fault()
+        self._resets = reset
+        if self._wired_run():
+            self._machine.enable()
+
+    def _copy_reference(self, before: ChannelsInForce, now: ChannelsInForce) -> None:
+        copies = self._body.setting("COP", 0) in COPIES_REFERENCE
+        if copies and self._copies(to_2=now.reference_2) and now.reference is ChannelPlace.LINE:
+            self._reference.leave(abs(self._wanted(before)))
+
+    def _copies(self, *, to_2: bool) -> bool:
+        """Channel 1 is copied to channel 2, in the I/O profile the other way too."""
+        return to_2 or self._command.is_io
+
+    def _change_channel(self, before: ChannelsInForce, now: ChannelsInForce) -> None:
+        """Another channel commands: what it orders holds from now on, or what was copied to it."""
+        running = self._ordered(before)
+        self._machine.leaving = False
+        self._command.let_go()
+        if now.command is ChannelPlace.TERMINALS:
+            self._wiring.renew()
+            self._wiring.follow()
+        if now.command is not ChannelPlace.LINE:
+            return
+        copies = self._body.setting("COP", 0) in COPIES_COMMAND
+        if copies and running and self._copies(to_2=now.command_2):
+            self._command.enable(reverse=self._body.motor.frequency < 0)
+            self._machine.enable()
+            return
+        self._command.adopt()
+        if not self._command.is_io:
+            self._obey(command_of(self._command.word))
+
+    def _ordered(self, channels: ChannelsInForce) -> bool:
+        """Whether the motor was ordered to run under these channels."""
+        if channels.command is ChannelPlace.TERMINALS:
+            return self._wiring.order.run
+        return self._machine.state is DrivecomState.ENABLED and not self._stopping()
 
     def written(self, parameter: Parameter) -> None:
         """Follow a word that the line wrote."""
-        if parameter.quantity == "command_word":
-            self._command(self._body.registers.present(parameter) & 0xFFFF)
-        elif (
-            self._body.traits.config_disables
-            and parameter.access == "rw-stopped"
-            and self.state in (DrivecomState.READY, DrivecomState.SWITCHED_ON)
-        ):
-            self.state = DrivecomState.DISABLED
+        if parameter is self._body.parameter("command_word"):
+            self._take(self._body.registers.present(parameter) & 0xFFFF)
+        elif parameter.access == "rw-stopped":
+            self._machine.reconfigured()
+        self.follow()
 
-    def _command(self, word: int) -> None:
-        rising = word & ~self._last_command
-        self._last_command = word
-        if not self.network_commands:
+    def _take(self, word: int) -> None:
+        self._channels.line_spoke = True
+        self.follow()
+        rising = self._command.take(word, in_force=self._by_line)
+        if not self._by_line or self._command.is_io:
             return
-        self._network = True
-        if self._io_profile():
-            self._io = read_io_command(self._io, word, rising, self._body.setting("TCC", 0))
-            reset_bit = self._body.setting("RSF", 0) - COMMAND_BITS
-            if 0 <= reset_bit <= 15 and rising >> reset_bit & 1:
-                self.reset_fault()
-        elif self.state is DrivecomState.FAULT:
-            if rising & FAULT_RESET:
-                self.reset_fault()
-        elif self.state is not DrivecomState.REACTION:
+        if rising & FAULT_RESET and self._machine.faulty:
+            self.reset_fault()
+        elif not self._machine.faulty:
             command = command_of(word)
             if command is not DrivecomCommand.ENABLE:
-                self._body.terminal_hz = None
-            self._move(command)
+                self._body.earlier_hz = None
+            self._obey(command)
 
-    def _move(self, command: DrivecomCommand | None) -> None:
-        self._leaving = False
-        if command is None:
-            return
-        if self.state is DrivecomState.ENABLED and command is DrivecomCommand.SWITCH_ON:
-            self._disable_operation()
-        elif command is DrivecomCommand.ENABLE and self._enables_from_here():
-            self.state = DrivecomState.ENABLED
-        elif target := TRANSITIONS.get((self.state, command)):
-            self.state = target
-
-    def _disable_operation(self) -> None:
-        """Stop as DOTD or the normal stop type says, then go to Switched on."""
-        freewheel_set = self._body.setting("DOTD", 1) == 0
-        self._stop = Stop.FREEWHEEL if freewheel_set else self._stop_type()
-        self._leaving = self._stop is not Stop.FREEWHEEL
-        if not self._leaving:
-            self.state = DrivecomState.SWITCHED_ON
-
-    def _enables_from_here(self) -> bool:
-        if self.state is DrivecomState.READY:
-            return self._body.traits.enable_from_ready
-        return self.state is DrivecomState.DISABLED and self._by_terminals()
+    def _obey(self, command: DrivecomCommand | None) -> None:
+        self._machine.obey(command, low_access=self._channels.low_access)
 
     @property
-    def network_commands(self) -> bool:
+    def _by_line(self) -> bool:
         """Whether the command channel is the line."""
-        if self._by_terminals():
-            return True
-        body = self._body
-        if self._combined:
-            return body.setting("FR1", MODBUS_REFERENCE) == MODBUS_REFERENCE
-        return body.setting("CD1", MODBUS_COMMAND) == MODBUS_COMMAND
+        return self._channels.now.command is ChannelPlace.LINE
 
-    @property
-    def network_reference(self) -> bool:
-        """Whether the reference channel is the line."""
-        channel = self._body.setting("FR1", MODBUS_REFERENCE)
-        return self._by_terminals() or channel == MODBUS_REFERENCE
-
-    @property
-    def _combined(self) -> bool:
-        return self._body.setting("CHCF", 1) < SEPARATE
+    def raises(self) -> OwnFault | None:
+        """The external fault, for as long as CMI bit 3 or the input of ETF reports it."""
+        return external_fault(self._body, self._channels.is_on)
 
     def trip(self, stop: Stop) -> None:
-        """Go to Fault, over the fault reaction where the motor is stopped first."""
-        slow = stop is not Stop.FREEWHEEL and self._body.turning
-        self.state = DrivecomState.REACTION if slow else DrivecomState.FAULT
-        self._stop = stop
-        self._leaving = False
-        self._io = IoCommand()
+        """Go to Fault; the inputs stay as they are."""
+        self._machine.trip(stop)
+        self._command.let_go()
 
     def reset_fault(self) -> None:
-        """Leave Fault if its cause is gone; nothing runs by itself afterwards."""
-        if self.state is DrivecomState.FAULT and self._body.fault and not self._body.fault.persists:
+        """Leave Fault if its cause is gone; the line must command anew, closed inputs run on."""
+        fault = self._body.fault
+        if self._machine.state is DrivecomState.FAULT and fault and not fault.persists:
             self._body.fault = None
-            self._body.terminal_hz = None
-            self.state = DrivecomState.ENABLED if self._by_terminals() else DrivecomState.DISABLED
-            self._network = self._network and self.state is DrivecomState.DISABLED
+            self._body.earlier_hz = None
+            self._wiring.renew()
+            self._channels.line_spoke = False
+            self._machine.start(enabled=self._channels.low_access)
 
     @property
     def running(self) -> bool:
@@ -169,138 +194,101 @@ class DrivecomChart:
     def order(self) -> MotorDemand:
         """What the motor has to do now."""
         body = self._body
-        self._settle()
+        self.follow()
+        if self._stands:
+            self._machine.stands(holds=self._holds())
         stop = self._stopping()
         up, down = body.rates(stop or Stop.RAMP, second=self._second_ramp())
         base = MotorDemand(acceleration=up, deceleration=down)
-        if self._cmi & CMI_LOCKED or not self._powered():
-            return base
-        if stop is Stop.FREEWHEEL:
+        if locked(body, stands=self._stands) or not self._powered() or stop is Stop.FREEWHEEL:
             return base
         if stop is Stop.INJECTION:
             return replace(base, injection=True)
         self._target_hz = 0.0 if stop else self._reference.target(self._wanted())
         return replace(base, energised=True, target=self._target_hz)
 
-    def _settle(self) -> None:
-        """Transitions that the drive makes by itself once the motor stands."""
-        body = self._body
-        stands = self._stands
-        if self.state is DrivecomState.REACTION and stands:
-            self.state = DrivecomState.FAULT
-        elif self._leaving and stands:
-            self._leaving = False
-            self.state = DrivecomState.SWITCHED_ON
-        elif self.state is DrivecomState.QUICK_STOP and stands:
-            if body.setting("QSTD", 6) == QSTD_LEAVES:
-                self.state = DrivecomState.DISABLED
-        elif self.state is DrivecomState.ENABLED and self._terminals_ended() and stands:
-            self.state = DrivecomState.DISABLED
+    def _holds(self) -> bool:
+        """Whether the drive stays enabled at standstill."""
+        return self._by_line or self._channels.low_access or self._wired_run()
+
+    def _wired_run(self) -> bool:
+        terminals = self._channels.now.command is ChannelPlace.TERMINALS
+        return terminals and self._wiring.order.run
 
     @property
     def _stands(self) -> bool:
         return not self._body.motor.frequency and not self._body.motor.rotor
 
-    def _terminals_ended(self) -> bool:
-        own = self._network or self._by_terminals() or self._io_profile()
-        return not own and self._body.terminal_hz is None
-
     def _powered(self) -> bool:
-        if self.state in (DrivecomState.QUICK_STOP, DrivecomState.REACTION):
+        state = self._machine.state
+        if state in (DrivecomState.QUICK_STOP, DrivecomState.REACTION):
             return not self._stands
-        if self.state is not DrivecomState.ENABLED and not self._io_powered():
+        turning = self._body.motor.frequency != 0
+        if self._by_line and self._command.is_io:
+            return self._body.fault is None and (self._command.io.run or turning)
+        if state is not DrivecomState.ENABLED:
             return False
-        if self.state is DrivecomState.ENABLED and not self._network:
-            turning = self._body.motor.frequency != 0
-            return self._body.terminal_hz is not None or turning
-        return True
-
-    def _io_powered(self) -> bool:
-        going = self._io.run or self._body.motor.frequency != 0
-        return self._io_profile() and self._network and self._body.fault is None and going
+        return self._by_line or self._wired_run() or turning
 
     def _stopping(self) -> Stop | None:
         """How the motor is being stopped; None while it follows its reference."""
-        if self.state is DrivecomState.QUICK_STOP:
-            return Stop.FAST
-        if self.state is DrivecomState.REACTION or self._leaving:
-            return self._stop
+        if by_state := self._machine.stopping():
+            return by_state
         if self._body.fallback is Fallback.STOP:
-            return self._stop_type()
-        if not self._network:
-            return None if self._body.terminal_hz is not None else Stop.RAMP
-        if self._io_profile():
-            return None if self._io.run else self._stop_type()
-        return self._commanded_stop()
-
-    def _commanded_stop(self) -> Stop | None:
-        word, cmi = self._last_command, self._cmi
-        low_access = self._by_terminals()
-        compact = self._body.traits.access_levels
-        orders = (
-            (bool(cmi & CMI_FAST) and not compact, Stop.FAST),
-            (bool(cmi & CMI_INJECTION) and not compact, Stop.INJECTION),
-            (bool(word & FAST) and low_access, Stop.FAST),
-            (bool(word & INJECTION) and low_access, Stop.INJECTION),
-            (bool(word & HALT) and not compact, self._stop_type()),
-            (bool(word & STOP_STT) and compact, self._stop_type()),
-        )
-        return next((stop for given, stop in orders if given), None)
-
-    def _stop_type(self) -> Stop:
-        return STT.get(self._body.setting("STT", 0), Stop.RAMP)
+            return stop_type(self._body)
+        if wired := self._wiring.stop():
+            return wired
+        if not self._by_line:
+            return None if self._wired_run() else stop_type(self._body)
+        if self._command.is_io:
+            return None if self._command.io.run else stop_type(self._body)
+        low = self._channels.low_access
+        return commanded_stop(self._body, self._command.word, low_access=low)
 
     def _second_ramp(self) -> bool:
-        return bool(self._cmi & CMI_SECOND_RAMP) and self._body.traits.access_levels
+        second = bool(extended_command(self._body) & CMI_SECOND_RAMP)
+        return second and self._body.traits.access_levels
 
-    @property
-    def _cmi(self) -> int:
-        return self._body.raw("extended_command_word") & 0xFFFF
-
-    def _wanted(self) -> float:
-        """The signed reference in Hz before LSP and HSP."""
-        if not self._network:
-            return self._reference.by_terminals()
-        io = self._io if self._io_profile() else None
-        return self._reference.by_line(self._last_command, io, channel=self.network_reference)
+    def _wanted(self, channels: ChannelsInForce | None = None) -> float:
+        """The signed reference in Hz before LSP and HSP, under the channels in force or others."""
+        channels = channels or self._channels.now
+        hz = self._reference.size(channels)
+        if channels.command is ChannelPlace.LINE:
+            reverse = self._command.reverse != self._reference.turned_over(self._command.is_io)
+        else:
+            reverse = self._wiring.order.reverse
+        return -hz if reverse else hz
 
     # What the line is shown
 
     def show(self) -> None:
         """Put the words of the present state into their registers."""
         body = self._body
-        motor = body.motor
         seen = self._appearance()
-        body.show_raw("status_word", status_word(body, seen))
-        body.show_raw("extended_status_word", extended_status_word(body, seen))
-        body.show_code("CCC", LINE if seen.line_commands else TERMINALS)
-        by_line = seen.line_commands and self.network_reference
-        body.show_code("CRC", LINE if by_line else TERMINALS)
-        shown = self._target_hz if motor.energised else seen.wanted
-        body.show("frequency_reference", shown)
-        body.show("speed_reference", shown * 120 / self._reference.poles)
+        shown = self._target_hz if body.motor.energised else seen.wanted
         if frequency := body.parameter("output_frequency"):
             count = self._reference.hz_per_count(frequency)
-            body.registers.put(frequency, round(motor.frequency / count))
-        disabled = self.state is DrivecomState.DISABLED and not self._io_profile()
-        show_altivar_words(body, seen.stop, disabled=disabled, reached=seen.reached)
+            body.registers.put(frequency, round(body.motor.frequency / count))
+        body.show("frequency_reference", shown)
+        body.show("speed_reference", shown * 120 / self._reference.poles)
+        show_drivecom(body, seen)
 
     def _appearance(self) -> Appearance:
         body = self._body
         motor = body.motor
         going = motor.energised and self._powered()
         wanted = self._wanted()
-        bits = self.state.value
-        if self._io_profile():
+        bits = self._machine.state.value
+        if self._command.is_io:
             bits = io_status(fault=body.fault is not None, running=body.turning)
         return Appearance(
             state_bits=bits,
-            network=self._network,
-            line_commands=self._network or (self.network_commands and body.terminal_hz is None),
+            channels=self._channels.now,
             going=going,
             reached=going and abs(motor.frequency - self._target_hz) < DRIVECOM_REACHED_HZ,
             wanted=wanted,
             outside=self._reference.outside(wanted),
             stop=self._stopping(),
-            locked=bool(self._cmi & CMI_LOCKED),
+            disabled=self._machine.state is DrivecomState.DISABLED and not self._command.is_io,
+            second_ramp=self._second_ramp(),
         )

@@ -1,6 +1,6 @@
 """The reference of the Altivar 31, 312 and 71: which word counts, its sign and its limits.
 
-Source: ATV71 communication parameters guide (LFR, LFRD, CMD bit 11, CMI bits 9 and 12); ATV312
+Source: ATV71 communication parameters guide (LFR, LFRD, CMI bits 9 and 12); ATV312
 communication variables, high resolution.
 """
 
@@ -9,9 +9,8 @@ from __future__ import annotations
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
-from .io_profile import IoCommand
+from .channels import ChannelPlace, ChannelsInForce
 
-CMD_REVERSE = 1 << 11
 CMI_HIGH_RESOLUTION, CMI_REVERSE = 1 << 9, 1 << 12
 FULL_COUNT = 32767
 UNLIMITED = 1e9
@@ -33,25 +32,43 @@ class DrivecomReference:
             return body.motor.frequency
         return self.cut(wanted)
 
-    def by_terminals(self) -> float:
-        """The reference at the terminals, in Hz."""
-        return self._body.terminal_hz or 0.0
+    def size(self, channels: ChannelsInForce) -> float:
+        """The reference in Hz that the channel in force gives, before its limits.
 
-    def by_line(self, word: int, io: IoCommand | None, *, channel: bool) -> float:
-        """The signed reference in Hz under a command word of the line, before its limits.
-
-        `io` is the order of the I/O profile where that is in force; without the reference
-        `channel` the terminals still give the size.
+        From the line it may be negative; 0 from a channel that nothing is simulated of.
         """
-        hz = self._written() if channel else None
-        if hz is None:
-            hz = self.by_terminals()
-        reverse = bool(word & CMD_REVERSE)
-        if io is not None:
-            reverse = io.reverse
-        elif not self._body.traits.access_levels and self._cmi & CMI_REVERSE:
-            reverse = not reverse
-        return -hz if reverse else hz
+        if channels.reference is ChannelPlace.LINE:
+            hz = self._written()
+            return (self._body.earlier_hz or 0.0) if hz is None else hz
+        if channels.reference is ChannelPlace.TERMINALS:
+            low, high = self.limits()
+            return low + self._body.terminals.level(f"AI{channels.input}") * (high - low)
+        return 0.0
+
+    def wire(self, channels: ChannelsInForce, hz: float) -> None:
+        """Put the analogue input of a channel to what gives this reference in Hz."""
+        low, high = self.limits()
+        part = (hz - low) / (high - low) if high > low else 0.0
+        self._body.terminals.apply(f"AI{channels.input}", part)
+
+    @property
+    def is_earlier(self) -> bool:
+        """Whether the line's reference is still what another master left there."""
+        return self._body.earlier_hz is not None and self._written() is None
+
+    def leave(self, hz: float) -> None:
+        """Put a reference in Hz into the line's word, as another master or a copy does."""
+        self._body.earlier_hz = hz
+        if frequency := self._body.parameter("command_frequency"):
+            count = self.hz_per_count(frequency)
+            self._body.registers.put(frequency, round(hz / count))
+            self._body.line_orders.take_back(frequency, self._body.parameter("command_speed"))
+
+    def turned_over(self, is_io: bool) -> bool:
+        """Whether CMI bit 12 turns the direction of the command word over (ATV71, Drivecom)."""
+        if is_io or self._body.traits.access_levels:
+            return False
+        return bool(self._cmi & CMI_REVERSE)
 
     def _written(self) -> float | None:
         """The later written of frequency and speed reference, in Hz; None if none was."""

@@ -1,4 +1,4 @@
-"""Status word and extended status word of the Altivar 31, 312 and 71, as pure functions.
+"""Status word and extended status word of the Altivar 31, 312 and 71, and who shows them.
 
 Sources: ATV71 communication parameters list (ETA, ETI); ATV312 communication variables.
 """
@@ -9,6 +9,9 @@ from dataclasses import dataclass
 
 from ..body import Body
 from ..plant.motor import Stop
+from .altivar_words import show_altivar_words, show_channels
+from .channels import ChannelsInForce, extended_status_bits
+from .drivecom_stops import CMI_LOCKED, extended_command
 
 WARM_MOTOR = 100.0
 
@@ -18,10 +21,7 @@ class Appearance:
     """What a chart tells about itself."""
 
     state_bits: int
-    network: bool
-    """The command word of the line is in force."""
-    line_commands: bool
-    """The line has, or would have, the command."""
+    channels: ChannelsInForce
     going: bool
     """The motor is supplied."""
     reached: bool
@@ -29,7 +29,8 @@ class Appearance:
     """Signed reference in Hz."""
     outside: bool
     stop: Stop | None
-    locked: bool
+    disabled: bool
+    second_ramp: bool
 
 
 def status_word(body: Body, seen: Appearance) -> int:
@@ -38,7 +39,7 @@ def status_word(body: Body, seen: Appearance) -> int:
     marks = (
         (body.traits.power_bit and motor.mains > 0, 4),
         (body.alarms != 0 or motor.motor_thermal >= WARM_MOTOR, 7),
-        (body.traits.remote_always or seen.line_commands, 9),
+        (_remote(body, seen.channels), 9),
         (seen.reached, 10),
         (seen.going and seen.outside, 11),
         (motor.frequency < 0, 15),
@@ -46,14 +47,22 @@ def status_word(body: Body, seen: Appearance) -> int:
     return seen.state_bits | sum(1 << bit for given, bit in marks if given)
 
 
+def _remote(body: Body, channels: ChannelsInForce) -> bool:
+    """Bit 9: no forced local (ATV31/312); command or reference by a network (ATV71)."""
+    if body.traits.remote_always:
+        return not channels.local
+    return channels.command.network or channels.reference.network
+
+
 def extended_status_word(body: Body, seen: Appearance) -> int:
     """The extended status word ETI."""
     motor = body.motor
     change = motor.acceleration * (1 if motor.frequency >= 0 else -1)
     fault = body.fault
+    shows_display, shows_line = extended_status_bits(seen.channels.command)
     marks = (
         (body.saving > 0, 0),
-        (not seen.locked, 1),
+        (not extended_command(body) & CMI_LOCKED, 1),
         (fault is not None and not fault.persists, 2),
         (motor.frequency != 0 if body.traits.running_bit else True, 4),
         (motor.braking, 5),
@@ -62,7 +71,16 @@ def extended_status_word(body: Body, seen: Appearance) -> int:
         (change > 0, 9),
         (change < 0, 10),
         (seen.stop is Stop.FAST and motor.frequency != 0, 12),
-        (seen.network, 14),
+        (shows_display, 13),
+        (shows_line, 14),
         (seen.wanted < 0, 15),
     )
     return sum(1 << bit for given, bit in marks if given)
+
+
+def show_drivecom(body: Body, seen: Appearance) -> None:
+    """Put the status words, the channels and the further words into their registers."""
+    body.show_raw("status_word", status_word(body, seen))
+    body.show_raw("extended_status_word", extended_status_word(body, seen))
+    show_channels(body, seen.channels, second_ramp=seen.second_ramp)
+    show_altivar_words(body, seen.stop, disabled=seen.disabled, reached=seen.reached)

@@ -1,7 +1,9 @@
 """Control word 6.42, status word 10.40 and their bit parameters on Leroy-Somer drives.
 
 Source: PX-MODBUS manual 5.5. With 6.43 = 1 the control word commands and the terminals do not;
-the manual names no reference register, so the reference stays that of the terminals.
+the manual names no reference register, so the reference stays that of the terminals, until bit 8
+(1.42) chooses the first preset. That this is 1.21, in rpm of a motor with 4 poles and at most
+1.06, is general knowledge of the menus.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ from dataclasses import replace
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
+from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
 
 CONTROL_WORD, CONTROL_ON, STATUS_WORD = "6.42", "6.43", "10.40"
@@ -28,9 +31,15 @@ BIT_PARAMETERS: Mapping[int, str] = {
 UNLOCKED, FORWARD, JOG, BACKWARD, CHANGE_WAY, RUN, RESET = (1 << b for b in (0, 1, 2, 3, 4, 5, 13))
 RUNNING_ORDERS = FORWARD | JOG | BACKWARD | RUN
 DEFAULT_HZ = 30.0
+"""Analogue reference of a drive whose inputs nobody has set, in Hz."""
+LEROY_FULL_HZ = 50.0
+"""Full scale of the analogue reference, in Hz; the manual gives none."""
 JOG_HZ = 5.0
 LEROY_REACHED_HZ = 0.1
 MAINS_LOSS_BIT = 14
+PRESET_CHOSEN = 1 << 8
+PRESET, MOST = "1.21", "1.06"
+RPM_PER_HZ = 30
 
 
 class LeroySomerChart:
@@ -41,15 +50,34 @@ class LeroySomerChart:
         self._stop = Stop.RAMP
         self._last = 0
         self._target_hz = 0.0
-        self.reference_hz = DEFAULT_HZ
-        """Analogue reference at the terminals, in Hz."""
+        self._pressed = False
+        """Whether RESET was closed at the last look."""
+        body.terminals.apply("AI1", DEFAULT_HZ / LEROY_FULL_HZ)
 
     def power_up(self) -> None:
         """Nothing is ordered by the line."""
         self._last = 0
 
-    def terminal_order(self) -> None:
-        """A run order at the terminals acts while the control word is off."""
+    def run(self, hz: float) -> None:
+        """Close the run input, at a reference in Hz; it acts while the control word is off."""
+        self._body.terminals.close("REV" if hz < 0 else "RUN")
+        self.refer(hz)
+
+    def refer(self, hz: float) -> None:
+        """Change the analogue reference at the terminals, in Hz."""
+        self._body.terminals.apply("AI1", abs(hz) / LEROY_FULL_HZ)
+
+    def halt(self) -> None:
+        """Open the run inputs."""
+        for name in ("RUN", "REV"):
+            self._body.terminals.close(name, closed=False)
+
+    def follow(self) -> None:
+        """Look at the inputs: RESET resets a fault."""
+        pressed = self._body.terminals.closed("RESET")
+        if pressed and not self._pressed:
+            self.reset_fault()
+        self._pressed = pressed
 
     def written(self, parameter: Parameter) -> None:
         """Follow a word that the line wrote: the control word moves its bit parameters."""
@@ -73,8 +101,9 @@ class LeroySomerChart:
             return self._body.setting(CONTROL_WORD, 0) & 0xFFFF
         given = self._body.setting
         bits = sum(1 << bit for bit, code in BIT_PARAMETERS.items() if given(code, 0))
-        if self._body.terminal_hz is not None:
-            bits |= UNLOCKED | (FORWARD if self._body.terminal_hz >= 0 else BACKWARD)
+        closed = self._body.terminals.closed
+        if closed("RUN") or closed("REV"):
+            bits |= UNLOCKED | (FORWARD if closed("RUN") else BACKWARD)
         return bits
 
     @property
@@ -87,10 +116,14 @@ class LeroySomerChart:
         self._stop = stop
 
     def reset_fault(self) -> None:
-        """Clear the fault if its cause is gone; a run order must be given anew."""
+        """Clear the fault if its cause is gone; a run input that is closed starts it again."""
         fault = self._body.fault
         if fault is not None and not fault.persists:
             self._body.fault = None
+
+    def raises(self) -> OwnFault | None:
+        """No word and no input of this family makes a fault."""
+        return None
 
     def order(self) -> MotorDemand:
         """What the motor has to do now."""
@@ -107,8 +140,10 @@ class LeroySomerChart:
         return replace(base, energised=energised, target=self._target_hz)
 
     def _wanted(self, bits: int) -> float:
-        given = self._body.terminal_hz
-        hz = abs(self.reference_hz if given is None else given)
+        hz = LEROY_FULL_HZ * self._body.terminals.level("AI1")
+        if bits & PRESET_CHOSEN and self._body.registers.named(PRESET) is not None:
+            most = _signed(self._body.setting(MOST, 0)) or 0x7FFF
+            hz = min(abs(_signed(self._body.setting(PRESET, 0))), most) / RPM_PER_HZ
         hz = min(hz, self._body.value("max_frequency", 1e9) or 1e9)
         if bits & JOG and not bits & (FORWARD | BACKWARD | RUN):
             return JOG_HZ
@@ -151,3 +186,8 @@ class LeroySomerChart:
     @property
     def _knows_mains_loss(self) -> bool:
         return self._body.registers.named("10.15") is not None
+
+
+def _signed(word: int) -> int:
+    """A word as a number with a sign."""
+    return word - 0x10000 if word >= 0x8000 else word

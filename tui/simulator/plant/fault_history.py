@@ -2,11 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from tui.drive.profile.profile import Profile
 
 from ..body import ActiveFault, Body
 from ..errors import SimulatorError
 from .fault_records import FaultRecords
+from .motor import Stop
+
+
+@dataclass(frozen=True, slots=True)
+class OwnFault:
+    """A fault that a word or an input makes the drive have, and how it stops then."""
+
+    raw: int
+    stop: Stop | None
+    """None: as the reaction to a silent line says."""
+    persists: bool = False
+    """Whether no reset helps for as long as it is raised."""
 
 
 def fault_raw(profile: Profile, fault: str | int) -> int:

@@ -7,6 +7,7 @@ from decimal import ROUND_HALF_UP, Decimal
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.settings.multiple import counts_of
 from tui.drive.values import is_enumeration, raw_range, type_range
 
 from .motor import RatingPlate
@@ -29,6 +30,11 @@ def first_values(
         if raw is None and parameter.quantity in plate:
             raw = to_raw(profile, parameter, plate[parameter.quantity])
         values[parameter.code] = _lowest(profile, parameter) if raw is None else raw
+    for parameter in profile.parameters:
+        # what follows the drive's rated current, once that is known
+        if parameter.factory_of is not None and parameter.code.casefold() not in chosen:
+            raw = counts_of(profile, parameter, parameter.factory_of, values)
+            values[parameter.code] = values[parameter.code] if raw is None else raw
     return values
 
 

@@ -39,6 +39,17 @@ class SettingsMemory:
             self._body.registers.put(parameter, 0)
         elif self._body.traits.access_levels and parameter.code.casefold() == "lac":
             self._access_level(parameter)
+        self._follow(parameter)
+
+    def _follow(self, source: Parameter) -> None:
+        """What has a factory setting for each value of this one takes it (HSP after bFr)."""
+        registers = self._body.registers
+        for parameter in registers.profile.parameters:
+            by = parameter.factory_by
+            if by is not None and by.parameter == source.code:
+                raw = by.raws.get(str(registers.present(source)))
+                if raw is not None:
+                    registers.put(parameter, raw)
 
     def _access_level(self, parameter: Parameter) -> None:
         """Reaching level L3 makes the channels their factory values (ATV31/312)."""

@@ -90,10 +90,15 @@ class SilenceWatch:
             cmi = self._body.raw("extended_command_word")
             if cmi & NO_MONITORING:
                 return False
-        return self._spoken and (self._body.line_orders.any_given or not self._data.needs_write)
+        earlier = self._body.earlier_hz is not None
+        given = self._body.line_orders.any_given or earlier
+        return self._spoken and (given or not self._data.needs_write)
 
     def step(self, dt: float) -> Consequence | None:
         """Let time pass; what has to happen if the time-out has just run out."""
+        if self._body.forced_local:
+            self._silent = -self._resumes_after
+            return None
         if not self.watching or self._expired:
             return None
         self._silent += dt
@@ -101,6 +106,12 @@ class SilenceWatch:
             return None
         self._expired = True
         return self.consequence()
+
+    @property
+    def _resumes_after(self) -> float:
+        """Time in s after forced local control before the line is watched again (FLOT)."""
+        parameter = self._body.registers.named("FLOT")
+        return self._body.engineering(parameter) if parameter else 0.0
 
     def consequence(self) -> Consequence:
         """What the reaction in force leads to; a reaction nobody knows is a freewheel stop."""

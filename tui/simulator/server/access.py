@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Block, Function, Parameter
+from tui.drive.profile.schema import Block, Function, Multiple, Parameter
+from tui.drive.settings.multiple import counts_of
+from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_enumeration, raw_range, to_words, word_count
 
 from ..registers import INPUT_REGISTERS, Registers
@@ -36,11 +38,14 @@ class DriveWords:
     ) -> None:
         self._profile = profile
         self._refusals = traits.refusals
+        self._limits = traits.limits
         self._limits_follow = traits.limits_follow
         self._registers = registers
         self._blocked = blocked
         self._written = written
         self._reading = profile.data.reading
+        self._taught = {one.parameter for one in profile.data.teachable_references}
+        """Words that take a reference though no document says that they can be written."""
         self._scanner: dict[int, tuple[Block, int]] = {}
         """Words that stand for another parameter: their block and place in it."""
         for block in profile.data.blocks:
@@ -159,7 +164,7 @@ class DriveWords:
         parameter = self._registers.owner(address) if address <= 0xFFFF else None
         if parameter is None:
             raise Refused(self._refusals.unknown_address)
-        if parameter.access == "r" or word_count(parameter) == 2:
+        if not self._may_be_written(parameter) or word_count(parameter) == 2:
             return
         raw = from_words(parameter, [word])
         low, high = raw_range(parameter)
@@ -176,12 +181,22 @@ class DriveWords:
             limit = self._registers.named(code) if code else None
             if limit and (limit.unit, limit.scale) == (parameter.unit, parameter.scale):
                 raw = bound(raw, self._registers.present(limit))
-        return raw
+        for of, bound in ((parameter.min_of, max), (parameter.max_of, min)):
+            if of is not None and (counts := self._counts(parameter, of)) is not None:
+                raw = bound(raw, counts)
+        own = self._registers.named(self._limits.get(parameter.code, ""))
+        return raw if own is None else min(raw, self._registers.in_force(own))
+
+    def _counts(self, parameter: Parameter, of: Multiple) -> int | None:
+        source = self._profile[of.parameter]
+        codes = [of.parameter, *depends_on(parameter), *depends_on(source)]
+        raws = {code: self._registers.present(self._profile[code]) for code in codes}
+        return counts_of(self._profile, parameter, of, raws)
 
     def _apply(self, address: int, word: int) -> None:
         parameter = self._registers.owner(address)
         assert parameter is not None
-        if parameter.access == "r":
+        if not self._may_be_written(parameter):
             raise Refused(self._refusals.read_only)
         if self._blocked(parameter):
             raise Refused(self._refusals.not_now)
@@ -189,6 +204,9 @@ class DriveWords:
             word = to_words(parameter, self._within(parameter, from_words(parameter, [word])))[0]
         self._registers.write_word(address, word)
         self._written(parameter)
+
+    def _may_be_written(self, parameter: Parameter) -> bool:
+        return parameter.access != "r" or parameter.code in self._taught
 
     def _check_count(self, count: int, limit: int | None, function: Function) -> None:
         if count < 1:

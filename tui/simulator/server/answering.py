@@ -64,6 +64,10 @@ class Answering:
                 return server
         return None
 
+    def is_own(self, address: int) -> bool:
+        """Whether the drive's own server, not that of a card, has this address."""
+        return self._body.powered and self._server_at(address) is self._own
+
     def is_called(self, address: int) -> bool:
         """Whether a broadcast or group address means this drive too."""
         return self._body.powered and self._station.is_called(address)

@@ -7,9 +7,11 @@ come back, and writes what is due. Times are those of a monotonic clock, in s.
 from __future__ import annotations
 
 import heapq
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
+from .client_settings import ClientSettings
 from .faults import FaultPlan
 from .frames import is_sealed, request_length
 from .line import SimulatedLine
@@ -79,13 +81,24 @@ class RtuConversation:
 
     In real time a frame ends with 3.5 characters of silence, and what comes sooner belongs to
     it: two requests without that silence between them are one blob that no drive understands.
-    A `paced` medium (a real port) spends the time of its characters itself. Without real time
+    `client` tells what the other side is set to. A `paced` medium (a real port) spends the time
+    of its characters itself. Without real time
     a frame ends as soon as it has the length it announces, or after a short silence.
     """
 
-    def __init__(self, line: SimulatedLine, faults: FaultPlan, *, paced: bool = False) -> None:
+    def __init__(
+        self,
+        line: SimulatedLine,
+        faults: FaultPlan,
+        *,
+        paced: bool = False,
+        client: Callable[[], ClientSettings] | None = None,
+    ) -> None:
         self._line = line
         self._timing = line.timing
+        self._look = client
+        self._client: ClientSettings | None = None
+        """What the client was set to when its last bytes came, where that can be seen."""
         self._faults = faults
         self._paced = paced
         self._buffer = b""
@@ -97,6 +110,9 @@ class RtuConversation:
         """Take bytes that have just come in."""
         if self._buffer and now >= self._end:
             self._finish()
+        if self._look is not None:
+            self._client = self._look()
+            self._timing = self._client.pace(self._line.timing)
         if self._paced or not self._timing.real_time:
             self._received = now
         else:
@@ -129,7 +145,7 @@ class RtuConversation:
 
     def _finish(self) -> None:
         frame, self._buffer = self._buffer, b""
-        reply = self._line.receive(frame)
+        reply = self._line.receive(frame, self._client)
         if reply is None:
             return
         start, character = self._received, 0.0

@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Protocol
 
 from ..errors import SimulatorError
+from ..spec import LineTiming
+from .client_settings import ClientSettings, set_up_terminal, settings_of_terminal
 from .conversation import Conversation
 
 CHUNK = 4096
@@ -90,15 +92,30 @@ def wait_time(conversation: Conversation, longest: float | None) -> float | None
 
 
 class PtyEndpoint(Endpoint):
-    """A pseudo-terminal; what is opened at `path` is the line."""
+    """A pseudo-terminal; what is opened at `path` is the line.
 
-    def __init__(self, converse: Callable[[], Conversation], link: str | None) -> None:
-        super().__init__("simulated line, pseudo-terminal", converse)
+    `converse` is given a look at what the client has set there, or nothing where the settings
+    do not matter. It begins with those of `timing`, so that a client that sets nothing is heard.
+    """
+
+    def __init__(
+        self,
+        converse: Callable[[Callable[[], ClientSettings] | None], Conversation],
+        link: str | None,
+        timing: LineTiming,
+        *,
+        any_settings: bool = False,
+    ) -> None:
+        super().__init__("simulated line, pseudo-terminal", lambda: converse(self._look()))
+        self._timing = timing
+        self._any_settings = any_settings
         # a number of a pseudo-terminal is given away again as soon as it is unplugged
         self._folder = None if link else Path(tempfile.mkdtemp(prefix="drivepanel-"))
         self._link = Path(link) if link else Path(f"{self._folder}/line")
         self._master = self._slave = -1
         self._pipe = (-1, -1)
+        self._seen = False
+        """Whether what is set on the terminal can be told."""
         self.path = ""
         """Path of the link to the slave side; it stays the same however often it is plugged in."""
 
@@ -112,10 +129,17 @@ class PtyEndpoint(Endpoint):
             ) from None
         self._master, self._slave = os.openpty()
         tty.setraw(self._slave)
+        self._seen = set_up_terminal(self._slave, self._timing)
         os.set_blocking(self._master, False)
         self._pipe = os.pipe()
         self._make_link(self._link, os.ttyname(self._slave))
         self.path = str(self._link)
+
+    def _look(self) -> Callable[[], ClientSettings] | None:
+        if self._any_settings or not self._seen:
+            return None
+        slave = self._slave
+        return lambda: settings_of_terminal(slave)
 
     def _make_link(self, link: Path, device: str) -> None:
         if self._folder is not None:

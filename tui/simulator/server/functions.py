@@ -29,7 +29,10 @@ class Words(Protocol):
 
 @dataclass
 class DiagnosticCounters:
-    """What function 8 counts, of frames to the drive's own address."""
+    """What function 8 counts, of frames to the drive's own address, right and damaged ones.
+
+    Source: ATV71 Modbus manual, Modbus counters.
+    """
 
     frames: int = 0
     checksum_errors: int = 0
@@ -39,7 +42,8 @@ class DiagnosticCounters:
         self.frames = (self.frames + 1) & 0xFFFF
 
     def count_checksum_error(self) -> None:
-        """One more frame with a wrong checksum; stays at 65535."""
+        """One more frame, with a wrong checksum; that count stays at 65535."""
+        self.count_frame()
         self.checksum_errors = min(self.checksum_errors + 1, 0xFFFF)
 
     def reset(self) -> None:

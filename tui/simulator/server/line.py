@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from ..drive import SimulatedDrive
 from ..errors import SimulatorError
 from ..spec import LineTiming
+from .client_settings import ClientSettings
 from .frames import is_sealed, seal
 
 FRESH_VALUES = 0.004
@@ -68,12 +69,15 @@ class SimulatedLine:
         known = ", ".join(str(d.address) for d in self.drives) or "none"
         raise SimulatorError(f"No simulated drive has address {address}. Addresses: {known}.")
 
-    def receive(self, frame: bytes) -> PendingReply | None:
-        """What comes back for what was received between two silences; None for silence."""
-        listening = [d for d in self.drives if d.station.hears(self.timing)]
+    def receive(self, frame: bytes, client: ClientSettings | None = None) -> PendingReply | None:
+        """What comes back for what was received between two silences; None for silence.
+
+        A drive whose baud, parity or stop bits are not those of the `client` makes nothing of it.
+        """
+        listening = [d for d in self.drives if d.station.hears(self.timing, client)]
         if not is_sealed(frame):
             for drive in listening:
-                if len(frame) >= 4 and drive.line_side.answers_at(frame[0]):
+                if len(frame) >= 4 and drive.line_side.is_own(frame[0]):
                     drive.line_side.count_checksum_error()
             return None
         address, pdu = frame[0], frame[1:-2]

@@ -7,6 +7,7 @@ from tui.drive.profile.schema import LinkChoice, LinkSetting, Parameter
 
 from ..registers import Registers
 from ..spec import LineTiming
+from .client_settings import ClientSettings
 
 SHORTEST_TURNAROUND = 0.0015
 """PX-MODBUS manual 4, 15.06: never less, in s."""
@@ -73,19 +74,33 @@ class Station:
                 return max(delay / 1000, SHORTEST_TURNAROUND)
         return float(self._profile.data.link.turnaround_ms) / 1000
 
-    def hears(self, timing: LineTiming) -> bool:
-        """Whether the drive's protocol, baud and format in force are those of the line."""
+    def hears(self, timing: LineTiming, client: ClientSettings | None = None) -> bool:
+        """Whether the drive's protocol, baud and format in force are those of the line.
+
+        `client` is what the other side is set to, where that can be seen; then it counts.
+        """
         for setting in self._profile.data.link.settings:
             if setting.role == "protocol" and setting.factory is not None:
                 protocol = self._registers.in_force(self._profile[setting.parameter])
                 if protocol != setting.factory:
                     return False
+        choices = self._chosen()
+        if client is not None:
+            return client.fits(*_own(choices, timing))
+        return all(_fits(choice, timing) for choice in choices)
+
+    def own(self, timing: LineTiming) -> LineTiming:
+        """The line as the drive itself is set; what no word of it says is that of the line."""
+        baud, form = _own(self._chosen(), timing)
+        return LineTiming(baud, form, timing.real_time)
+
+    def _chosen(self) -> list[LinkChoice]:
+        """What the drive's words for baud and format say, as far as it has any."""
+        chosen = []
         for setting, parameter in self._settings:
             raw = self._registers.in_force(parameter)
-            choice = next((c for c in setting.choices if c.raw == raw), None)
-            if choice is not None and not _fits(choice, timing):
-                return False
-        return True
+            chosen += [choice for choice in setting.choices if choice.raw == raw][:1]
+        return chosen
 
 
 def in_group(own: int, called: int) -> bool:
@@ -94,6 +109,15 @@ def in_group(own: int, called: int) -> bool:
     if called == 0 or "0" not in theirs or "0" in mine or len(mine) != len(theirs):
         return False
     return all(t in ("0", m) for m, t in zip(mine, theirs, strict=True))
+
+
+def _own(choices: list[LinkChoice], timing: LineTiming) -> tuple[int, str]:
+    """Baud and format of a drive; those of the line where no word of the drive says them."""
+    baud, form = timing.baud, timing.format
+    for choice in choices:
+        baud = choice.baud or baud
+        form = choice.format or (f"8{choice.parity}{form[2]}" if choice.parity else form)
+    return baud, form
 
 
 def _fits(choice: LinkChoice, timing: LineTiming) -> bool:

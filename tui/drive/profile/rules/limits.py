@@ -108,4 +108,36 @@ def _refused(parameter: Parameter, raw: int, names: dict[str, str]) -> str:
     return ""
 
 
-LIMIT_RULES = (circles, proposed_values)
+def factory_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Factory settings that follow another parameter, against that one's own factory setting."""
+    factory = {p.code: p.factory for p in data.parameters}
+    for index, parameter in enumerate(data.parameters):
+        by = parameter.factory_by
+        if by is None:
+            continue
+        place: TomlPath = ("parameters", index, "factory_by")
+        for raw in by.raws:
+            if not raw.lstrip("-").isdecimal():
+                yield place, f"parameter {parameter.code}: {raw!r} is not a raw value in decimal."
+        if by.raws.get(str(factory.get(by.parameter))) != parameter.factory:
+            yield (
+                place,
+                f"parameter {parameter.code}: factory is not what factory_by gives for the"
+                f" factory setting of {by.parameter}.",
+            )
+
+
+def start_up(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """A parameter stands in one step of the first commissioning."""
+    seen: dict[str, str] = {}
+    for index, step in enumerate(data.start_up):
+        for code in step.parameters:
+            if code in seen:
+                yield (
+                    ("start_up", index),
+                    f"step {step.step}: {code} stands in step {seen[code]} already.",
+                )
+            seen.setdefault(code, step.step)
+
+
+LIMIT_RULES = (circles, proposed_values, factory_settings, start_up)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterator
 
 from ..schema import Chart, Parameter, ProfileData
@@ -11,6 +12,12 @@ from ..toml_lines import TomlPath
 TAKEN_IDS = frozenset({"new", "path"})
 NamedPlace = tuple[TomlPath, str]
 """A place that names a parameter, and the code."""
+WORD_FORMS = {
+    re.compile(r"16#"): re.compile(r"\b(?=[0-9]*[A-F])[0-9A-F]{4}\b"),
+    re.compile(r"W[0-9]"): re.compile(r"\bW[0-9]{3,5}\b"),
+    re.compile(r"[0-9]+\.[0-9]"): re.compile(r"\b[0-9]{1,2}\.[0-9]{2}\b"),
+}
+"""How a text names a word, by how the numbers of a family are written."""
 
 
 def references(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
@@ -41,8 +48,12 @@ def named_parameters(data: ProfileData) -> Iterator[NamedPlace]:
     for index, reference in enumerate(data.references):
         yield ("references", index, "parameter"), reference.parameter
         yield ("references", index, "feedback"), reference.feedback
+    for index, one in enumerate(data.teachable_references):
+        yield ("teachable_references", index, "parameter"), one.parameter
+        yield ("teachable_references", index, "most"), one.most
     for index, group in enumerate(data.groups):
         yield ("groups", index, "needs_factory"), group.needs_factory
+    yield from _of_channels(data)
     yield from _of_monitoring(data)
     yield from _of_faults(data)
     yield from _of_tables(data)
@@ -56,6 +67,9 @@ def _of_parameter(parameter: Parameter) -> Iterator[tuple[str, str]]:
         yield "scale_by", parameter.scale_by.parameter
     if parameter.unit_by:
         yield "unit_by", parameter.unit_by.parameter
+    for key in ("factory_by", "min_of", "max_of", "factory_of"):
+        if (of := getattr(parameter, key)) is not None:
+            yield key, of.parameter
 
 
 def _of_chart(chart: Chart) -> Iterator[NamedPlace]:
@@ -69,6 +83,16 @@ def _of_chart(chart: Chart) -> Iterator[NamedPlace]:
             yield (key, place, "parameter"), row.parameter
             for when in getattr(row, "when", ()):
                 yield (key, place, "when"), when.parameter
+            for code in getattr(row, "clears", ()):
+                yield (key, place, "clears"), code
+
+
+def _of_channels(data: ProfileData) -> Iterator[NamedPlace]:
+    for key in ("command", "reference", "switches"):
+        for index, row in enumerate(getattr(data.channels, key)):
+            yield ("channels", key, index, "parameter"), row.parameter
+            for when in row.when:
+                yield ("channels", key, index, "when"), when.parameter
 
 
 def _of_monitoring(data: ProfileData) -> Iterator[NamedPlace]:
@@ -90,9 +114,8 @@ def _of_faults(data: ProfileData) -> Iterator[NamedPlace]:
     for place, stored in enumerate(data.faults.stored):
         for inner, code in enumerate(stored):
             yield ("faults", "stored", place, inner), code
-    for place, one in enumerate(data.faults.help):
-        for inner, look in enumerate(one.look_at):
-            yield ("faults", "help", place, "look_at", inner), look.code
+    if ready := data.faults.reset_ready:
+        yield ("faults", "reset_ready"), ready.parameter
 
 
 def _of_tables(data: ProfileData) -> Iterator[NamedPlace]:
@@ -107,6 +130,9 @@ def _of_tables(data: ProfileData) -> Iterator[NamedPlace]:
             yield ("memory", key, "groups"), order.groups
             if order.done:
                 yield ("memory", key, "done"), order.done.parameter
+    for index, step in enumerate(data.start_up):
+        for place, code in enumerate(step.parameters):
+            yield ("start_up", index, "parameters", place), code
     for index, source in enumerate(data.control_sources):
         for place, one in enumerate(source.settings):
             yield ("control_sources", index, "settings", place), one.parameter
@@ -139,4 +165,22 @@ def fault_of_the_line(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
         yield ("communication_fault", "fault"), f"there is no fault {watch.fault}."
 
 
-NAME_RULES = (own_id, references, groups_in_use, fault_of_the_line)
+def written_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Words that the texts of control sources name by their numbers."""
+    numbers = [parameter.number for parameter in data.parameters]
+    known = {name for p in data.parameters for name in (p.code, p.number, p.number[3:])}
+    forms = [form for start, form in WORD_FORMS.items() if any(start.match(n) for n in numbers)]
+    for index, source in enumerate(data.control_sources):
+        texts = [source.name, source.note]
+        texts += [
+            t for way in (source.command, source.reference) for t in (*way.sources, way.switch)
+        ]
+        for word in (word for text in texts for form in forms for word in form.findall(text)):
+            if word not in known:
+                yield (
+                    ("control_sources", index),
+                    f"control source {source.id}: there is no word {word}.",
+                )
+
+
+NAME_RULES = (own_id, references, groups_in_use, fault_of_the_line, written_words)

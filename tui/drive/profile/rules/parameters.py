@@ -7,7 +7,8 @@ from collections.abc import Iterable, Iterator
 
 from tui.drive.values import raw_range, type_range
 
-from ..schema import Parameter, ProfileData
+from ..help_file import help_findings
+from ..schema import HelpData, Parameter, ProfileData
 from ..toml_lines import TomlPath
 
 
@@ -79,13 +80,14 @@ def _faults_of(
             "enumeration",
             f"there is no enumeration {parameter.enumeration!r}; there are: {known}.",
         )
-    words = parameter.source.split()
-    if not words or words[0].rstrip(",;:") not in sources:
-        known = ", ".join(sources) or "none, add a table [[sources]]"
-        yield (
-            "source",
-            f"source {parameter.source!r} does not begin with the id of a source; ids: {known}.",
-        )
+    for key, source in _sources_of(parameter):
+        words = source.split()
+        if not words or words[0].rstrip(",;:") not in sources:
+            known = ", ".join(sources) or "none, add a table [[sources]]"
+            yield (
+                key,
+                f"source {source!r} does not begin with the id of a source; ids: {known}.",
+            )
     yield from _number_keys("values", parameter.values)
     if parameter.scale_by:
         yield from _number_keys("scale_by", parameter.scale_by.scales)
@@ -96,6 +98,15 @@ def _faults_of(
     for number, times in Counter(bit.bit for bit in parameter.bits).items():
         if times > 1:
             yield "bits", f"a bit is named twice: {number}."
+
+
+def _sources_of(parameter: Parameter) -> Iterator[tuple[str, str]]:
+    """What the row, its limits and its factory setting rest on."""
+    yield "source", parameter.source
+    if parameter.limit_grounds is not None:
+        yield "limit_grounds", parameter.limit_grounds.source
+    if parameter.factory_grounds is not None:
+        yield "factory_grounds", parameter.factory_grounds.source
 
 
 def _range_faults(
@@ -152,14 +163,10 @@ def enumeration_keys(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
 
 
 def fault_help(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
-    """Help belongs to a fault that is there, and a fault has one."""
-    known = {fault.raw for fault in data.faults.codes}
-    helped = [one.raw for one in data.faults.help]
-    for index, raw in enumerate(helped):
-        if raw not in known:
-            yield ("faults", "help", index, "raw"), f"help: there is no fault {raw}."
-        if raw in helped[:index]:
-            yield ("faults", "help", index, "raw"), f"help: fault {raw} has two."
+    """Help belongs to a fault that is there, a fault has one, and what it looks at is there."""
+    rows = data.faults.help
+    for place, fault in help_findings(data, HelpData(faults=rows)) if rows else ():
+        yield ("faults", "help", place[1]), fault
 
 
 PARAMETER_RULES = (unique_names, fields, enumeration_keys, fault_help)

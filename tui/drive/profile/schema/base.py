@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from msgspec import Meta, Struct
@@ -10,6 +11,7 @@ WordAddress = Annotated[int, Meta(ge=0, le=0xFFFF)]
 RawWord = Annotated[int, Meta(ge=-0x8000, le=0xFFFF)]
 DeviceAddress = Annotated[int, Meta(ge=0, le=255)]
 DecimalText = Annotated[str, Meta(pattern=r"^[0-9]+(\.[0-9]+)?$")]
+SignedDecimalText = Annotated[str, Meta(pattern=r"^-?[0-9]+(\.[0-9]+)?$")]
 Identifier = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]*$")]
 BitNumber = Annotated[int, Meta(ge=0, le=15)]
 
@@ -27,4 +29,13 @@ class When(Table, frozen=True, kw_only=True):
     """A condition on another parameter's raw value."""
 
     parameter: str
+    mask: WordAddress | None = None
+    """Bits of the word that count; all of it where absent."""
     values: list[int]
+
+    def holds(self, raws: Mapping[str, int]) -> bool | None:
+        """Whether it holds, given raw values by code; None where its word is not known."""
+        raw = raws.get(self.parameter)
+        if raw is None:
+            return None
+        return (raw if self.mask is None else raw & self.mask) in self.values

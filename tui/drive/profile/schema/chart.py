@@ -92,6 +92,10 @@ class Order(Table, frozen=True, kw_only=True):
     """Raw values that must be known and hold."""
     broadcast: bool = False
     """True where its word can start no motor on any drive that hears it."""
+    clears: list[str] = []
+    """Words that go back to their initial values by it."""
+    follows: str = ""
+    """What follows from it besides, told before it is given; sentences."""
     note: str = ""
     confidence: Confidence = "manual"
 
@@ -178,3 +182,16 @@ class ReferenceWay(Table, frozen=True, kw_only=True):
     signed: bool = False
     feedback: str = ""
     note: str = ""
+
+
+class TeachableReference(Table, frozen=True, kw_only=True):
+    """A word of unknown scale that takes the reference once that scale was taught and confirmed."""
+
+    parameter: str
+    bits: WordAddress = 0
+    """Bits of the chart's command word that choose it; set with each command to run."""
+    most: str = ""
+    """Parameter that holds the highest reference, once it was taught in the same unit."""
+    note: str = ""
+    source: str = ""
+    confidence: Confidence = "unverified"

@@ -6,7 +6,9 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import Confidence, RawWord, Table
+from .base import Confidence, Identifier, RawWord, Table
+from .chart import StatusBit
+from .fault_help import FaultHelp
 
 
 class MonitoringValue(Table, frozen=True, kw_only=True):
@@ -48,29 +50,6 @@ class FaultCode(Table, frozen=True, kw_only=True):
     remedy: str = ""
 
 
-class LookAt(Table, frozen=True, kw_only=True):
-    """A parameter to look at after a fault, and why."""
-
-    code: str
-    why: str
-
-
-class FaultHelp(Table, frozen=True, kw_only=True):
-    """What a fault points at; `practice` is general practice with drives, from no manual."""
-
-    raw: RawWord
-    """The fault, as among `codes`."""
-    probable: list[str]
-    """Probable causes, the likeliest first."""
-    check: list[str] = []
-    look_at: list[LookAt] = []
-    reset: Literal["", "after-cause", "automatic", "power-cycle"] = ""
-    """How it can be reset: once its cause is gone, by the drive itself too where that is set, or
-    only by switching the drive off and on."""
-    source: str = ""
-    confidence: Literal["manual", "public", "practice"] = "practice"
-
-
 class Faults(Table, frozen=True, kw_only=True):
     """Where faults are read and what their codes mean."""
 
@@ -83,6 +62,11 @@ class Faults(Table, frozen=True, kw_only=True):
     """What the drive keeps of the moment of each fault of its history, in the same order."""
     codes: list[FaultCode] = []
     help: list[FaultHelp] = []
+    """What faults point at; a file of the folder `help` says it where a family has many."""
+    help_file: Identifier | None = None
+    """Name of that file, without .toml, where it is not the profile's id."""
+    reset_ready: StatusBit | None = None
+    """The bit by which the drive tells that a reset can work now."""
     none: int = 0
     note: str = ""
     source: str = ""

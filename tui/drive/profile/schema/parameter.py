@@ -12,6 +12,7 @@ from .base import (
     DecimalText,
     Effective,
     Identifier,
+    SignedDecimalText,
     Table,
     WordAddress,
 )
@@ -47,6 +48,33 @@ class ScaleBy(Table, frozen=True, kw_only=True):
     scales: dict[str, DecimalText]
     absent: DecimalText | None = None
     """Scale where the drive says that it has no such parameter; without it the scale is unknown."""
+
+
+class FactoryBy(Table, frozen=True, kw_only=True):
+    """A factory setting that follows another parameter's raw value (HSP after bFr); raw values."""
+
+    parameter: str
+    raws: dict[str, int]
+
+
+class Multiple(Table, frozen=True, kw_only=True):
+    """So many times another parameter, in the unit of the one it is for, cut to a whole count.
+
+    Limits and factory settings that follow the drive's rated current, for one.
+    """
+
+    parameter: str
+    times: SignedDecimalText
+    plus: SignedDecimalText = "0"
+    """Added to it, in the same unit: `100 - tA1` is times -1, plus 100."""
+
+
+class Grounds(Table, frozen=True, kw_only=True):
+    """What a fact rests on where that is something else than what its row rests on."""
+
+    source: str
+    """The id of a source and the place in it."""
+    confidence: Confidence
 
 
 class UnitBy(Table, frozen=True, kw_only=True):
@@ -172,6 +200,8 @@ class Parameter(Table, frozen=True, kw_only=True):
     and stay as they are when it is written."""
     shift: BitNumber = 0
     """How many bits the word is shifted down first."""
+    sure_up_to: int | None = None
+    """Highest raw value whose meaning is sure; one above it is marked `?`."""
     unit: str = ""
     scale: DecimalText = "1"
     scale_by: ScaleBy | None = None
@@ -185,9 +215,21 @@ class Parameter(Table, frozen=True, kw_only=True):
     min_from: str = ""
     max_from: str = ""
     """Parameters that limit this one further (LSP..HSP)."""
+    min_of: Multiple | None = None
+    max_of: Multiple | None = None
+    """Limits that are so many times another parameter (0.2 times the drive's rated current)."""
+    limit_grounds: Grounds | None = None
+    """What the limits rest on, where that is something else than what the row rests on."""
     factory: int | None = None
     factory_text: str = ""
     """Factory setting in words where it depends on the rating or the market."""
+    factory_by: FactoryBy | None = None
+    """Factory setting after another parameter; `factory` is that of the factory state."""
+    factory_of: Multiple | None = None
+    factory_grounds: Grounds | None = None
+    """What the factory setting rests on, where that is something else than the row's."""
+    set_by_drive: bool = False
+    """True where the drive itself changes it (auto-tuning): never told as changed by a person."""
     enumeration: str = ""
     values: dict[str, str] = {}
     """Names of raw values; of special ones where the parameter is a number."""

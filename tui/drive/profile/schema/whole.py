@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from .base import Table
 from .block import Block
-from .chart import Chart, CommandExample, ReferenceWay
+from .channel import Channels
+from .chart import Chart, CommandExample, ReferenceWay, TeachableReference
 from .control_source import ControlSource
 from .identification import Erratum, Identification, ProfileHead, Source
 from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkSettings, ReadShapes
 from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter, ParameterGroup
+from .start_up import StartUpStep
+from .wiring import Wiring
 
 
 class ProfileData(Table, frozen=True, kw_only=True):
@@ -29,13 +32,17 @@ class ProfileData(Table, frozen=True, kw_only=True):
     charts: list[Chart] = []
     command_examples: list[CommandExample] = []
     references: list[ReferenceWay] = []
+    teachable_references: list[TeachableReference] = []
     faults: Faults = Faults()
     monitoring: Monitoring
+    channels: Channels = Channels()
     control_sources: list[ControlSource] = []
     communication_fault: CommunicationFault | None = None
     memory: MemoryOrders = MemoryOrders()
+    start_up: list[StartUpStep] = []
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
+    wiring: Wiring = Wiring()
     groups: list[ParameterGroup] = []
     enumerations: list[Enumeration] = []
     parameters: list[Parameter]

@@ -1,0 +1,79 @@
+"""Taking a drive's control from its terminals, and giving it back, on the command line."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+
+import pytest
+
+from .commands import held, invoked, motor, put, refused, run, tcp_line
+
+DRIVE = ("-p", "powerdrive")
+COMMAND_WORD, IN_FORCE = 641, 642
+
+
+@pytest.fixture
+def line() -> Iterator[str]:
+    """A simulated Powerdrive at rest, commanded at its terminals, that several commands reach."""
+    with tcp_line("powerdrive@1") as served:
+        yield served
+
+
+def test_the_control_is_taken_and_given_back(line: str) -> None:
+    said = motor(5, line, *DRIVE, "--arm", "--for", "1")
+    assert "run --take-control takes the control first." in said
+    assert held(line, COMMAND_WORD) == 0
+    status = run(0, "status", line, *DRIVE)
+    assert "drivepanel run --take-control takes it, in the panel t on Monitor." in status
+    told = motor(0, line, *DRIVE, "--arm", "--take-control", "--for", "1")
+    assert told.index("Control by the line") < told.index("Unlock and run forward:")
+    assert "stop --give-back --arm gives it back" in told
+    assert told.rstrip().endswith("stopped.")
+    assert held(line, IN_FORCE) == 1
+    control = json.loads(run(0, "status", line, *DRIVE, "--json"))["control"]
+    assert control == {
+        "taken": True, "take": "run --take-control", "give_back": "stop --give-back --arm",
+    }  # fmt: skip
+    back = run(0, "stop", line, *DRIVE, "--give-back", "--arm")
+    assert "stopped." in back
+    assert "Control by the terminals" in back
+    assert held(line, IN_FORCE) == 0
+
+
+def test_5_a_stop_gives_nothing_back_unarmed_but_stops(line: str) -> None:
+    put(line, IN_FORCE, 1)
+    put(line, COMMAND_WORD, 0x0003)
+    done = invoked("stop", line, *DRIVE, "--give-back")
+    assert done.exit_code == 5
+    assert "stopped." in done.stdout
+    assert "Not given back" in done.stderr
+    assert "waits at the terminals" in done.stderr
+    assert held(line, COMMAND_WORD) & 0x002E == 0
+    assert held(line, IN_FORCE) == 1
+
+
+def test_5_the_control_is_not_taken_where_that_would_start_the_motor(line: str) -> None:
+    put(line, COMMAND_WORD, 0x0003)
+    said = motor(5, line, *DRIVE, "--arm", "--take-control")
+    assert "the motor would start as soon as it is in force" in said
+    assert held(line, IN_FORCE) == 0
+
+
+def test_2_giving_back_is_for_one_drive() -> None:
+    refused(2, "stop", "sim:powerdrive", "--all", "--give-back")
+
+
+def test_5_a_family_without_a_control_to_take() -> None:
+    said = motor(5, "sim:atv71@1", "--arm", "--take-control")
+    assert "has no control to take" in said
+
+
+def test_5_a_family_without_a_control_to_give_back() -> None:
+    said = refused(5, "stop", "sim:atv71@1", "--give-back", "--arm")
+    assert "has no control to give back" in said
+
+
+def test_status_names_no_control_where_a_family_has_none() -> None:
+    assert "Control  " not in run(0, "status", "sim:atv71@1")
+    assert json.loads(run(0, "status", "sim:atv71@1", "--json"))["control"] is None

@@ -1,0 +1,135 @@
+"""`status` on a drive in fault: what it points at, with the values of now, in text and JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+
+from tui.cli.commands.status import Status, status_json, status_of_drive, status_table
+from tui.drive.profile import library
+from tui.session.connect.open_line import OpenLine, demo_line
+from tui.session.drive import DriveSession
+
+from ..drive.test_fault_help import own_drive
+from .commands import refused, run
+
+
+@asynccontextmanager
+async def line(family: str) -> AsyncIterator[OpenLine]:
+    opened = demo_line({family: 0.0})
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+async def status_of(opened: OpenLine, family: str) -> Status:
+    session = DriveSession(opened.line, 1, library.load(family))
+    return await status_of_drive(session, opened)
+
+
+def provoke(opened: OpenLine, fault: str | int, *, persists: bool = False) -> None:
+    assert opened.simulation is not None
+    opened.simulation.drive(1).provoke(fault, persists=persists)
+
+
+def text_of(status: Status) -> str:
+    return "\n".join(f"{title}: {text}" for title, text in status_table(status))
+
+
+async def test_a_fault_with_causes_checks_and_live_values() -> None:
+    async with line("atv71") as opened:
+        assert opened.simulation is not None
+        opened.simulation.drive(1).set("DEC", 5)
+        provoke(opened, "ObF")
+        status = await status_of(opened, "atv71")
+    told = json.loads(json.dumps(status_json("demo", status)))["fault"]
+    assert (told["raw"], told["code"], told["name"]) == (18, "ObF", "Overbraking")
+    assert told["causes"][0] == "The braking is too sudden for the inertia"
+    assert told["confidence"] == "public"
+    assert "AAV49428" in told["source"]
+    assert "Lengthen DEC" in told["checks"]
+    (ramp,) = [row for row in told["look_at"] if row["code"] == "DEC"]
+    assert (ramp["value"]["text"], ramp["value"]["unit"], ramp["value"]["quality"]) == (
+        "0.5", "s", "good",
+    )  # fmt: skip
+    assert ramp["why"] == "the ramp in force"
+    assert told["reset"] == {
+        "way": "automatic",
+        "confidence": "practice",
+        "possible_now": True,
+        "wait_s": None,
+    }
+    text = text_of(status)
+    for part in (
+        "probably: The braking is too sudden for the inertia; ",
+        "(public guide)",
+        "check: Lengthen DEC; ",
+        "(general practice)",
+        "look at: DEC 0.5 s, the ramp in force",
+        "reset: a fault reset works now, says the drive; a run command may start it",
+    ):
+        assert part in text
+
+
+async def test_the_drive_tells_that_the_cause_is_there_still() -> None:
+    async with line("atv312") as opened:
+        provoke(opened, "ObF", persists=True)
+        status = await status_of(opened, "atv312")
+    assert status_json("demo", status)["fault"]["reset"]["possible_now"] is False
+    assert "reset: not yet, says the drive" in text_of(status)
+
+
+async def test_a_wait_before_the_reset() -> None:
+    async with line("atv21") as opened:
+        provoke(opened, "OL2")
+        status = await status_of(opened, "atv21")
+    told = status_json("demo", status)["fault"]
+    assert told["reset"]["wait_s"] == 120
+    assert told["reset"]["possible_now"] is None
+    assert "wait about 120 s before it (general practice)" in text_of(status)
+
+
+async def test_a_trip_without_a_number() -> None:
+    async with line("varmeca") as opened:
+        provoke(opened, 1)
+        status = await status_of(opened, "varmeca")
+    told = status_json("demo", status)["fault"]
+    assert (told["raw"], told["code"], told["name"]) == (None, None, None)
+    assert told["confidence"] == "manual"
+    assert {row["code"] for row in told["look_at"]} == {"11.63", "15.07", "10.33"}
+
+
+async def test_an_alarm_has_its_causes_and_no_reset() -> None:
+    async with line("atv71") as opened:
+        assert opened.simulation is not None
+        opened.simulation.drive(1).set("LRS6", 1 << 8)
+        status = await status_of(opened, "atv71")
+    told = status_json("demo", status)
+    assert (told["fault"], told["alarms"]) == (None, ["Undervoltage alarm"])
+    rows = text_of(status).splitlines()
+    at = rows.index("Alarms: Undervoltage alarm")
+    assert rows[at + 1] == "  probably: Undervoltage alarm: Mains low or a dip (general practice)"
+    assert any(row.startswith("  look at: ULN 2") for row in rows)
+    assert not any(row.startswith("  reset") for row in rows)
+
+
+@pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "atv71", "varmeca"])
+async def test_nothing_is_read_or_told_where_there_is_no_fault(family: str) -> None:
+    async with line(family) as opened:
+        status = await status_of(opened, family)
+    assert status.finding is None
+    assert status_json("demo", status)["fault"] is None
+    assert "probably" not in text_of(status)
+
+
+def test_a_profile_is_checked_with_its_help(tmp_path: Path) -> None:
+    profile = own_drive(tmp_path, '[[faults]]\nraw = 900\nprobable = ["A jam"]\n')
+    said = refused(2, "profiles", "--check", profile)
+    assert "help/mine.toml:1: help of fault 900: there is no such fault." in said
+    own_drive(tmp_path, '[[faults]]\nraw = 9\nprobable = ["A jam"]\n')
+    assert "no fault found" in run(0, "profiles", "--check", profile)

@@ -1,0 +1,57 @@
+"""`status` and `run` say the same of who commands a drive, and name what opens the way."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tests.programs import drivepanel
+
+from .commands import run, tcp_line
+
+ELSEWHERE = {
+    "Leroy-Somer at its terminals": (
+        "powerdrive", {"6.43": 0}, "6.43 is Terminals. In the panel t takes the control.",
+    ),
+    "Altivar 312 at its terminals": (
+        "atv312", {"LAC": 2, "Fr1": 1}, "reference channel 1 (Fr1), which counts, is Terminals.",
+    ),
+    "Altivar 31, second channel": (
+        "atv31", {"LAC": 2, "Fr1": 164, "Fr2": 1, "rFC": 97},
+        "reference channel 2 (Fr2), which counts, is Terminals.",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("family", "sets", "why"), ELSEWHERE.values(), ids=ELSEWHERE.keys())
+def test_what_status_tells_is_what_run_says(family: str, sets: dict[str, int], why: str) -> None:
+    words = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
+    with tcp_line(f"{family}@1", *words) as line:
+        told = json.loads(run(0, "status", line, "-p", family, "--json"))
+        assert told["commandable"] is False
+        assert why in told["why_not"]
+        done = drivepanel("run", line, "-p", family, "--arm")
+        assert (done.returncode, done.stdout) == (5, "")
+        assert told["why_not"] in done.stderr
+        assert told["why_not"] in run(0, "status", line, "-p", family)
+
+
+@pytest.mark.parametrize(
+    ("family", "sets"),
+    [
+        ("powerdrive", {"6.43": 1}),
+        ("atv312", {"LAC": 2, "Fr1": 164}),
+        ("atv31", {"LAC": 2, "Fr1": 1, "Fr2": 164, "rFC": 97}),
+        ("atv31", {"LAC": 2, "CHCF": 2, "Fr1": 1, "Cd1": 1, "Cd2": 10, "CCS": 99}),
+    ],
+)
+def test_an_idle_drive_set_up_for_the_line_is_commanded_by_it(
+    family: str, sets: dict[str, int]
+) -> None:
+    words = [part for code, raw in sets.items() for part in ("--set", f"{code}={raw}")]
+    with tcp_line(f"{family}@1", *words) as line:
+        told = json.loads(run(0, "status", line, "-p", family, "--json"))
+    assert (told["commandable"], told["why_not"]) == (True, None)
+    if family != "powerdrive":
+        assert told["commanded_by"] == "Modbus"

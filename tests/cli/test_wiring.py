@@ -1,0 +1,64 @@
+"""`drivepanel profiles ID --wiring`, and the model of a drive in `identify`."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from .commands import refused, run, tcp_line
+
+FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_the_page_of_a_family(family: str) -> None:
+    text = run(0, "profiles", family, "--wiring")
+    for part in ("Warnings", "Before it is opened", "Pins: ", "Addresses", "Command words"):
+        assert f"\n{part}" in text
+    assert max(map(len, text.splitlines())) <= 100
+
+
+def test_the_page_for_programs() -> None:
+    told = json.loads(run(0, "profiles", "atv71", "--wiring", "--json"))
+    assert (told["id"], told["name"]) == ("atv71", "Altivar 71")
+    titles = [section["title"] for section in told["sections"]]
+    assert titles[:2] == ["Warnings", "Before it is opened"]
+    rows = {row["head"]: row["text"] for s in told["sections"] for row in s["rows"]}
+    assert rows["D0"].startswith("EIA/TIA-485: A or A'")
+    assert rows["16#000F"] == "Enable operation, forward"
+
+
+def test_a_page_needs_its_family() -> None:
+    assert "name its ID" in run_usage("profiles", "--wiring")
+    assert "There is no profile" in refused(2, "profiles", "nosuch", "--wiring")
+
+
+def run_usage(*arguments: str) -> str:
+    from .commands import ended
+
+    return ended(2, *arguments).stderr
+
+
+@pytest.mark.parametrize(
+    ("code", "text"),
+    [(6, "ATV21HU15M3X, 200 V, 1.5 kW"), (999, "code 999, in no list at hand")],
+)
+def test_the_model_is_what_the_drive_says_of_itself(code: int, text: str) -> None:
+    with tcp_line("atv21@3", "--set", f"FB05={code}", "--set", "FB72=0") as line:
+        told = json.loads(run(0, "identify", line, "-d", "3", "--json"))
+        assert (told["model"]["code"], told["model"]["text"]) == (code, text)
+        assert told["reference"] == "ATV21H075M3X"
+        assert f"Model      {text}" in run(0, "identify", line, "-d", "3")
+
+
+def test_a_drive_whose_model_cannot_be_read_is_identified_all_the_same() -> None:
+    with tcp_line("atv21@3", "--protect", "FB05", "--protect", "FB72") as line:
+        told = json.loads(run(0, "identify", line, "-d", "3", "--json"))
+    assert told["profile"] == "atv21"
+    assert told["model"] is None
+
+
+def test_a_family_without_such_a_word_has_no_model() -> None:
+    with tcp_line("atv312@3") as line:
+        assert json.loads(run(0, "identify", line, "-d", "3", "--json"))["model"] is None

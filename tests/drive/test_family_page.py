@@ -1,0 +1,194 @@
+"""The page of a family: warnings, waiting, pins, rules, addresses, lamps, commands, errata."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.drive.family_page import PageSection, family_page, page_lines
+from tui.drive.model import model_codes, model_of, model_told
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+
+ALTIVAR = ["atv21", "atv31", "atv312", "atv71"]
+LEROY = ["powerdrive", "proxidrive", "varmeca"]
+FAMILIES = [*ALTIVAR, *LEROY]
+COMMON_SECTIONS = [
+    "Warnings",
+    "Before it is opened",
+    "Line",
+    "Addresses",
+    "When the line falls silent",
+    "Command words",
+    "Where the manuals are wrong",
+]
+
+
+def section(family: str, title: str) -> PageSection:
+    (found,) = [one for one in family_page(library.load(family)) if one.title == title]
+    return found
+
+
+def text_of(family: str, title: str = "") -> str:
+    sections = family_page(library.load(family))
+    kept = [one for one in sections if not title or one.title == title]
+    return "\n".join(f"{row.head} {row.text} {row.sure}" for one in kept for row in one.rows)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_family_has_its_sections(family: str) -> None:
+    titles = [one.title for one in family_page(library.load(family))]
+    assert [title for title in COMMON_SECTIONS if title not in titles] == []
+    assert [title for title in titles if title.startswith("Pins: ")]
+    assert ("Names of the signals" in titles) is (family in ALTIVAR)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_every_pin_rule_command_and_erratum_stands_on_the_page(family: str) -> None:
+    data = library.load(family).data
+    page = text_of(family)
+    told = [
+        *(pin.signal for connector in data.connectors for pin in connector.pins),
+        *(warning for connector in data.connectors for warning in connector.warnings),
+        *(rule.rule for rule in data.line_rules),
+        *(f"16#{one.word:04X} {one.does}" for one in data.command_examples),
+        *(f"Right: {one.right}." for one in data.errata),
+        *(one.text for one in data.wiring.warnings),
+        *(data.communication_fault.warnings if data.communication_fault else ()),
+        *(server.name for server in data.addresses.servers),
+    ]
+    assert [one for one in told if one not in page] == []
+
+
+WARNED = [
+    ("atv31", "With SLL = 0 a motor goes on running"),
+    ("atv312", "With SLL = 0 a motor goes on running"),
+    ("atv71", "With SLL = 0 a motor goes on running"),
+    ("atv21", "With F803 = 0 the drive does not notice a dead line"),
+    *((family, "Behind a gateway") for family in FAMILIES),
+    ("atv71", "leaves the factory at OFF"),
+    ("atv21", "can be set to 0: the drive then answers nobody"),
+    *((family, "digit 0 (10, 20, 100 to 110) call a group") for family in LEROY),
+]
+
+
+@pytest.mark.parametrize(("family", "text"), WARNED)
+def test_the_warnings_of_the_manuals(family: str, text: str) -> None:
+    assert text in text_of(family, "Warnings")
+    assert all(row.warns for row in section(family, "Warnings").rows)
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_no_warning_stands_twice(family: str) -> None:
+    gateways = [r for r in section(family, "Warnings").rows if "gateway" in r.text]
+    assert len(gateways) == 1
+    texts = [row.text for row in section(family, "Warnings").rows]
+    assert len(texts) == len(set(texts))
+
+
+def test_what_is_not_from_the_familys_manual_is_marked() -> None:
+    marks = {row.text: row.sure for row in section("atv312", "Warnings").rows}
+    (gateway,) = [sure for text, sure in marks.items() if "gateway" in text]
+    assert gateway == "sister family ?"
+    (own,) = [row.sure for row in section("atv71", "Warnings").rows if "gateway" in row.text]
+    assert own == ""
+    wait = section("atv31", "Before it is opened").rows[0]
+    assert (wait.text, wait.sure) == (
+        "15 minutes; DC bus below 42 V, measured",
+        "sister family ?",
+    )
+
+
+WAITS = {
+    "atv21": "15 minutes; DC bus below 45 V, measured",
+    "atv312": "15 minutes; DC bus below 42 V, measured",
+    "atv71": "15 minutes; DC bus below 45 V, measured",
+    "powerdrive": "not known",
+    "proxidrive": "not known",
+    "varmeca": "not known",
+}
+
+
+@pytest.mark.parametrize("family", WAITS)
+def test_how_long_to_wait_before_it_is_opened(family: str) -> None:
+    assert section(family, "Before it is opened").rows[0].text == WAITS[family]
+
+
+@pytest.mark.parametrize("family", ALTIVAR)
+def test_names_of_the_signals_across_standards(family: str) -> None:
+    rows = {row.head: row.text for row in section(family, "Names of the signals").rows}
+    assert rows == {
+        "D0": "EIA/TIA-485: A or A'; Uni-Telway: D(A); Jbus: RD+/TD+ or L+",
+        "D1": "EIA/TIA-485: B or B'; Uni-Telway: D(B); Jbus: RD-/TD- or L-",
+        "Common": "EIA/TIA-485: C or C'; Uni-Telway: 0VL",
+    }
+
+
+def test_other_servers_and_lamps_of_the_altivar_71() -> None:
+    addresses = text_of("atv71", "Addresses")
+    assert "AMOA another server" in addresses
+    assert "AMOC another server" in addresses
+    assert "leaves the factory with OFF" in addresses
+    assert "MOD Lit for 200 ms" in text_of("atv71", "Lamps and display")
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+@given(width=st.integers(40, 160))
+def test_no_line_is_wider_than_the_page(family: str, width: int) -> None:
+    for line in page_lines(family_page(library.load(family)), width):
+        assert len(line.head + line.text) <= width or line.kind == "title"
+
+
+def test_control_characters_of_a_profile_are_not_sent_to_the_terminal() -> None:
+    data = library.load("atv71").data
+    bad = msgspec.structs.replace(data.wiring.warnings[0], text="a\x1b[2Jb")
+    wiring = msgspec.structs.replace(data.wiring, warnings=[bad])
+    pins = msgspec.structs.replace(data.connectors[0], name="a\x1b[2Jb")
+    profile = Profile(msgspec.structs.replace(data, wiring=wiring, connectors=[pins]))
+    assert all("\x1b" not in line.head + line.text for line in page_lines(family_page(profile), 80))
+
+
+# Models
+
+
+def test_every_model_of_the_altivar_21_is_told_by_its_code_and_class() -> None:
+    profile = library.load("atv21")
+    known = profile.data.identification
+    assert model_codes(profile) == ["FB05", "FB72"]
+    assert len(known.models) == 64
+    assert sum(bool(model.reference) for model in known.models) == 60
+    for model in known.models:
+        raws = {"FB05": model.code, "FB72": int(model.class_b) << 7}
+        assert model_of(profile, raws) == model
+
+
+def test_models_that_share_a_code_need_the_class() -> None:
+    profile = library.load("atv21")
+    counts: dict[int, int] = {}
+    for model in profile.data.identification.models:
+        counts[model.code] = counts.get(model.code, 0) + 1
+    for code, count in counts.items():
+        assert (model_of(profile, {"FB05": code}) is None) is (count > 1), code
+    assert model_of(profile, {}) is None
+
+
+def test_what_a_model_is_called() -> None:
+    profile = library.load("atv21")
+    assert model_told(profile, {"FB05": 6, "FB72": 0}) == "ATV21HU15M3X, 200 V, 1.5 kW"
+    assert model_told(profile, {"FB05": 136, "FB72": 0x80}) == (
+        "ATV21W075N4C, 400/460 V, 0.75 kW, IP54, class B filter"
+    )
+    assert model_told(profile, {"FB05": 999, "FB72": 0}) == "code 999, in no list at hand"
+    assert model_told(profile, {}) == ""
+    assert model_told(library.load("atv312"), {"FB05": 6}) == ""
+
+
+def test_a_section_without_rows_is_left_out() -> None:
+    data = msgspec.structs.replace(library.load("atv71").data, errata=[], line_rules=[])
+    titles = [one.title for one in family_page(Profile(data))]
+    assert "Where the manuals are wrong" not in titles
+    assert all(replace(one).rows for one in family_page(Profile(data)))

@@ -1,0 +1,113 @@
+"""The profile of one drive: its family's, with what a person has taught of it."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+import pytest
+
+from tui.drive.control_taking import control_taking
+from tui.drive.orders import choose, locked_by
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+from tui.drive.settings.factory import not_factory
+from tui.drive.settings.writable import is_setting, write_refusal
+from tui.drive.shown import shown, typed_text
+from tui.drive.taught_profile import teachable_codes, why_not_taught, with_taught
+from tui.drive.teaching import TaughtScale
+
+LEROY_SOMER = ("powerdrive", "proxidrive", "varmeca")
+RPM = TaughtScale(Decimal(1), "rpm", None)
+HERTZ = TaughtScale(Decimal("0.1"), "Hz", True)
+
+
+@pytest.fixture(params=LEROY_SOMER)
+def family(request: pytest.FixtureRequest) -> Profile:
+    return library.load(str(request.param))
+
+
+def test_every_measurement_of_a_leroy_somer_drive_can_be_taught(family: Profile) -> None:
+    assert {"1.06", "1.21", "4.01", "5.01", "5.02"} <= {*teachable_codes(family)}
+    for code in ("6.42", "10.40", "6.43", "15.07", "10.01"):
+        assert why_not_taught(family, code), code
+
+
+@pytest.mark.parametrize("id", ["atv21", "atv31", "atv312", "atv71"])
+def test_what_a_family_knows_is_not_taught(id: str) -> None:
+    family = library.load(id)
+    told = [p for p in family.parameters if p.unit or p.values or p.bits or p.scale != "1"]
+    assert told
+    assert not {p.code for p in told} & {*teachable_codes(family)}
+
+
+def test_a_taught_value_is_told_with_its_sign_and_mark(family: Profile) -> None:
+    own = with_taught(family, {"5.01": HERTZ, "1.21": RPM})
+    value = shown(own, own["5.01"], 65236, {})
+    assert (value.display, value.taught) == ("-30.0 Hz", True)
+    # whoever still holds the family's parameter is told the same
+    assert shown(own, family["5.01"], 65236, {}) == value
+    assert typed_text(own, own["5.01"], 300, {}) == "30.0"
+    unsure = shown(own, own["1.21"], 65236, {})
+    assert (unsure.display, unsure.taught) == ("65236 raw", False)
+    assert not shown(own, own["4.01"], 84, {}).taught
+    assert not shown(family, family["5.01"], 300, {}).taught
+
+
+def test_what_was_taught_is_still_written_by_no_editor(family: Profile) -> None:
+    own = with_taught(family, {"1.21": RPM}, "1.21")
+    refused = write_refusal(own, own["1.21"], "ready", ("1.21",))
+    assert refused is not None
+    assert refused.reason == "read-only"
+    assert not is_setting(own, own["1.21"])
+    assert not not_factory(own, own["1.21"], {"1.21": 900})
+
+
+def test_the_confirmed_reference_is_chosen_by_each_command_to_run_and_by_nothing_else(
+    family: Profile,
+) -> None:
+    own = with_taught(family, {"1.21": RPM}, "1.21")
+    raws = {"10.40": 1, "6.43": 1}
+    (before,), (after,) = family.data.charts, own.data.charts
+    for order, word in (("forward", 0x0103), ("reverse", 0x0109)):
+        assert choose(after, order, raws).words == [word]  # type: ignore[arg-type]
+    rest = [one for one in after.orders if one.id not in ("forward", "reverse")]
+    assert rest == [one for one in before.orders if one.id not in ("forward", "reverse")]
+    assert own.quantity("command_speed") == own["1.21"]
+    assert own.quantity("command_frequency") is None
+
+
+@pytest.mark.parametrize("unit", ["", "%", "A"])
+def test_a_preset_in_another_unit_takes_no_reference(family: Profile, unit: str) -> None:
+    own = with_taught(family, {"1.21": TaughtScale(Decimal(1), unit, None)}, "1.21")
+    assert own.quantity("command_speed") is None
+    assert own.data.charts == family.data.charts
+
+
+def test_nothing_known_is_the_family_itself(family: Profile) -> None:
+    assert with_taught(family, {}) is family
+    assert with_taught(family, {"NOSUCH": HERTZ, "10.40": HERTZ}, "1.21") is family
+
+
+def test_who_has_the_control(family: Profile) -> None:
+    unknown, line, terminals = (
+        control_taking(family, raws) for raws in ({}, {"6.43": 1}, {"6.43": 0})
+    )
+    for found in (unknown, line, terminals):
+        assert found is not None
+        assert found.can_take
+        assert found.can_give_back
+    taken = [found.taken for found in (unknown, line, terminals) if found is not None]
+    assert taken == [None, True, False]
+    assert control_taking(library.load("atv71"), {}) is None
+
+
+@pytest.mark.parametrize(
+    ("word", "holds"), [(0, False), (1, False), (3, True), (9, True), (0x20, True)]
+)
+def test_the_control_is_not_taken_over_a_waiting_run_command(
+    family: Profile, word: int, holds: bool
+) -> None:
+    (chart,) = family.data.charts
+    assert (locked_by(chart, "take-control", {"6.42": word}) is not None) is holds
+    assert locked_by(chart, "forward", {"6.42": word}) is None
+    assert locked_by(chart, "hand-back", {"6.42": word}) is None

@@ -1,0 +1,56 @@
+"""`drivepanel simulate` from outside: inputs by lines on its standard input, line settings."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+from pathlib import Path
+
+import pytest
+
+from tests.programs import Served, drivepanel, port_of, simulated, wait_until
+
+
+def typed(simulation: Served, line: str) -> str:
+    """What the program says to a line that somebody types."""
+    process = simulation.process
+    assert process.stdin is not None
+    assert process.stdout is not None
+    process.stdin.write(f"{line}\n")
+    process.stdin.flush()
+    return process.stdout.readline().strip()
+
+
+def frequency(line: str) -> float:
+    done = drivepanel("read", line, "-d", "2", "-p", "atv312", "--json", "RFR")
+    assert done.returncode == 0, done.stderr
+    return float(json.loads(done.stdout)["values"]["rFr"]["value"])
+
+
+def test_a_line_on_standard_input_runs_the_motor_as_a_hand_at_the_terminals_would() -> None:
+    way = ("atv312@2", "--set", "FR1=1", "--tcp", "0")
+    with simulated(*way, stdin=subprocess.PIPE) as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+        assert typed(simulation, "2: LI1=1, AI1=8V") == "2: LI1 = 1, AI1 = 80 %"
+        wait_until(lambda: frequency(line) > 10, "the motor turns")
+        assert typed(simulation, "2: LI1=0") == "2: LI1 = 0"
+        wait_until(lambda: frequency(line) == 0, "the motor stands")
+        assert simulation.process.stdin is not None
+        simulation.process.stdin.write("2: LI9=1\n")
+        simulation.process.stdin.close()
+        simulation.process.stdin = None
+        status, said = simulation.end()
+        assert status == 0
+        assert "No input is called 'LI9'" in said
+
+
+@pytest.mark.parametrize(("more", "status"), [((), 3), (("--any-settings",), 0)])
+def test_another_baud_is_not_understood_unless_any_settings_are(
+    more: tuple[str, ...], status: int, tmp_path: Path
+) -> None:
+    link = str(tmp_path / "line")
+    with simulated("atv312@2", "--pty", link, *more):
+        own = drivepanel("read", f"serial:{link},19200,8E1", "-d", "2", "-p", "atv312", "ETA")
+        assert own.returncode == 0, own.stderr
+        other = drivepanel("read", f"serial:{link},9600,8E1", "-d", "2", "-p", "atv312", "ETA")
+        assert other.returncode == status, other.stderr

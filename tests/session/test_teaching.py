@@ -1,0 +1,367 @@
+"""What is taught of a drive is kept with it, used at once, and ended by a look that disagrees."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tui.drive.errors import ValueRefused
+from tui.drive.teaching import LessonKind
+from tui.session.command.reference import Reference, parse_reference, reference_codes
+from tui.session.connect.identify import DriveIdentity
+from tui.session.drive import DriveSession
+from tui.session.read.reader import Reader
+from tui.session.teaching.kept import TaughtDrive
+from tui.session.teaching.teacher import Teacher
+
+from .fakes import OneDrive, parameter, profile_of
+
+RAW: dict[str, Any] = {"access": "r", "confidence": "unverified"}
+PROFILE = profile_of(
+    parameter("HZ", 500, **RAW),
+    parameter("AMPS", 400, **RAW),
+    parameter("PRESET", 120, **RAW),
+    parameter("MOST", 121, **RAW),
+    parameter("KNOWN", 600, unit="V"),
+    teachable_references=[{"parameter": "PRESET", "most": "MOST"}],
+)
+NAMED = DriveIdentity(1, "Maker", "A-1", "1.0", "", None, ())
+OTHER = DriveIdentity(1, "Maker", "B-2", "1.0", "", None, ())
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A state folder of its own."""
+    monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path))
+    return tmp_path
+
+
+def drive(identity: DriveIdentity | None = None, **words: int) -> tuple[OneDrive, Teacher]:
+    """A drive with its words by code, and its teacher, which has recalled what was kept."""
+    held = {one.address: 0 for one in PROFILE.parameters}
+    held |= {PROFILE[code].address: word for code, word in words.items()}
+    line = OneDrive(held)
+    teacher = Teacher(DriveSession(line, 1, PROFILE, identity))
+    teacher.recall()
+    return line, teacher
+
+
+def kept(folder: Path, ending: str = "json") -> Path:
+    """The one file of what was taught, or of what was set aside."""
+    (path,) = folder.glob(f"taught/*.{ending}")
+    return path
+
+
+async def shown(teacher: Teacher, code: str = "HZ") -> str:
+    """What the drive's value reads, and its mark."""
+    value = (await Reader(teacher.session).read([code]))[code].value
+    assert value is not None
+    return f"{value.display}{' taught' if value.taught else ''}"
+
+
+async def two_looks(line: OneDrive, teacher: Teacher) -> None:
+    """Teach HZ: 0.1 Hz a count."""
+    line.registers[500] = 300
+    assert (await teacher.look("HZ", "30.0", "Hz")).kind is LessonKind.FIRST
+    line.registers[500] = 503
+    assert (await teacher.look("HZ", "50.3")).kind is LessonKind.TAUGHT
+
+
+async def test_from_the_second_look_on_the_value_is_told_in_its_unit() -> None:
+    line, teacher = drive()
+    assert await shown(teacher) == "0"
+    await two_looks(line, teacher)
+    assert await shown(teacher) == "50.3 Hz taught"
+    assert teacher.session.profile["HZ"].unit == "Hz"
+    assert teacher.session.family["HZ"].unit == "", "the family learns nothing"
+    assert await shown(teacher, "AMPS") == "0"
+
+
+async def test_it_is_known_to_the_next_program_on_this_line_and_device() -> None:
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    _, later = drive(HZ=250)
+    assert await shown(later) == "25.0 Hz taught"
+    elsewhere = Teacher(DriveSession(OneDrive({500: 250}, device=2), 2, PROFILE))
+    elsewhere.recall()
+    assert await shown(elsewhere) == "250"
+
+
+async def test_another_drive_at_the_same_place_is_not_taken_for_it() -> None:
+    line, teacher = drive(NAMED)
+    await two_looks(line, teacher)
+    _, other = drive(OTHER, HZ=250)
+    assert await shown(other) == "250"
+    _, same = drive(NAMED, HZ=250)
+    assert await shown(same) == "25.0 Hz taught"
+    _, unsaid = drive(None, HZ=250)
+    assert await shown(unsaid) == "25.0 Hz taught", "its profile was named, it was not asked"
+
+
+async def test_of_two_drives_taught_at_one_place_an_unnamed_one_is_neither() -> None:
+    for who in (NAMED, OTHER):
+        line, teacher = drive(who)
+        await two_looks(line, teacher)
+    _, unsaid = drive(None, HZ=250)
+    assert await shown(unsaid) == "250"
+
+
+async def test_a_third_look_that_disagrees_ends_it_for_good() -> None:
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    line.registers[500] = 400
+    lesson = await teacher.look("HZ", "20.0")
+    assert lesson.kind is LessonKind.ENDED
+    assert await shown(teacher) == "400"
+    _, later = drive(HZ=250)
+    assert await shown(later) == "250"
+
+
+async def test_a_sign_that_no_look_has_told_leaves_the_word_raw() -> None:
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    line.registers[500] = 65036
+    assert await shown(teacher) == "65036 raw"
+    assert (await teacher.look("HZ", "-50.0")).kind is LessonKind.AGREES
+    assert await shown(teacher) == "-50.0 Hz taught"
+
+
+async def test_what_has_a_scale_is_not_taught() -> None:
+    line, teacher = drive()
+    with pytest.raises(ValueRefused, match="nothing is to be taught"):
+        await teacher.look("KNOWN", "12")
+    assert line.asked == []
+
+
+async def test_a_text_that_is_no_number_is_refused_before_the_drive_is_asked() -> None:
+    line, teacher = drive()
+    with pytest.raises(ValueRefused, match="no number of a display"):
+        await teacher.look("HZ", "fast")
+    assert line.asked == []
+
+
+async def test_forgetting() -> None:
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    assert teacher.forget("HZ")
+    assert not teacher.forget("HZ")
+    assert await shown(teacher) == "503"
+    _, later = drive(HZ=250)
+    assert await shown(later) == "250"
+
+
+async def test_what_two_programs_teach_is_all_kept() -> None:
+    line, teacher = drive()
+    other_line, other = drive()
+    await two_looks(line, teacher)
+    other_line.registers[400] = 84
+    await other.look("AMPS", "8.4", "A")
+    other_line.registers[400] = 120
+    await other.look("AMPS", "12.0")
+    _, later = drive(HZ=250, AMPS=50)
+    assert await shown(later) == "25.0 Hz taught"
+    assert await shown(later, "AMPS") == "5.0 A taught"
+
+
+# The reference
+
+
+async def preset(unit: str = "Hz") -> Teacher:
+    """A drive whose preset was taught, 0.1 a count."""
+    line, teacher = drive(PRESET=300)
+    await teacher.look("PRESET", "30.0", unit)
+    line.registers[120] = 400
+    await teacher.look("PRESET", "40.0")
+    return teacher
+
+
+async def test_a_taught_preset_is_proposed_and_takes_the_reference_once_confirmed() -> None:
+    teacher = await preset()
+    session = teacher.session
+    assert teacher.proposal() == "PRESET"
+    assert session.profile.quantity("command_frequency") is None, "not before a person confirms"
+    assert "Hz" in teacher.confirm_reference("PRESET")
+    assert session.profile.quantity("command_frequency") == session.profile["PRESET"]
+    assert (teacher.proposal(), teacher.reference) == ("", "PRESET")
+    _, later = drive()
+    assert later.reference == "PRESET"
+    later.drop_reference()
+    assert later.session.profile.quantity("command_frequency") is None
+    _, last = drive()
+    assert last.reference == ""
+
+
+async def test_a_preset_in_rpm_takes_a_speed() -> None:
+    teacher = await preset("rpm")
+    teacher.confirm_reference("PRESET")
+    assert teacher.session.profile.quantity("command_speed") is not None
+    assert teacher.session.profile.quantity("command_frequency") is None
+
+
+@pytest.mark.parametrize(("unit", "why"), [("%", "given in Hz or rpm"), ("", "no unit")])
+async def test_a_preset_in_another_unit_takes_none(unit: str, why: str) -> None:
+    teacher = await preset(unit)
+    assert teacher.proposal() == ""
+    with pytest.raises(ValueRefused, match=why):
+        teacher.confirm_reference("PRESET")
+
+
+async def test_what_was_not_taught_or_is_no_preset_takes_none() -> None:
+    line, teacher = drive()
+    with pytest.raises(ValueRefused, match="not taught yet"):
+        teacher.confirm_reference("PRESET")
+    await two_looks(line, teacher)
+    with pytest.raises(ValueRefused, match="PRESET may"):
+        teacher.confirm_reference("HZ")
+
+
+async def test_a_look_that_ends_the_scale_ends_the_reference_and_its_confirmation() -> None:
+    teacher = await preset()
+    teacher.confirm_reference("PRESET")
+    assert (await teacher.look("PRESET", "20.0")).kind is LessonKind.ENDED
+    assert teacher.session.profile.quantity("command_frequency") is None
+    again = await preset()
+    assert again.reference == "", "confirmed anew, or not at all"
+
+
+async def presets(limit_unit: str) -> tuple[OneDrive, Teacher]:
+    """A drive whose preset takes the reference in rpm, and whose highest reference is 1500."""
+    line, teacher = drive(PRESET=300, MOST=1500)
+    await teacher.look("PRESET", "300", "rpm")
+    line.registers[120] = 400
+    await teacher.look("PRESET", "400")
+    teacher.confirm_reference("PRESET")
+    await teacher.look("MOST", "1500", limit_unit)
+    line.registers[121] = 900
+    await teacher.look("MOST", "900")
+    return line, teacher
+
+
+async def parsed(teacher: Teacher, text: str) -> Reference:
+    """A reference as typed, checked against what the drive holds."""
+    profile = teacher.session.profile
+    readings = await Reader(teacher.session).read(reference_codes(profile))
+    return parse_reference(profile, text, readings)
+
+
+async def test_a_reference_in_the_taught_unit() -> None:
+    teacher = await preset("Hz")
+    teacher.confirm_reference("PRESET")
+    found = await parsed(teacher, "25.5")
+    assert (found.parameter.code, found.raw, found.text) == ("PRESET", 255, "25.5 Hz")
+    with pytest.raises(ValueRefused, match="taught in Hz"):
+        await parsed(teacher, "700rpm")
+
+
+async def test_the_highest_reference_holds_once_it_was_taught_in_the_same_unit() -> None:
+    _, teacher = await presets("rpm")
+    assert (await parsed(teacher, "900rpm")).raw == 900
+    with pytest.raises(ValueRefused, match="above MOST = 900 rpm"):
+        await parsed(teacher, "901rpm")
+    teacher.forget("MOST")
+    assert (await parsed(teacher, "901rpm")).raw == 901
+    _, other = await presets("Hz")
+    assert (await parsed(other, "901rpm")).raw == 901, "another unit says nothing"
+
+
+async def test_a_reference_whose_word_could_mean_a_negative_one_is_refused() -> None:
+    teacher = await preset("Hz")
+    teacher.confirm_reference("PRESET")
+    assert (await parsed(teacher, "3276.7")).raw == 0x7FFF
+    with pytest.raises(ValueRefused, match="sign is open"):
+        await parsed(teacher, "3276.8")
+
+
+@pytest.mark.parametrize(
+    ("taught", "says"),
+    [(False, "teach PRESET: L in the panel"), (True, "R in the panel, or drivepanel teach PRESET")],
+)
+async def test_where_no_reference_goes_yet_the_way_is_told(taught: bool, says: str) -> None:
+    teacher = await preset() if taught else drive()[1]
+    with pytest.raises(ValueRefused, match="no manual at hand") as told:
+        await parsed(teacher, "20")
+    assert says in str(told.value)
+
+
+# Files
+
+
+HOSTILE = {
+    "no json": "{",
+    "binary": "\x00\x01",
+    "another thing": "[1, 2]",
+    "no looks": '{"line": "x"}',
+    "looks of no kind": '{"looks": 3}',
+    "a list of numbers": '{"looks": {"HZ": [1, 2]}}',
+    "a word past the last": '{"looks": {"HZ": [{"raw": 70000, "shown": "1"}]}}',
+    "a word that is true": '{"looks": {"HZ": [{"raw": true, "shown": "1"}]}}',
+    "shown is no number": '{"looks": {"HZ": [{"raw": 1, "shown": "1e9999"}]}}',
+    "a unit that commands a terminal": '{"looks": {"HZ": [{"raw": 1, "shown": "1 \\u001b[2J"}]}}',
+    "a code that is none": '{"looks": {"a b": []}}',
+    "too many": json.dumps({"looks": {"HZ": [{"raw": 1, "shown": "1"}] * 9}}),
+    "endless": "[" * 100_000,
+    "too long": json.dumps({"looks": {}, "x": "x" * 200_001}),
+    "a reference of no kind": '{"looks": {}, "reference": 3}',
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", HOSTILE.values(), ids=HOSTILE.keys())
+async def test_a_damaged_file_is_told_and_nothing_is_lost(folder: Path, text: str) -> None:
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    path = kept(folder)
+    path.write_text(text, "utf-8")
+    line, teacher = drive(HZ=250)
+    assert str(path) in teacher.trouble
+    assert "Nothing taught is used" in teacher.trouble
+    assert await shown(teacher) == "250"
+    assert path.read_text("utf-8") == text, "looking at it changes nothing"
+    await two_looks(line, teacher)
+    assert teacher.trouble == ""
+    assert kept(folder, "damaged1").read_text("utf-8") == text
+    assert await shown(drive(HZ=250)[1]) == "25.0 Hz taught"
+
+
+async def test_looks_that_contradict_each_other_teach_nothing(folder: Path) -> None:
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    path = kept(folder)
+    told = json.loads(path.read_text("utf-8"))
+    told["looks"]["HZ"][1]["shown"] = "70.0 Hz"
+    path.write_text(json.dumps(told), "utf-8")
+    assert await shown(drive(HZ=250)[1]) == "250"
+
+
+async def test_a_code_that_the_profile_does_not_have_is_kept_and_not_used(folder: Path) -> None:
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    path = kept(folder)
+    told = json.loads(path.read_text("utf-8"))
+    told["looks"]["GONE"] = told["looks"]["HZ"]
+    told["looks"]["KNOWN"] = told["looks"]["HZ"]
+    path.write_text(json.dumps(told), "utf-8")
+    line, later = drive(HZ=250, KNOWN=230)
+    assert later.trouble == ""
+    assert await shown(later, "KNOWN") == "230 V"
+    later.forget("HZ")
+    assert set(json.loads(path.read_text("utf-8"))["looks"]) == {"GONE", "KNOWN"}
+
+
+async def test_a_folder_that_cannot_be_written_is_told_and_the_scale_is_used(
+    folder: Path,
+) -> None:
+    (folder / "taught").write_text("in the way")
+    line, teacher = drive()
+    await two_looks(line, teacher)
+    assert "not kept" in teacher.trouble
+    assert await shown(teacher) == "50.3 Hz taught"
+
+
+def test_the_file_is_found_however_the_line_is_typed() -> None:
+    one = TaughtDrive.of("serial:/dev/ttyS9,19200,8E1", 4, "powerdrive", None)
+    assert one.file == TaughtDrive.of("/dev/ttyS9", 4, "powerdrive", None).file
+    assert one.file != TaughtDrive.of("/dev/ttyS9", 5, "powerdrive", None).file
+    assert one.file != TaughtDrive.of("/dev/ttyS9", 4, "varmeca", None).file

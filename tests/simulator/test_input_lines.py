@@ -1,0 +1,52 @@
+"""Lines that set the inputs of simulated drives."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.simulator import DriveSpec, Simulation, SimulatorError, set_inputs
+
+from .small import PROFILES
+
+
+def simulation(*profiles: str) -> Simulation:
+    drives = [DriveSpec(profile, address) for address, profile in enumerate(profiles, 2)]
+    return Simulation(drives, profiles=PROFILES)
+
+
+def test_a_line_sets_inputs_of_the_drive_that_it_names() -> None:
+    made = simulation("atv312", "atv21")
+    assert set_inputs(made, "2: LI1=1, AI1=5V") == "2: LI1 = 1, AI1 = 50 %"
+    assert set_inputs(made, " 3:f=1 ") == "3: F = 1"
+    assert made.drive(2).terminals.closed("LI1")
+    assert made.drive(3).terminals.closed("F")
+
+
+def test_without_inputs_they_are_told() -> None:
+    made = simulation("atv21")
+    set_inputs(made, "2: F=1, VIA=4V")
+    assert set_inputs(made, "2:") == "2: closed of F, R, RES: F; VIA 40 %, VIB 0 %"
+
+
+def test_the_address_may_be_left_out_where_there_is_one_drive() -> None:
+    assert set_inputs(simulation("atv21"), "F=1") == "2: F = 1"
+    with pytest.raises(SimulatorError, match=r"Say which drive.*2, 3"):
+        set_inputs(simulation("atv21", "atv312"), "F=1")
+
+
+@pytest.mark.parametrize(
+    ("line", "why"),
+    [
+        ("9: LI1=1", "No simulated drive has address 9"),
+        ("two: LI1=1", "write it like"),
+        ("2: LI1", "write an input like"),
+        ("2: LI9=1", "No input is called 'LI9'"),
+        ("2: LI1=5", "is a logic input"),
+        ("2: LI1=1, AI1=50V", "more than its full scale"),
+    ],
+)
+def test_a_line_that_is_wrong_sets_nothing(line: str, why: str) -> None:
+    made = simulation("atv312")
+    with pytest.raises(SimulatorError, match=why):
+        set_inputs(made, line)
+    assert made.drive(2).terminals.bits() == 0

@@ -1,0 +1,136 @@
+"""What a terminal can show, as its environment tells it; what stands for what it cannot."""
+
+from __future__ import annotations
+
+import pickle
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from rich.cells import cell_len
+from rich.color import ColorSystem
+from rich.segment import Segment
+from rich.style import Style
+from textual.color import Color
+
+import tui
+from tui.terminal.abilities import ASCII, UTF_8, Abilities, abilities_of, encoding_of
+from tui.terminal.few_colours import in_sixteen, without_colours
+from tui.terminal.plain_signs import NO_SIGN, PLAIN_SIGNS, PlainSigns, in_encoding
+from tui.widgets import palette
+
+LOCALES = [
+    ({"LANG": "en_US.UTF-8"}, UTF_8),
+    ({"LC_CTYPE": "UTF-8"}, UTF_8),
+    ({"LANG": "de_DE.utf8@euro"}, UTF_8),
+    ({"LANG": "en_US.UTF-8", "LC_ALL": "C"}, ASCII),
+    ({"LANG": "C", "LC_CTYPE": "C.UTF-8"}, UTF_8),
+    ({"LANG": "C"}, ASCII),
+    ({"LANG": "POSIX"}, ASCII),
+    ({"LANG": "", "LC_ALL": ""}, ASCII),
+    ({}, ASCII),
+    ({"LANG": "en_US.nonsense"}, ASCII),
+    ({"LANG": "en_US.hex"}, ASCII),
+]
+
+
+@pytest.mark.parametrize(("environment", "encoding"), LOCALES)
+def test_the_locale_tells_the_signs(environment: dict[str, str], encoding: str) -> None:
+    assert encoding_of(environment) == encoding
+
+
+def test_latin_1_counts_where_python_writes_it() -> None:
+    environment = {"LANG": "fr_FR.ISO-8859-1"}
+    assert encoding_of(environment, "iso-8859-1") == "iso8859-1"
+    assert encoding_of(environment, "utf-8") == ASCII, "two bytes would be two signs there"
+
+
+@pytest.mark.parametrize(("ascii", "encoding"), [(True, ASCII), (False, UTF_8)])
+def test_a_person_who_says_it_is_right(ascii: bool, encoding: str) -> None:
+    for environment in ({"LANG": "en_US.UTF-8"}, {"LANG": "C"}):
+        assert abilities_of(environment, ascii=ascii).encoding == encoding
+
+
+COLOURS = [
+    ({"TERM": "xterm-256color"}, ColorSystem.EIGHT_BIT),
+    ({"TERM": "xterm-256color", "COLORTERM": "truecolor"}, ColorSystem.TRUECOLOR),
+    ({"TERM": "xterm-256color", "COLORTERM": "truecolor", "NO_COLOR": "1"}, None),
+    ({"TERM": "xterm-256color", "NO_COLOR": ""}, ColorSystem.EIGHT_BIT),
+    ({"TERM": "linux"}, ColorSystem.STANDARD),
+    ({"TERM": "vt100"}, None),
+    ({"TERM": "vt220"}, None),
+    ({"TERM": "dumb"}, None),
+    ({"TERM": "dumb", "COLORTERM": "truecolor"}, None),
+    ({"TERM": ""}, None),
+    ({}, None),
+    ({"TERM": "nobody-256color"}, ColorSystem.EIGHT_BIT),
+    ({"TERM": "nobody-knows"}, None),
+]
+
+
+@pytest.mark.parametrize(("environment", "colours"), COLOURS)
+def test_terminfo_tells_the_colours(
+    environment: dict[str, str], colours: ColorSystem | None
+) -> None:
+    assert told_of(environment).colours == colours
+
+
+@pytest.mark.parametrize("term", ["vt100", "nobody-knows", "dumb", "screen"])
+def test_only_a_terminal_that_erases_in_colour_is_let_erase(term: str) -> None:
+    assert not told_of({"TERM": term}).erases
+
+
+def told_of(environment: dict[str, str]) -> Abilities:
+    """What is found in a process of its own: terminfo is looked at once in each."""
+    code = (
+        "import sys, pickle; from tui.terminal.abilities import abilities_of;"
+        f"sys.stdout.buffer.write(pickle.dumps(abilities_of({environment!r})))"
+    )
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, check=True).stdout
+    found = pickle.loads(told)
+    assert isinstance(found, Abilities)
+    return found
+
+
+def test_every_sign_of_the_panel_has_a_plain_one() -> None:
+    drawn = {
+        character
+        for path in Path(tui.__file__).parent.rglob("*.py")
+        for character in path.read_text("utf-8")
+        if not character.isascii() and not "\u2400" <= character <= "\u2421"
+    }
+    assert [one for one in sorted(drawn) if in_encoding(one, ASCII) == NO_SIGN] == []
+    assert all(cell_len(one) == len(PLAIN_SIGNS.get(one, " ")) for one in drawn)
+
+
+@given(st.text(max_size=30))
+def test_a_text_in_plain_signs_is_ascii_and_as_wide(text: str) -> None:
+    (segment,) = PlainSigns(ASCII).apply([Segment(text)], Color(0, 0, 0))
+    assert segment.text.isascii()
+    assert cell_len(segment.text) == cell_len(text)
+
+
+def test_latin_1_keeps_what_it_has() -> None:
+    assert in_encoding("µ ± ü · →", "iso8859-1") == "µ ± ü · >"
+
+
+STYLES = [style for name, style in vars(palette).items() if isinstance(style, Style)]
+
+
+@pytest.mark.parametrize("style", STYLES, ids=str)
+def test_in_sixteen_colours_words_are_never_of_the_colour_behind_them(style: Style) -> None:
+    shown = in_sixteen(Style(bgcolor=palette.GROUND) + style)
+    assert shown.color is None or shown.color.number != shown.bgcolor.number  # type: ignore[union-attr]
+
+
+def test_what_is_raised_from_the_ground_stays_so() -> None:
+    assert without_colours(palette.CURSOR).reverse
+    assert without_colours(palette.FAULT_BLOCK).reverse
+    assert without_colours(palette.ATTENTION_BLOCK).reverse
+    assert not without_colours(Style(color=palette.TEXT, bgcolor=palette.SURFACE)).reverse
+    grounds = {in_sixteen(Style(bgcolor=one)).bgcolor for one in (palette.GROUND, palette.SURFACE)}
+    assert in_sixteen(palette.CURSOR).bgcolor not in grounds
+    assert in_sixteen(palette.FAULT).color != in_sixteen(palette.ALARM).color

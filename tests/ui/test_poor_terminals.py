@@ -1,0 +1,68 @@
+"""Terminals that lack signs, colours or room: what stands on them, and that it is all they have."""
+
+from __future__ import annotations
+
+import pytest
+from rich.color import ColorSystem
+
+from tui.terminal.abilities import ASCII, Abilities
+
+from .test_monitor_pictures import SCENES, panel, show
+from .test_pictures import Compare
+
+POOR = {
+    "plain signs": Abilities(ASCII),
+    "latin-1": Abilities("iso8859-1"),
+    "no colours": Abilities(colours=None),
+    "sixteen colours": Abilities(colours=ColorSystem.STANDARD),
+    "vt100": Abilities(ASCII, None),
+}
+"""Terminals that lack something, as `abilities_of` finds them."""
+
+LOOKED_AT = ("1", "2", "question_mark", "escape", "ctrl+p", "escape", "m", "escape", "q")
+"""Keys that lead through screens and dialogs."""
+
+
+@pytest.mark.parametrize("terminal", POOR)
+@pytest.mark.parametrize("name", ["running", "fault", "run"])
+def test_monitor_on_a_poor_terminal(
+    snap_compare: Compare, name: str, terminal: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, screen = panel(SCENES[name], monkeypatch, POOR[terminal])
+    keys = SCENES[name].keys
+    assert snap_compare(
+        app, terminal_size=(80, 24), run_before=lambda pilot: show(app, screen, keys, pilot)
+    )
+
+
+@pytest.mark.parametrize("terminal", ["plain signs", "vt100"])
+async def test_plain_signs_are_ascii_on_every_screen(
+    terminal: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app, screen = panel(SCENES["running"], monkeypatch, POOR[terminal])
+    async with app.run_test(size=(80, 24)) as pilot:
+        await show(app, screen, (), pilot)
+        for key in LOOKED_AT:
+            await pilot.press(key)
+            await pilot.pause()
+            strips = app.screen._compositor.render_strips()
+            assert [strip.text for strip in strips if not strip.text.isascii()] == []
+
+
+async def test_without_colours_there_is_none_on_any_screen(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app, screen = panel(SCENES["fault"], monkeypatch, POOR["no colours"])
+    async with app.run_test(size=(80, 24)) as pilot:
+        await show(app, screen, (), pilot)
+        for key in LOOKED_AT:
+            await pilot.press(key)
+            await pilot.pause()
+            styles = [
+                style
+                for strip in app.screen._compositor.render_strips()
+                for _, style, _ in strip
+                if style is not None
+            ]
+            assert not [style for style in styles if style.color or style.bgcolor]
+            assert any(style.reverse for style in styles), "what is chosen is seen"

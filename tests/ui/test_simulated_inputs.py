@@ -1,0 +1,54 @@
+"""The key that sets the inputs of a simulated drive; a real line has none to be set."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.screens.dialogs.ask import Ask
+from tui.screens.monitor.input_keys import NOT_SIMULATED
+from tui.widgets.plain import Plain
+
+from .test_command_flows import Bench, bench, said, writes
+from .test_flows import until
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+async def asked(made: Bench) -> None:
+    assert made.app.opened is not None
+    made.app.opened.simulation = made.simulation
+    await made.pilot.press("D")
+    await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+
+
+async def test_a_text_sets_the_inputs_of_the_drive_shown_and_writes_nothing() -> None:
+    async with bench("atv312") as made:
+        await asked(made)
+        before = writes(made.app)
+        await made.pilot.press(*"li4=1,ai1=5V", "enter")
+        await until(made.pilot, lambda: not isinstance(made.app.screen, Ask))
+        assert "LI4 = 1, AI1 = 50 %" in said(made.app)
+        terminals = made.drive().terminals
+        assert (terminals.closed("LI4"), terminals.level("AI1")) == (True, 0.5)
+        assert writes(made.app) == before
+
+
+async def test_a_wrong_text_is_told_and_sets_nothing() -> None:
+    async with bench("atv312") as made:
+        await asked(made)
+        await made.pilot.press(*"LI1=1,LI9=1", "enter")
+        fault = made.app.screen.query_one("#fault", Plain)
+        await until(made.pilot, lambda: "No input is called" in str(fault.render()))
+        await made.pilot.press("escape")
+        await until(made.pilot, lambda: not isinstance(made.app.screen, Ask))
+        assert made.drive().terminals.bits() == 0
+
+
+async def test_on_a_real_line_it_asks_nothing() -> None:
+    async with bench("atv312") as made:
+        await made.pilot.press("D")
+        await until(made.pilot, lambda: NOT_SIMULATED[:40] in said(made.app))
+        assert not isinstance(made.app.screen, Ask)

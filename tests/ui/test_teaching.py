@@ -1,0 +1,166 @@
+"""Teaching a raw value in the panel, and running by a taught reference: a simulated Powerdrive."""
+
+from __future__ import annotations
+
+import pytest
+from textual.widgets import Input, OptionList
+
+from tui.screens.command.teaching import PickWord
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.parameters.screen import ParametersScreen
+from tui.session.command.stop_report import Phase
+
+from .test_command_flows import Bench, bench, writes
+from .test_flows import shown, until
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+async def pick(made: Bench, code: str) -> None:
+    """Choose a value on Monitor; the question for its display stands then."""
+    await made.pilot.press("L")
+    await until(made.pilot, lambda: isinstance(made.app.screen, PickWord))
+    listed = made.app.screen.query_one(OptionList)
+    listed.highlighted = made.app.screen._codes.index(code)  # type: ignore[attr-defined]
+    await made.pilot.pause(0.4)
+    await made.pilot.press("enter")
+    await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
+
+
+async def look(made: Bench, text: str) -> None:
+    """Type what the display shows, and Enter once the question has stood."""
+    await made.pilot.press(*text)
+    await made.pilot.pause(0.4)
+    await made.pilot.press("enter")
+    await until(made.pilot, lambda: not isinstance(made.app.screen, Ask))
+
+
+async def two_looks(
+    made: Bench, code: str, first: tuple[int, str], second: tuple[int, str]
+) -> None:
+    """Teach a value that Monitor offers; what the drive holds is set as a person would at it."""
+    for raw, text in (first, second):
+        made.drive().set(code, raw)
+        await pick(made, code)
+        await look(made, text)
+        await made.message(code, "1 count is" if text == second[1] else "another value")
+
+
+async def test_two_looks_on_monitor_and_a_third_that_disagrees() -> None:
+    async with bench("powerdrive") as made:
+        app, pilot = made.app, made.pilot
+        assert "Output ?" in shown(app, "readouts")
+        await two_looks(made, "5.01", (300, "30.0Hz"), (503, "50.3"))
+        await until(pilot, lambda: "Output taught" in shown(app, "readouts"))
+        await until(pilot, lambda: "Hz" in shown(app, "readouts"))
+        assert "Current ?" in shown(app, "readouts"), "it was not taught"
+        made.drive().set("5.01", 400)
+        await pick(made, "5.01")
+        assert "Taught: 1 count is 0.1 Hz" in str(app.screen.query_one("#about").render())
+        await look(made, "20.0")
+        await made.message("no longer taught")
+        await until(pilot, lambda: "Output ?" in shown(app, "readouts"))
+        assert writes(app) == []
+
+
+async def test_what_is_no_number_of_a_display_is_told_in_the_question() -> None:
+    async with bench("powerdrive") as made:
+        await pick(made, "5.01")
+        await made.pilot.press(*"fast")
+        await made.pilot.pause(0.4)
+        await made.pilot.press("enter")
+        fault = made.app.screen.query_one("#fault")
+        await until(made.pilot, lambda: "no number of a display" in str(fault.render()))
+        await made.pilot.press("escape")
+
+
+async def test_space_stops_while_a_display_is_typed() -> None:
+    async with bench("powerdrive") as made:
+        await pick(made, "5.01")
+        await made.pilot.press("5", "space")
+        assert made.app.fleet is not None
+        stopper = made.app.fleet.stopper
+        await until(made.pilot, lambda: 1 in stopper.reports)
+        await until(made.pilot, lambda: not isinstance(made.app.screen, Ask))
+        await until(made.pilot, lambda: stopper.reports[1].phase is Phase.STOPPED)
+        console = made.app.chosen
+        assert console is not None
+        assert console.teacher.looks("5.01") == ()
+
+
+async def test_enter_on_a_raw_value_of_parameters_asks_and_l_does_too() -> None:
+    async with bench("powerdrive") as made:
+        app, pilot = made.app, made.pilot
+        for key, raw, text in (("enter", 84, "8.4A"), ("L", 120, "12.0")):
+            made.drive().set("4.01", raw)
+            await app.open_parameter("4.01")
+            await until(pilot, lambda: isinstance(app.screen, ParametersScreen))
+            await until(pilot, lambda: "4.01" in shown(app, "detail"))
+            await pilot.press(key)
+            await until(pilot, lambda: isinstance(app.screen, Ask))
+            await look(made, text)
+        await until(
+            pilot, lambda: "Taught: 1 count is 0.1 A" in " ".join(shown(app, "detail").split())
+        )
+        await until(pilot, lambda: "12.0 A" in shown(app, "table"))
+
+
+async def test_l_on_a_parameter_with_a_scale_says_that_there_is_nothing_to_teach() -> None:
+    async with bench("powerdrive") as made:
+        app, pilot = made.app, made.pilot
+        await app.open_parameter("15.07")
+        await until(pilot, lambda: isinstance(app.screen, ParametersScreen))
+        await until(pilot, lambda: "15.07" in shown(app, "detail"))
+        await pilot.press("L")
+        await until(
+            pilot, lambda: "nothing is to be taught" in " ".join(shown(app, "said").split())
+        )
+        assert not isinstance(app.screen, Ask)
+
+
+async def test_a_taught_preset_is_proposed_confirmed_and_run_by() -> None:
+    async with bench("powerdrive") as made:
+        app, pilot = made.app, made.pilot
+        await pilot.press("R")
+        await made.message("teach 1.21")
+        for raw, text in ((900, "900rpm"), (600, "600")):
+            made.drive().set("1.21", raw)
+            await pick(made, "1.21")
+            await look(made, text)
+            await made.message("1.21", f"raw {raw}")
+        await until(pilot, lambda: isinstance(app.screen, Confirm))
+        assert "bit 8 of 6.42" in str(app.screen.query_one("#follows").render())
+        await pilot.pause(0.4)
+        await pilot.press("enter")
+        assert isinstance(app.screen, Confirm), "Enter confirms nothing"
+        await pilot.press("y")
+        await made.message("1.21 takes the reference, in rpm")
+        await made.armed()
+        await made.answer("t", "y")
+        await made.message("Control by the line")
+        await pilot.press("r")
+        await made.message("RUN FORWARD", "rpm", "Enter runs")
+        await pilot.press(*"1200")
+        await pilot.pause(0.4)
+        await pilot.press("enter")
+        await until(pilot, lambda: made.drive().raw("1.21") == 1200)
+        await until(pilot, lambda: made.drive().raw("6.42") == 0x0103)
+        await until(pilot, lambda: made.speed() > 35)
+        await pilot.press("space")
+        await made.stopped()
+        assert made.drive().raw("6.42") & 0x002E == 0
+        await made.answer("R", "y")
+        await made.message("takes the reference no longer")
+
+
+async def test_a_family_with_a_reference_has_none_to_teach() -> None:
+    async with bench("atv71") as made:
+        await made.pilot.press("R")
+        await made.message("no reference that has to be taught")
+        await made.pilot.press("L")
+        await made.message("Nothing here is shown raw")
+        assert not made.app.screen.query(Input)

@@ -1,0 +1,101 @@
+"""The page of a family in the panel: reached from everywhere, scrolled, of the drive meant."""
+
+from __future__ import annotations
+
+from textual.widgets import OptionList
+
+from tui.screens.connection.screen import ConnectionScreen
+from tui.screens.keys.finding import find
+from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.wiring.screen import WiringScreen
+
+from .test_frame import Panel, panel
+from .test_frame import no_ports as no_ports  # the fixture is for these tests too
+
+
+async def wiring(made: Panel) -> WiringScreen:
+    await made.pilot.press("I")
+    await made.until(lambda: isinstance(made.app.screen, WiringScreen))
+    await made.until(lambda: "Warnings" in made.shown("page"))
+    screen = made.app.screen
+    assert isinstance(screen, WiringScreen)
+    return screen
+
+
+async def test_the_page_of_the_open_drive_with_its_model() -> None:
+    async with panel() as made:
+        await wiring(made)
+        assert "Schneider Electric Altivar 71" in made.shown("title")
+        assert "gateway" in made.shown("page")
+        await made.until(lambda: "kW" in made.shown("title"))
+        await made.pilot.press("escape")
+        await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
+
+
+async def test_sections_and_lines_are_scrolled_and_the_end_is_the_end() -> None:
+    async with panel() as made:
+        screen = await wiring(made)
+        first = made.shown("page").splitlines()[0]
+        assert first == " Warnings"
+        await made.pilot.press("tab")
+        assert made.shown("page").splitlines()[0] == " Before it is opened"
+        await made.pilot.press("shift+tab")
+        assert made.shown("page").splitlines()[0] == first
+        await made.pilot.press("down")
+        assert made.shown("page").splitlines()[0] != first
+        for _ in range(40):
+            await made.pilot.press("pagedown")
+        last = made.shown("page")
+        await made.pilot.press("down")
+        assert made.shown("page") == last
+        assert len(last.splitlines()) == screen.query_one("#page").size.height
+        for _ in range(40):
+            await made.pilot.press("pageup")
+        assert made.shown("page").splitlines()[0] == first
+
+
+async def test_the_next_drive_has_its_own_page() -> None:
+    async with panel() as made:
+        await made.until(lambda: made.app.fleet is not None)
+        await made.pilot.press("1")
+        await made.until(lambda: isinstance(made.app.screen, ConnectionScreen))
+        await made.pilot.press("s")
+        await made.until(lambda: len(made.app.fleet.consoles if made.app.fleet else []) == 2)
+        await made.pilot.press("2")
+        await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
+        await wiring(made)
+        await made.pilot.press("right_square_bracket")
+        await made.until(lambda: "Altivar 312" in made.shown("title"))
+        # messages belong to no drive: the next drive is shown on Monitor
+        await made.pilot.press("m")
+        await made.pilot.press("left_square_bracket")
+        await made.until(lambda: isinstance(made.app.screen, MonitorScreen))
+
+
+async def test_on_line_it_is_the_drive_under_the_cursor() -> None:
+    async with panel() as made:
+        await made.pilot.press("1", "s")
+        await made.until(lambda: len(made.app.fleet.consoles if made.app.fleet else []) == 2)
+        screen = made.app.screen
+        assert isinstance(screen, ConnectionScreen)
+        drives = screen.query_one("#drives", OptionList)
+        drives.focus()
+        await made.until(lambda: drives.option_count == 2)
+        drives.highlighted = 1
+        await made.until(lambda: screen.pointed is not None and screen.pointed.device == 2)
+        await wiring(made)
+        assert "Altivar 312" in made.shown("title")
+        await made.pilot.press("escape")
+        await made.until(lambda: made.app.screen is screen)
+
+
+async def test_a_stop_works_there_and_nothing_is_written() -> None:
+    async with panel() as made:
+        await wiring(made)
+        await made.pilot.press("space")
+        await made.until(lambda: "STOPPING" in made.shown("strip"))
+
+
+def test_it_is_found_by_its_words() -> None:
+    for query in ("wiring", "pins", "errata", "warnings"):
+        assert find(query, "monitor")[0].action.id == "wiring", query

@@ -1,0 +1,173 @@
+"""`drivepanel teach`: the scale of a raw value, from what the drive's own display shows."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..shared.errors import DIFFERENT, told
+from ..shared.options import (
+    Target,
+    connect_drive,
+    drive_options,
+    json_option,
+    line_argument,
+    on_line,
+)
+from ..shared.say import say
+
+if TYPE_CHECKING:
+    from tui.drive.teaching import Lesson, TaughtScale
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.teaching.teacher import Teacher
+
+
+@click.command(context_settings={"ignore_unknown_options": True})  # -12.5 is a VALUE
+@line_argument
+@click.argument("code", required=False)
+@click.argument("value", required=False)
+@click.argument("unit", required=False)
+@drive_options
+@click.option("--forget", is_flag=True, help="Teach CODE no longer: it is shown raw again.")
+@click.option(
+    "--reference",
+    is_flag=True,
+    help="Confirm that CODE, once taught, takes the drive's reference.",
+)
+@click.option(
+    "--no-reference", is_flag=True, help="Give the reference by no taught parameter any more."
+)
+@json_option
+@told
+def teach(
+    target: Target,
+    code: str | None,
+    value: str | None,
+    unit: str | None,
+    forget: bool,
+    reference: bool,
+    no_reference: bool,
+    as_json: bool,
+) -> None:
+    """Teach what a raw value is in its unit, by what the drive's display shows now.
+
+    VALUE is what the display shows while CODE is read: 50.3 Hz. Two looks at different values tell
+    scale and sign; a look that disagrees ends it. Without VALUE it is told what is taught. Writes
+    nothing to the drive.
+    """
+    wishes = sum((forget, reference, no_reference, value is not None))
+    if wishes > 1:
+        raise click.UsageError("Either VALUE, --forget, --reference or --no-reference.")
+    if (forget or reference) and code is None:
+        raise click.UsageError("Which CODE?")
+
+    async def work(opened: OpenLine) -> int:
+        teacher = await _teacher(opened, target)
+        found = teacher.family.find(code).code if code is not None else ""
+        if value is not None:
+            return await _look(teacher, found, value, unit or "", as_json=as_json)
+        if forget:
+            known = teacher.forget(found)
+            say(f"{found}: {'shown raw again' if known else 'was not taught'}.")
+        elif reference:
+            _confirm(teacher, found)
+        elif no_reference:
+            teacher.drop_reference()
+            say("No taught parameter takes the reference.")
+        else:
+            _tell_all(teacher, found, as_json=as_json)
+        _tell_trouble(teacher)
+        return 0
+
+    if status := on_line(target, work, read_only=True):
+        raise click.exceptions.Exit(status)
+
+
+async def _teacher(opened: OpenLine, target: Target) -> Teacher:
+    """The teacher of the wanted drive; what cannot be recalled was said by `connect_drive`."""
+    from tui.session.teaching.teacher import Teacher
+
+    teacher = Teacher(await connect_drive(opened, target))
+    teacher.recall()
+    teacher.trouble = ""
+    return teacher
+
+
+async def _look(teacher: Teacher, code: str, value: str, unit: str, *, as_json: bool) -> int:
+    from ..shared.output import print_json
+
+    lesson = await teacher.look(code, value, unit)
+    if as_json:
+        print_json({**_of_drive(teacher), **_lesson_json(code, lesson)})
+    else:
+        say(lesson.text)
+        if teacher.proposal() == code:
+            say(f"{code} may take the reference: drivepanel teach with {code} --reference.")
+    _tell_trouble(teacher)
+    return DIFFERENT if lesson.went_wrong else 0
+
+
+def _confirm(teacher: Teacher, code: str) -> None:
+    from tui.session.teaching.teacher import reference_asks
+
+    said = teacher.confirm_reference(code)
+    say(f"{said} {reference_asks(teacher.family, code)}")
+
+
+def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:
+    """What is taught and what was begun, of one parameter or of all."""
+    from ..shared.output import print_json
+
+    codes = [p.code for p in teacher.family.parameters if teacher.looks(p.code)]
+    rows = [code for code in codes if only in ("", code)]
+    if as_json:
+        kept = {code: _kept_json(teacher, code) for code in rows}
+        reference = teacher.reference or None
+        print_json({**_of_drive(teacher), "taught": kept, "reference": reference})
+        return
+    for code in rows:
+        scale = teacher.scales.get(code)
+        what = scale.text if scale is not None else "not known yet"
+        seen = ", ".join(look.text for look in teacher.looks(code))
+        takes = ", takes the reference" if code == teacher.reference else ""
+        say(f"{code:<8} {teacher.family[code].name}: {what}{takes} ({seen})")
+    if not rows:
+        say(f"{f'Of {only} nothing' if only else 'Nothing'} is taught.")
+
+
+def _tell_trouble(teacher: Teacher) -> None:
+    if teacher.trouble:
+        say(f"drivepanel: {teacher.trouble}", err=True)
+
+
+def _of_drive(teacher: Teacher) -> dict[str, Any]:
+    session = teacher.session
+    return {
+        "line": session.line_text,
+        "device": session.device,
+        "profile": session.profile.id,
+    }
+
+
+def _lesson_json(code: str, lesson: Lesson) -> dict[str, Any]:
+    return {
+        "code": code,
+        "lesson": str(lesson.kind),
+        "text": lesson.text,
+        "taught": _scale_json(lesson.scale),
+    }
+
+
+def _kept_json(teacher: Teacher, code: str) -> dict[str, Any]:
+    looks = [
+        {"raw": one.word, "shown": float(one.shown), "unit": one.unit or None}
+        for one in teacher.looks(code)
+    ]
+    return {"scale": _scale_json(teacher.scales.get(code)), "looks": looks}
+
+
+def _scale_json(scale: TaughtScale | None) -> dict[str, Any] | None:
+    if scale is None:
+        return None
+    return {"scale": float(scale.scale), "unit": scale.unit or None, "signed": scale.signed}

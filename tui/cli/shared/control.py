@@ -1,0 +1,53 @@
+"""The commands and keys that take a drive's control and give it back, for every text here."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tui.drive.control_taking import ControlTaking
+    from tui.session.drive import DriveSession
+
+TAKE_OPTION = "run --take-control"
+GIVE_BACK_OPTION = "stop --give-back --arm"
+TAKES = f"drivepanel {TAKE_OPTION} takes it, in the panel t on Monitor."
+GIVES_BACK = f"drivepanel {GIVE_BACK_OPTION} gives it back, in the panel g on Monitor."
+
+
+def taking_of(session: DriveSession) -> ControlTaking | None:
+    """What can be done about a drive's control, by what was read of it."""
+    from tui.drive.control_taking import control_taking
+
+    return control_taking(session.profile, session.image.raws)
+
+
+def control_json(session: DriveSession) -> dict[str, Any] | None:
+    """Who has the control, and the commands that change that; null where a drive has none."""
+    found = taking_of(session)
+    if found is None:
+        return None
+    return {
+        "taken": found.taken,
+        "take": TAKE_OPTION if found.can_take else None,
+        "give_back": GIVE_BACK_OPTION if found.can_give_back else None,
+    }
+
+
+def control_row(session: DriveSession) -> list[tuple[str, str]]:
+    """The same for a person; nothing where a drive has none of it."""
+    found = taking_of(session)
+    if found is None:
+        return []
+    if found.can_take and found.taken is False:
+        return [("Control", f"not taken by the line: {TAKES}")]
+    if not found.can_give_back:
+        return []
+    return [("Control", f"{'taken by the line: ' if found.taken else ''}{GIVES_BACK}")]
+
+
+def way_to_take(session: DriveSession) -> str:
+    """How the control is taken, for a command that was refused; empty where that is not it."""
+    found = taking_of(session)
+    if found is None or not found.can_take or found.taken is not False:
+        return ""
+    return f" {TAKE_OPTION} takes the control first."

@@ -1,0 +1,133 @@
+"""What a drive's fault points at, as the command line tells it: text and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tui.drive.hints import TRUST, ResetText, alarms_on, codes_to_read, reset_ready, reset_text
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+    from tui.drive.profile.schema import Hint
+    from tui.session.console import DriveConsole
+    from tui.session.drive_state import DriveState
+    from tui.session.reading import Reading
+
+RESET_BY = "a fault reset"
+
+
+@dataclass(frozen=True, slots=True)
+class FaultFinding:
+    """What is known of the fault or the alarm that a drive is in, and the values to look at."""
+
+    profile: Profile
+    hint: Hint | None
+    readings: Mapping[str, Reading]
+    alarm: str = ""
+    """The name of the alarm that is told of, where there is no fault."""
+
+    @property
+    def ready(self) -> bool | None:
+        """Whether the drive says that a reset can work now; None where it does not tell."""
+        raws = {code: r.raw for code, r in self.readings.items() if r.raw is not None}
+        return reset_ready(self.profile, raws)
+
+    def reset(self) -> ResetText:
+        """How the fault ends."""
+        from tui.drive.profile.schema import FaultHelp
+
+        help_ = self.hint if isinstance(self.hint, FaultHelp) else None
+        return reset_text(help_, self.ready, RESET_BY)
+
+
+async def find_out(
+    console: DriveConsole, state: DriveState, readings: Mapping[str, Reading]
+) -> FaultFinding | None:
+    """Read what the drive's fault points at, else its first alarm; None where it has neither.
+
+    Raises the line's errors.
+    """
+    profile = console.session.profile
+    if state.kind == "fault" or state.fault is not None:
+        help_ = profile.guide.fault(state.fault.raw if state.fault else None)
+        found = await console.read(codes_to_read(profile, help_))
+        return FaultFinding(profile, help_, found)
+    raws = {code: r.raw for code, r in readings.items() if r.raw is not None}
+    for word, bit, name in alarms_on(profile, raws):
+        if (hint := profile.guide.alarm(word, bit)) is not None:
+            codes = [look.code for look in hint.look_at]
+            return FaultFinding(profile, hint, await console.read(codes) if codes else {}, name)
+    return None
+
+
+def fault_json(state: DriveState, found: FaultFinding | None) -> dict[str, Any] | None:
+    """The fault that a drive is in, with what it points at; null where it is in none."""
+    fault = state.fault
+    if fault is None and state.kind != "fault":
+        return None
+    told: dict[str, Any] = {
+        "raw": fault.raw if fault else None,
+        "code": fault.code if fault else None,
+        "name": fault.name if fault else None,
+    }
+    hint = found.hint if found is not None and not found.alarm else None
+    return {
+        **told,
+        "causes": list(hint.probable) if hint else [],
+        "checks": list(hint.check) if hint else [],
+        "look_at": _look_at_json(found) if found and hint else [],
+        "confidence": hint.confidence if hint else None,
+        "source": hint.source if hint else None,
+        "reset": _reset_json(found) if found else None,
+    }
+
+
+def _look_at_json(found: FaultFinding) -> list[dict[str, Any]]:
+    from .output import reading_json
+
+    rows = []
+    for look in found.hint.look_at if found.hint else ():
+        reading = found.readings.get(look.code)
+        value = reading_json(reading) if reading is not None else None
+        row = {"code": look.code, "name": found.profile[look.code].name, "why": look.why}
+        rows.append({**row, "value": value})
+    return rows
+
+
+def _reset_json(found: FaultFinding) -> dict[str, Any]:
+    from tui.drive.profile.schema import FaultHelp
+
+    help_ = found.hint if isinstance(found.hint, FaultHelp) else None
+    return {
+        "way": help_.reset if help_ else None,
+        "confidence": "practice",
+        "possible_now": found.ready,
+        "wait_s": help_.wait_s if help_ else None,
+    }
+
+
+def fault_rows(found: FaultFinding | None) -> list[tuple[str, str]]:
+    """Titles and texts of what a fault or an alarm points at, for a person."""
+    if found is None:
+        return []
+    rows: list[tuple[str, str]] = []
+    hint = found.hint
+    if hint is not None:
+        probably = f"{'; '.join(hint.probable)} ({TRUST[hint.confidence]})"
+        rows.append(("  probably", f"{found.alarm}: {probably}" if found.alarm else probably))
+        if hint.check:
+            rows.append(("  check", f"{'; '.join(hint.check)} ({TRUST['practice']})"))
+        for look in hint.look_at:
+            reading = found.readings.get(look.code)
+            value = f"{reading.text} {reading.unit}".rstrip() if reading else "-----"
+            rows.append(("  look at", f"{look.code} {value}, {look.why}"))
+    elif found.profile.guide.trouble:
+        rows.append(("  probably", found.profile.guide.trouble))
+    if not found.alarm:
+        reset = found.reset()
+        said = "" if reset.told_by_drive else f" ({TRUST['practice']})"
+        wait = f"; {reset.wait}" if reset.wait else ""
+        rows.append(("  reset", f"{reset.text}{wait}{said}"))
+    return rows

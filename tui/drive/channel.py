@@ -1,0 +1,95 @@
+"""Who commands a drive and who gives its reference now, by the channels that its words tell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from .profile.profile import Profile
+from .profile.schema import ChannelRow, Parameter, When
+from .values import set_bits
+
+
+@dataclass(frozen=True, slots=True)
+class Channel:
+    """The channel in force."""
+
+    text: str
+    """Who it is, as a person reads it; empty where it is not known."""
+    by_line: bool | None
+    """Whether it is this line; None where it is not known."""
+    parameter: Parameter | None = None
+    """The word that tells it, or that was not read and decides."""
+    of_several: bool = False
+    """Whether another word counts under other conditions."""
+
+
+NOT_TOLD = Channel("", None)
+"""No row of the profile holds."""
+
+
+def command_channel(profile: Profile, raws: Mapping[str, int]) -> Channel | None:
+    """Who commands; None where the profile has no words for it."""
+    rows = profile.data.channels.command
+    return _in_force(profile, rows, raws) if rows else None
+
+
+def reference_channel(profile: Profile, raws: Mapping[str, int]) -> Channel | None:
+    """Who gives the reference; None where the profile has no words for it."""
+    rows = profile.data.channels.reference
+    return _in_force(profile, rows, raws) if rows else None
+
+
+def channel_codes(profile: Profile) -> list[str]:
+    """Codes of all words that tell the channels in force, and what switches them."""
+    channels = profile.data.channels
+    rows = [*channels.command, *channels.reference]
+    told = [(row.parameter, row.when) for row in rows]
+    told += [(switch.parameter, switch.when) for switch in channels.switches]
+    codes = [code for own, when in told for code in (*(one.parameter for one in when), own)]
+    return list(dict.fromkeys(codes))
+
+
+def switch_texts(profile: Profile, raws: Mapping[str, int]) -> list[str]:
+    """What can bring another channel into force, or changes what follows then; sentences."""
+    found = []
+    for switch in profile.data.channels.switches:
+        raw = raws.get(switch.parameter)
+        if raw is None or raw in switch.fixed or not all(w.holds(raws) for w in switch.when):
+            continue
+        parameter = profile[switch.parameter]
+        value = profile.names(parameter).get(raw, str(raw))
+        found.append(f"{parameter.code} is {value}: {switch.does}.")
+    return found
+
+
+def _in_force(profile: Profile, rows: Sequence[ChannelRow], raws: Mapping[str, int]) -> Channel:
+    """The channel of the first row that holds; not known where a word before it was not read."""
+    for row in rows:
+        unread = _unread(row.when, raws)
+        if unread == "":
+            continue
+        code = unread or (row.parameter if row.parameter not in raws else "")
+        if code:
+            return Channel("", None, profile[code], len(rows) > 1)
+        value = (raws[row.parameter] & row.mask) >> row.shift
+        text = _text(profile, row, raws[row.parameter], value)
+        return Channel(text, value in row.line, profile[row.parameter], len(rows) > 1)
+    return NOT_TOLD
+
+
+def _unread(conditions: Sequence[When], raws: Mapping[str, int]) -> str | None:
+    """The first word that was not read and decides; None where all hold, "" where one does not."""
+    verdicts = [(when.parameter, when.holds(raws)) for when in conditions]
+    if any(holds is False for _, holds in verdicts):
+        return ""
+    return next((code for code, holds in verdicts if holds is None), None)
+
+
+def _text(profile: Profile, row: ChannelRow, raw: int, value: int) -> str:
+    parameter = profile[row.parameter]
+    if (name := row.names.get(str(value))) is not None:
+        return name
+    if parameter.bits and not row.names:
+        return ", ".join(bit.name for bit in set_bits(parameter.bits, raw)) or "none"
+    return profile.names(parameter).get(value, f"{parameter.code} = {value}")

@@ -1,0 +1,196 @@
+"""What a person has to know of a family around its line: one page, in sections.
+
+Warnings first, then waiting, pins, rules, addresses, servers, lamps, commands, and where its
+manuals are wrong. Made from the profile alone.
+"""
+
+from __future__ import annotations
+
+import textwrap
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Literal
+
+from .plain import plain
+from .profile.profile import Profile
+from .profile.schema import Confidence, Connector, ProfileData
+
+SURENESS: dict[Confidence, str] = {
+    "manual": "",
+    "manual+public": "",
+    "public-x2": "public documents",
+    "public": "public document",
+    "analogy": "sister family ?",
+    "unverified": "not verified ?",
+}
+"""How surely a thing is known, where no manual of the family says it."""
+HEAD_WIDTH = 18
+"""Columns of what stands before a text, an indent of two and a space behind it among them."""
+MARKS, MARK_WIDTH = ("!", "*"), 4
+"""Signs that stand before a text in place of a name, and their columns."""
+
+
+@dataclass(frozen=True, slots=True)
+class PageRow:
+    """One thing, what it is called, and how surely it is known."""
+
+    head: str
+    text: str
+    sure: str = ""
+    warns: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class PageSection:
+    """Rows of one subject."""
+
+    title: str
+    rows: tuple[PageRow, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class PageLine:
+    """One line of the page as it is drawn."""
+
+    kind: Literal["title", "row", "warning", "gap"]
+    head: str
+    """A title, or what stands before the text in so many columns as it takes."""
+    text: str = ""
+
+
+def family_page(profile: Profile) -> list[PageSection]:
+    """Every section that anything is known of."""
+    data = profile.data
+    sections = [
+        PageSection("Warnings", tuple(_warnings(data))),
+        PageSection("Before it is opened", tuple(_opening(data))),
+        *(PageSection(f"Pins: {c.name}", tuple(_pins(c))) for c in data.connectors),
+        PageSection("Names of the signals", tuple(_signals(data))),
+        PageSection("Line", tuple(_line(data))),
+        PageSection("Addresses", tuple(_addresses(data))),
+        PageSection("When the line falls silent", tuple(_silence(data))),
+        PageSection("Lamps and display", tuple(_lamps(data))),
+        PageSection("Command words", tuple(_commands(data))),
+        PageSection("Where the manuals are wrong", tuple(_errata(data))),
+    ]
+    return [section for section in sections if section.rows]
+
+
+def page_lines(sections: Sequence[PageSection], width: int) -> list[PageLine]:
+    """The page in lines of that width: head, text, and how sure it is behind the text."""
+    lines: list[PageLine] = []
+    for section in sections:
+        if lines:
+            lines.append(PageLine("gap", ""))
+        lines.append(PageLine("title", plain(section.title)))
+        for row in section.rows:
+            lines += _flowed(row, width)
+    return lines
+
+
+def _flowed(row: PageRow, width: int) -> Iterator[PageLine]:
+    before = MARK_WIDTH if row.head in MARKS else HEAD_WIDTH
+    text = plain(f"{row.text} [{row.sure}]" if row.sure else row.text)
+    parts = textwrap.wrap(text, max(20, width - before)) or [""]
+    heads = textwrap.wrap(plain(row.head), before - 3) or [""]
+    kind: Literal["row", "warning"] = "warning" if row.warns else "row"
+    for head, part in zip_longest(heads, parts, fillvalue=""):
+        yield PageLine(kind, f"  {head:<{before - 2}}", part)
+
+
+def _warnings(data: ProfileData) -> Iterator[PageRow]:
+    said = [*data.wiring.warnings]
+    for one in said:
+        yield PageRow("!", one.text, SURENESS[one.confidence], True)
+    watch = data.communication_fault
+    known = {one.text for one in said}
+    for text in watch.warnings if watch else ():
+        if text not in known:
+            yield PageRow("!", text, "", True)
+
+
+def _opening(data: ProfileData) -> Iterator[PageRow]:
+    opening = data.wiring.opening
+    if opening is None:
+        return
+    wait = f"{opening.minutes} minutes" if opening.minutes else "not known"
+    below = f"; DC bus below {opening.below_volts} V, measured" if opening.below_volts else ""
+    yield PageRow("Wait", wait + below, SURENESS[opening.confidence], True)
+    if opening.note:
+        yield PageRow("", opening.note)
+
+
+def _pins(connector: Connector) -> Iterator[PageRow]:
+    for pin in connector.pins:
+        yield PageRow(pin.pin, f"{pin.signal}; {pin.note}" if pin.note else pin.signal)
+    for warning in connector.warnings:
+        yield PageRow("!", warning, "", True)
+
+
+def _signals(data: ProfileData) -> Iterator[PageRow]:
+    for one in data.wiring.signals:
+        yield PageRow(one.signal, "; ".join(f"{std}: {name}" for std, name in one.names.items()))
+
+
+def _line(data: ProfileData) -> Iterator[PageRow]:
+    link = data.link
+    yield PageRow("As it leaves", f"{link.baud} bit/s, {link.format}")
+    if link.bauds or link.formats:
+        rates = ", ".join(map(str, link.bauds or [link.baud]))
+        yield PageRow("It can", f"{rates} bit/s; {', '.join(link.formats or [link.format])}")
+    if link.note:
+        yield PageRow("", link.note)
+    for rule in data.line_rules:
+        yield PageRow(rule.subject, rule.rule)
+
+
+def _addresses(data: ProfileData) -> Iterator[PageRow]:
+    known = data.addresses
+    off = known.off is not None and known.factory == known.off
+    left = "OFF" if off else str(known.factory)
+    yield PageRow("Its own", f"{known.first} to {known.last}; leaves the factory with {left}")
+    if known.off is not None:
+        yield PageRow("Off", f"{known.off}: the drive answers nobody", "", True)
+    if known.zero_digit_is_group:
+        text = "an address with a digit 0 (10, 20, 100) calls a group of drives"
+        yield PageRow("Groups", text, "", True)
+    sent = f"address {known.broadcast}" if known.broadcast is not None else "none"
+    yield PageRow("Broadcast", sent)
+    if known.note:
+        yield PageRow("", known.note)
+    for server in known.servers:
+        text = f"{server.name}: {server.note}" if server.note else server.name
+        yield PageRow(server.parameter, f"another server, address of its own. {text}")
+
+
+def _silence(data: ProfileData) -> Iterator[PageRow]:
+    watch = data.communication_fault
+    if watch is None:
+        yield PageRow("", "What this family does then is in no document at hand.", "", True)
+        return
+    off = f"; {watch.off} switches it off" if watch.off is not None else ""
+    yield PageRow("Time-out", f"{watch.timeout}{off}")
+    yield PageRow("It begins", watch.starts)
+    for one in watch.reactions:
+        head = f"{watch.reaction} = {one.raw}" if watch.reaction else one.name
+        yield PageRow(head, f"{one.name}: {one.does}", "", one.motor_keeps_running)
+    if watch.note:
+        yield PageRow("", watch.note)
+
+
+def _lamps(data: ProfileData) -> Iterator[PageRow]:
+    for one in data.wiring.lamps:
+        yield PageRow(one.name, one.tells, SURENESS[one.confidence])
+
+
+def _commands(data: ProfileData) -> Iterator[PageRow]:
+    for one in data.command_examples:
+        text = f"{one.does}. {one.note}" if one.note else one.does
+        yield PageRow(f"16#{one.word:04X}", text, SURENESS[one.confidence])
+
+
+def _errata(data: ProfileData) -> Iterator[PageRow]:
+    for one in data.errata:
+        why = f" {one.why}" if one.why else ""
+        yield PageRow("*", f"{one.place}. Printed: {one.printed}. Right: {one.right}.{why}")

@@ -1,0 +1,94 @@
+"""Why a command that can move the motor would have no effect now, and what is the way out."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from .channel import Channel, command_channel
+from .chart import state_now
+from .orders import MOVING_ORDERS, OrderRefused, choose, locked_by, order_target, unmet
+from .profile.profile import Profile
+from .profile.schema import Chart, OrderId
+
+IN_FAULT = "The drive is in fault: reset it first."
+
+WayOut = Literal["", "set-up", "take-control"]
+"""What opens the way: nothing from here, another control source, taking the control."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeldBack:
+    """What speaks against a command now."""
+
+    text: str
+    remedy: str = ""
+    """What is to be done, as a sentence."""
+    way: WayOut = ""
+    of_channel: bool = False
+    """Whether somebody else commands the drive."""
+
+
+def held_back(
+    profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]
+) -> HeldBack | None:
+    """What speaks against a command, as far as is known; a word that decides and is not does."""
+    if (lock := locked_by(chart, id, raws)) is not None:
+        if lock.parameter not in raws:
+            return HeldBack(f"{lock.parameter} is not known, and it decides: {lock.text}")
+        channel = _is_set_up(profile, lock.parameter)
+        return HeldBack(lock.text, lock.remedy, "set-up" if channel else "", channel)
+    if id not in MOVING_ORDERS or not chart.orders:
+        return None
+    found = command_channel(profile, raws)
+    if found is not None and not found.by_line:
+        return _by_others(profile, found)
+    if (when := unmet(chart, id, raws)) is not None:
+        value = profile.names(profile[when.parameter]).get(raws[when.parameter])
+        shown = raws[when.parameter] if value is None else value
+        text = f"The drive is not commanded by Modbus: {when.parameter} is {shown}."
+        way: WayOut = "take-control" if _takes_control(profile, chart, when.parameter) else ""
+        return HeldBack(text, "", way, of_channel=True)
+    return None
+
+
+def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str, int]) -> str:
+    """Why the state of now lets no such start through; empty where it does."""
+    state = state_now(profile, chart, raws)
+    if state.kind == "fault":
+        return IN_FAULT
+    if chart.runs_in is None:  # else it is walked there from any other state
+        try:
+            choose(chart, id, raws, state)
+        except OrderRefused as refused:
+            return str(refused)
+    return ""
+
+
+def _by_others(profile: Profile, found: Channel) -> HeldBack:
+    """Somebody else commands, or who does is not known."""
+    word = found.parameter
+    if word is None:
+        return HeldBack("Who commands the drive is not known.", of_channel=True)
+    if found.by_line is None:
+        return HeldBack(f"{word.code} is not known, and it decides who commands the drive.")
+    counts = ", which counts," if found.of_several else ""
+    name = f"{word.name[0].lower()}{word.name[1:]} ({word.code}){counts}"
+    text = f"The drive is not commanded by Modbus: {name} is {found.text}."
+    way: WayOut = "set-up" if profile.data.control_sources else ""
+    return HeldBack(text, profile.data.channels.remedy, way, of_channel=True)
+
+
+def _is_set_up(profile: Profile, code: str) -> bool:
+    """Whether a way of commanding the drive, as it is set up from here, sets this word."""
+    sources = profile.data.control_sources
+    written = {setting.parameter for source in sources for setting in source.settings}
+    return code in written or profile[code].quantity == "command_channel"
+
+
+def _takes_control(profile: Profile, chart: Chart, code: str) -> bool:
+    return any(
+        order.id == "take-control" and order_target(profile, chart, order).code == code
+        for order in chart.orders
+    )

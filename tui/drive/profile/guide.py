@@ -1,0 +1,46 @@
+"""What the faults and alarms of a family point at, by fault and by alarm bit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cached_property
+
+from ..errors import ProfileError
+from .schema import AlarmHelp, FaultHelp, HelpData, ProfileData
+
+
+class FaultGuide:
+    """Help of faults and alarms; its file is read once somebody asks, not with the profile."""
+
+    def __init__(self, profile: ProfileData, read: Callable[[], HelpData] | None = None) -> None:
+        self._numbered = bool(profile.faults.codes)
+        self._rows = HelpData(faults=list(profile.faults.help))
+        self._read = read
+        self.trouble = ""
+        """Why its file could not be read; empty where it could, or was not asked for yet."""
+
+    @cached_property
+    def data(self) -> HelpData:
+        """All that is known; raises ProfileError where the file is wrong."""
+        return self._read() if self._read is not None else self._rows
+
+    @cached_property
+    def _found(self) -> tuple[dict[int | None, FaultHelp], dict[tuple[str, int], AlarmHelp]]:
+        """Help by raw fault, and by word and bit; a file that is wrong hinders nobody at work."""
+        try:
+            told = self.data
+        except ProfileError as error:
+            self.trouble = str(error).partition("\n")[0]
+            told = self._rows
+        return {one.raw: one for one in told.faults}, {(a.word, a.bit): a for a in told.alarms}
+
+    def fault(self, raw: int | None) -> FaultHelp | None:
+        """What a fault points at, by its raw code; None where nothing is known.
+
+        A family whose trips have no numbers has one help for all of them, that of None.
+        """
+        return self._found[0].get(raw if self._numbered else None)
+
+    def alarm(self, word: str, bit: int) -> AlarmHelp | None:
+        """What an alarm bit points at; None where nothing is known."""
+        return self._found[1].get((word, bit))

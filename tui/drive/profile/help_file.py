@@ -1,0 +1,101 @@
+"""Reading what the faults and alarms of a family point at, once somebody asks.
+
+It stands in a file of its own beside the profiles, so that a profile stays readable and the first
+picture of a drive waits for none of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from ..errors import ProfileError
+from .decode import decode_tables, line_of
+from .schema import AlarmHelp, FaultHelp, HelpData, Hint, ProfileData
+from .shared_rows import source_text
+
+FOLDER = "help"
+HelpPlace = tuple[str, int]
+"""A row of a help file: the table, and which of it."""
+
+
+def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
+    """What is known of a family's faults: its own rows before those of its help file.
+
+    `folders` hold profiles; the file is sought in their folder `help`, the first found counts.
+    From a file that does not stand beside the profile (the first folder) what does not fit is
+    left out: it belongs to another edition. Raises ProfileError with each fault, its file and line.
+    """
+    name = (data.faults.help_file or data.profile.id) + ".toml"
+    found = next((f / FOLDER / name for f in folders if (f / FOLDER / name).is_file()), None)
+    if found is None:
+        return HelpData(faults=list(data.faults.help))
+    source = source_text(found)
+    told = decode_tables(source, HelpData)
+    findings = list(help_findings(data, told))
+    if findings and found.parent.parent == folders[0]:
+        lines = [f"{found}:{line_of(source, place)}: {fault}" for place, fault in findings]
+        raise ProfileError("\n".join(lines))
+    wrong = {place for place, _ in findings}
+    own = {one.raw for one in data.faults.help}
+    faults = [
+        one
+        for index, one in enumerate(told.faults)
+        if one.raw not in own and ("faults", index) not in wrong
+    ]
+    alarms = [one for index, one in enumerate(told.alarms) if ("alarms", index) not in wrong]
+    return HelpData(faults=[*data.faults.help, *faults], alarms=alarms)
+
+
+def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
+    """Places of a help file that do not fit the profile, each with what is wrong."""
+    codes = {parameter.code for parameter in data.parameters}
+    for place, label, hint in _hints(told):
+        for look in hint.look_at:
+            if look.code not in codes:
+                yield place, f"{label}: there is no parameter {look.code!r} to look at."
+    yield from _faults(data, told)
+    yield from _alarms(data, told)
+
+
+def _hints(told: HelpData) -> Iterator[tuple[HelpPlace, str, Hint]]:
+    """Everything a help file tells, with its place and its name."""
+    for index, fault in enumerate(told.faults):
+        yield ("faults", index), _label(fault), fault
+    for index, alarm in enumerate(told.alarms):
+        yield ("alarms", index), _label(alarm), alarm
+
+
+def _label(hint: FaultHelp | AlarmHelp) -> str:
+    if isinstance(hint, AlarmHelp):
+        return f"help of alarm {hint.word} bit {hint.bit}"
+    return f"help of fault {hint.raw} {hint.code}".rstrip()
+
+
+def _faults(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
+    known = {fault.raw: fault.code for fault in data.faults.codes}
+    seen: set[int | None] = set()
+    for index, fault in enumerate(told.faults):
+        place: HelpPlace = ("faults", index)
+        if fault.raw in seen:
+            yield place, f"{_label(fault)}: there are two."
+        seen.add(fault.raw)
+        code = known.get(fault.raw) if fault.raw is not None else ""
+        if fault.raw is None and known:
+            yield place, f"{_label(fault)}: raw is missing."
+        elif code is None:
+            yield place, f"{_label(fault)}: there is no such fault."
+        elif fault.raw is not None and fault.code not in ("", code):
+            yield place, f"{_label(fault)}: the profile calls it {code}."
+
+
+def _alarms(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:
+    bits = {p.code: {bit.bit for bit in p.bits} for p in data.parameters}
+    seen: set[tuple[str, int]] = set()
+    for index, alarm in enumerate(told.alarms):
+        place: HelpPlace = ("alarms", index)
+        if (alarm.word, alarm.bit) in seen:
+            yield place, f"{_label(alarm)}: there are two."
+        seen.add((alarm.word, alarm.bit))
+        if alarm.bit not in bits.get(alarm.word, set()):
+            yield place, f"{_label(alarm)}: there is no such bit."

@@ -1,0 +1,51 @@
+"""Which words tell who commands the drive and who gives its reference now."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from .base import Confidence, Table, When, WordAddress
+
+
+class ChannelRow(Table, frozen=True, kw_only=True):
+    """A word that tells the channel in force, where its conditions hold."""
+
+    parameter: str
+    when: list[When] = []
+    """Conditions under which the row counts; all must hold."""
+    mask: WordAddress = 0xFFFF
+    """Bits that tell it, before the shift."""
+    shift: Annotated[int, Meta(ge=0, le=15)] = 0
+    line: list[int] = []
+    """Values, behind mask and shift, with which the channel is this line."""
+    names: dict[str, str] = {}
+    """Names of the values; those of the parameter, or of its bits, where empty."""
+
+
+class ChannelSwitch(Table, frozen=True, kw_only=True):
+    """A parameter by which another channel can come into force while the drive runs."""
+
+    parameter: str
+    fixed: list[int]
+    """Raw values with which nothing is switched."""
+    when: list[When] = []
+    """Conditions under which it switches; all must hold."""
+    does: str
+    """What it does otherwise, behind its name and value."""
+
+
+class Channels(Table, frozen=True, kw_only=True):
+    """Who commands and who gives the reference; of several rows the first that holds counts."""
+
+    command: list[ChannelRow] = []
+    """Words that tell who commands."""
+    reference: list[ChannelRow] = []
+    """Words that tell who gives the reference."""
+    switches: list[ChannelSwitch] = []
+    """Parameters by which another channel can come into force."""
+    remedy: str = ""
+    """What makes the line command the drive, as a sentence."""
+    source: str = ""
+    confidence: Confidence = "manual"

@@ -1,0 +1,61 @@
+"""What the manuals say of a family around its line: warnings, lamps, names of signals, waiting."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from msgspec import Meta
+
+from .base import Confidence, Table
+
+
+class FamilyWarning(Table, frozen=True, kw_only=True):
+    """Something that surprises, hurts or breaks, as a sentence."""
+
+    text: str
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class Opening(Table, frozen=True, kw_only=True):
+    """How long to wait, everything switched off, before the drive is opened or plugged."""
+
+    minutes: Annotated[int, Meta(ge=1)] | None = None
+    """Absent where no document at hand tells it."""
+    below_volts: Annotated[int, Meta(ge=1)] | None = None
+    """Voltage of the DC bus, measured, below which it counts as discharged."""
+    note: str = ""
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class Lamp(Table, frozen=True, kw_only=True):
+    """A lamp or a sign of the display, and what it tells."""
+
+    name: str
+    tells: str
+    source: str = ""
+    confidence: Confidence = "manual"
+
+
+class SignalName(Table, frozen=True, kw_only=True):
+    """A signal of the line and what other standards and makers call it."""
+
+    signal: str
+    names: dict[str, str]
+    """Its names by standard."""
+
+
+class Wiring(Table, frozen=True, kw_only=True):
+    """What a person has to know before touching the line or the drive."""
+
+    warnings: list[FamilyWarning] = []
+    """What surprises, hurts or breaks."""
+    opening: Opening | None = None
+    """How long to wait before the drive is opened."""
+    signals: list[SignalName] = []
+    """What other standards call the signals of the line."""
+    signals_source: str = ""
+    """Where those names are told."""
+    lamps: list[Lamp] = []
+    """Lamps and signs of the display."""

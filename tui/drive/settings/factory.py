@@ -1,0 +1,110 @@
+"""The factory setting of a parameter on the drive at hand, and whether it was changed from it.
+
+Some follow another parameter (50 or 60 Hz), some the drive's rated current, and of some only words
+are known. What cannot be told for sure is told as not changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+
+from ..profile.profile import UNVERIFIED, Profile
+from ..profile.schema import Parameter
+from ..shown import shown
+from ..values import Value
+from .multiple import counts_of
+from .writable import is_setting
+
+
+def factory_raw(
+    profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
+) -> int | None:
+    """The raw factory setting, given what the drive holds; None where that does not tell it.
+
+    A raw value counts with the factory scale: see `factory_value`.
+    """
+    by, of = parameter.factory_by, parameter.factory_of
+    if by is not None:
+        if by.parameter in absent:
+            return parameter.factory
+        return by.raws.get(str(raws.get(by.parameter)))
+    if of is not None:
+        return counts_of(profile, parameter, of, raws, absent)
+    return parameter.factory
+
+
+def factory_value(
+    profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str] = ()
+) -> Value | None:
+    """The factory setting as a person reads it: under the scale that the drive left with.
+
+    A ramp that left the factory with 30 counts of 0.1 s is 3.0 s, whatever a count is worth now.
+    """
+    raw = factory_raw(profile, parameter, raws, absent)
+    if raw is None:
+        return None
+    return shown(profile, parameter, raw, _first_scales(profile, parameter, raws, absent), absent)
+
+
+def factory_sources(parameter: Parameter) -> tuple[str, ...]:
+    """Codes that must be read before its factory setting can be told."""
+    by, of = parameter.factory_by, parameter.factory_of
+    return tuple(one.parameter for one in (by, of) if one is not None)
+
+
+def factory_is_sure(parameter: Parameter) -> bool:
+    """Whether a document of this family tells the factory setting."""
+    grounds = parameter.factory_grounds
+    known = parameter.confidence if grounds is None else grounds.confidence
+    return known not in UNVERIFIED
+
+
+def not_factory(
+    profile: Profile,
+    parameter: Parameter,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> bool:
+    """Whether a setting holds something else than its factory setting, as far as that is known.
+
+    What the drive sets itself, by auto-tuning, nobody has changed.
+    """
+    held = raws.get(parameter.code)
+    factory = factory_raw(profile, parameter, raws, absent)
+    if held is None or factory is None or parameter.set_by_drive:
+        return False
+    return _differs(profile, parameter, (held, factory), raws, absent) and is_setting(
+        profile, parameter
+    )
+
+
+def _differs(
+    profile: Profile,
+    parameter: Parameter,
+    pair: tuple[int, int],
+    raws: Mapping[str, int],
+    absent: Collection[str],
+) -> bool:
+    """Whether what is held means something else than the factory setting; raw values both."""
+    held, factory = pair
+    if parameter.factory_of is not None:
+        # the drive may round its own product the other way
+        return abs(held - factory) > 1
+    if parameter.scale_by is None:
+        return held != factory
+    first = _first_scales(profile, parameter, raws, absent)
+    was = shown(profile, parameter, factory, first, absent)
+    now = shown(profile, parameter, held, raws, absent)
+    # without a scale nobody can tell
+    return was.unit == now.unit and was.number != now.number
+
+
+def _first_scales(
+    profile: Profile, parameter: Parameter, raws: Mapping[str, int], absent: Collection[str]
+) -> Mapping[str, int]:
+    """The raw values with what gives the parameter its scale as it left the factory."""
+    follows = parameter.scale_by
+    source = None if follows is None else profile[follows.parameter]
+    if source is None or source.factory is None or source.code in absent:
+        return raws
+    return {**raws, source.code: source.factory}

@@ -1,0 +1,51 @@
+"""What a limit or a factory setting comes to that is so many times another parameter."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from decimal import ROUND_FLOOR, Decimal
+
+from ..profile.profile import Profile
+from ..profile.schema import Multiple, Parameter
+from ..shown import number_of
+
+
+def counts_of(
+    profile: Profile,
+    parameter: Parameter,
+    of: Multiple,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> int | None:
+    """It as a raw value of the parameter, cut to a whole count; None while it is not known."""
+    raw, scale = raws.get(of.parameter), profile.scale(parameter, raws, absent)
+    if raw is None or scale is None:
+        return None
+    number = number_of(profile, profile[of.parameter], raw, raws, absent)
+    # a rated current of 0 tells nothing
+    if number is None or (number == 0 and Decimal(of.plus) == 0):
+        return None
+    counts = (Decimal(of.times) * number + Decimal(of.plus)) / scale
+    return int(counts.to_integral_value(ROUND_FLOOR))
+
+
+def value_of(
+    profile: Profile,
+    parameter: Parameter,
+    of: Multiple,
+    raws: Mapping[str, int],
+    absent: Collection[str] = (),
+) -> Decimal | None:
+    """It in the unit of the parameter, cut to a whole count; None while it is not known."""
+    counts = counts_of(profile, parameter, of, raws, absent)
+    scale = profile.scale(parameter, raws, absent)
+    return None if counts is None or scale is None else counts * scale
+
+
+def formula_of(of: Multiple) -> str:
+    """How it is worked out: `1.5 x INV`, `100 - tA1`."""
+    times, plus = Decimal(of.times), Decimal(of.plus)
+    product = of.parameter if abs(times) == 1 else f"{abs(times):f} x {of.parameter}"
+    if times < 0:
+        return f"{plus:f} - {product}"
+    return f"{product} + {plus:f}" if plus else product

@@ -1,0 +1,105 @@
+"""A family's profile with what a person has taught of one drive: scales, and its reference."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from msgspec.structs import replace
+
+from .profile.profile import Profile, is_verified
+from .profile.schema import Chart, Parameter, Quantity, TeachableReference
+from .teaching import TaughtScale
+from .values import is_enumeration, word_count
+
+REFERENCE_UNITS: Mapping[str, Quantity] = {"Hz": "command_frequency", "rpm": "command_speed"}
+"""In which unit a reference can be given, and what its word is then."""
+RUNS = frozenset({"forward", "reverse"})
+
+
+def why_not_taught(family: Profile, code: str) -> str:
+    """Why a parameter's scale cannot be taught, by the profile of its family; empty if it can."""
+    parameter = family[code]
+    if parameter.access == "w" or parameter.bits or word_count(parameter) != 1:
+        return f"{code} is no number of one word: it has no scale to teach."
+    if family.names(parameter) and is_enumeration(parameter):
+        return f"{code} has names for its values: it has no scale to teach."
+    if not is_raw(family, parameter):
+        return f"{code} has its scale from {family.name}'s profile: nothing is to be taught."
+    return ""
+
+
+def is_raw(family: Profile, parameter: Parameter) -> bool:
+    """Whether a parameter is shown raw since no document tells its scale.
+
+    A document may tell what it is and leave its scale open, as a cover diagram does.
+    """
+    measured = parameter.access == "r" and parameter.quantity is None
+    measured = measured and (parameter.min, parameter.max, parameter.factory) == (None, None, None)
+    told = bool(parameter.unit or parameter.scale_by or parameter.unit_by or parameter.values)
+    told = told or bool(parameter.enumeration or parameter.bits) or parameter.scale != "1"
+    return not told and (measured or not is_verified(parameter)) and word_count(parameter) == 1
+
+
+def teachable_codes(family: Profile) -> list[str]:
+    """Codes of all parameters whose scale can be taught, in the order of the profile."""
+    return [p.code for p in family.parameters if is_raw(family, p) and p.access != "w"]
+
+
+def reference_of(family: Profile, code: str) -> TeachableReference | None:
+    """What is known of a parameter that may take the reference once it was taught, or None."""
+    found = family.data.teachable_references
+    return next((one for one in found if one.parameter == code), None)
+
+
+def why_no_reference(family: Profile, code: str, taught: Mapping[str, TaughtScale]) -> str:
+    """Why a parameter cannot take the reference; empty if it can, once a person confirms it."""
+    if reference_of(family, code) is None:
+        known = ", ".join(one.parameter for one in family.data.teachable_references)
+        may = f"{known} may." if known else f"{family.name} has none that may."
+        return f"{code} does not take the reference; {may}"
+    if (scale := taught.get(code)) is None:
+        return f"{code}: its scale was not taught yet."
+    if scale.unit not in REFERENCE_UNITS:
+        unit = scale.unit or "no unit"
+        return f"{code} was taught in {unit}: a reference is given in Hz or rpm."
+    return ""
+
+
+def with_taught(family: Profile, taught: Mapping[str, TaughtScale], reference: str = "") -> Profile:
+    """The profile of one drive; `reference` is the confirmed parameter that takes its reference."""
+    known = {
+        code: scale
+        for code, scale in taught.items()
+        if family.get(code) is not None and not why_not_taught(family, code)
+    }
+    if not known:
+        return family
+    if reference and why_no_reference(family, reference, known):
+        reference = ""
+    parameters = [
+        _taught(one, known[one.code], one.code == reference) if one.code in known else one
+        for one in family.parameters
+    ]
+    charts = family.data.charts
+    way = reference_of(family, reference) if reference else None
+    if way is not None and way.bits:
+        charts = [_choosing(chart, way.bits) for chart in charts]
+    data = replace(family.data, parameters=parameters, charts=charts)
+    return Profile(data, family.read_help, taught=known)
+
+
+def _taught(parameter: Parameter, scale: TaughtScale, reference: bool) -> Parameter:
+    """The parameter with its scale and unit; it stays one that the editor does not write."""
+    quantity = REFERENCE_UNITS[scale.unit] if reference else parameter.quantity
+    return replace(parameter, unit=scale.unit, scale=f"{scale.scale:f}", quantity=quantity)
+
+
+def _choosing(chart: Chart, bits: int) -> Chart:
+    """The chart whose commands to run choose the reference too; stops stay as they are."""
+    orders = [
+        replace(order, words=[word | bits if word else word for word in order.words])
+        if order.id in RUNS and order.parameter in ("", chart.command)
+        else order
+        for order in chart.orders
+    ]
+    return replace(chart, orders=orders)

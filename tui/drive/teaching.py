@@ -1,0 +1,248 @@
+"""The scale of a raw word, learnt from what the drive's own display shows beside it; pure.
+
+A look is a raw word and the number that a person read at the same moment. Of a fixed list of
+scales that one is right with which every look agrees; where none or several do, nothing is taught.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from enum import StrEnum
+
+from .errors import ValueRefused
+
+LOOKS_KEPT = 8
+"""Looks at one word that are kept; a later one takes the place of the last."""
+SIGN_FROM = 0x8000
+"""Words from here on are negative where the word has a sign."""
+WORDS = 0x10000
+POWERS_OF_TEN = tuple(Decimal(text) for text in ("1", "0.1", "0.01", "0.001", "10", "100"))
+USUAL_SCALES = tuple(
+    Decimal(f"{Decimal(digits).scaleb(places):f}")
+    for places in (0, -1, -2, -3, 1)
+    for digits in ("2", "5", "2.5", "6", "3", "1.5", "1.2")
+)
+"""Steps of 2, 5 and 2.5, and rpm of 1 or 0.1 Hz with 1 to 5 pole pairs."""
+SCALES = (*POWERS_OF_TEN, *USUAL_SCALES)
+"""What one count may be worth, the likeliest first."""
+UNITS = ("Hz", "rpm", "A", "V", "kW", "W", "%", "s", "ms", "°C", "Nm", "h", "kWh")
+"""Units that are usual on drives, as they are written here."""
+_ALIASES = {
+    "1/min": "rpm", "min-1": "rpm", "tr/min": "rpm", "tr/mn": "rpm", "r/min": "rpm", "°c": "°C",
+    "m3/h": "m³/h", "m3/s": "m³/s",
+}  # fmt: skip
+_TYPED = re.compile(r"([+-]?)(\d{1,7}(?:[.,]\d{1,4})?)\s*(1/min|[^\s\d+\-.,][^\s]{0,7})?")
+_UNIT = re.compile(r"[A-Za-zµΩ°%][A-Za-zµΩ°%²³/·]{0,7}")
+
+
+@dataclass(frozen=True, slots=True)
+class DisplayLook:
+    """A raw word, and what the drive's own display showed with it."""
+
+    word: int
+    """As on the wire, 0 to 65535."""
+    shown: Decimal
+    """With the decimals of the display."""
+    unit: str = ""
+
+    @property
+    def text(self) -> str:
+        """Both, for a person."""
+        return f"raw {self.word} at {self.shown:f} {self.unit}".rstrip()
+
+
+@dataclass(frozen=True, slots=True)
+class TaughtScale:
+    """What one count of a word is worth, as looks at the drive's display have told."""
+
+    scale: Decimal
+    unit: str
+    signed: bool | None
+    """Whether words from 32768 on are negative; None while no look has told."""
+
+    def number(self, raw: int) -> Decimal | None:
+        """The value of a raw word; None where its sign is not known."""
+        word = raw % WORDS
+        if word < SIGN_FROM:
+            return word * self.scale
+        if self.signed is None:
+            return None
+        return (word - WORDS if self.signed else word) * self.scale
+
+    @property
+    def text(self) -> str:
+        """What one count is worth, for a person."""
+        return f"1 count is {self.scale:f} {self.unit}".rstrip()
+
+
+class LessonKind(StrEnum):
+    """What a look has come to."""
+
+    FIRST = "first"
+    SAME = "same"
+    UNSURE = "unsure"
+    TAUGHT = "taught"
+    AGREES = "agrees"
+    DISAGREES = "disagrees"
+    ENDED = "ended"
+
+
+@dataclass(frozen=True, slots=True)
+class Lesson:
+    """What a look has come to, which looks are kept, and what is known by them."""
+
+    kind: LessonKind
+    looks: tuple[DisplayLook, ...]
+    text: str
+    """For a person: what is known now, and what to do next."""
+    scale: TaughtScale | None = None
+
+    @property
+    def went_wrong(self) -> bool:
+        """Whether looks contradict each other."""
+        return self.kind in (LessonKind.DISAGREES, LessonKind.ENDED)
+
+
+def parse_display(text: str, unit: str = "") -> tuple[Decimal, str]:
+    """Number and unit of what a person read: `50.3`, `50,3 Hz`, `-12A`; unit may stand apart.
+
+    Raises ValueRefused for what is neither.
+    """
+    typed = text.strip().replace("\N{MINUS SIGN}", "-")
+    match = _TYPED.fullmatch(typed)
+    if match is None:
+        raise ValueRefused(f"{text!r} is no number of a display. Write it like 50.3 or -12 A.")
+    beside = match[3] or ""
+    if beside and unit and unit_named(beside) != unit_named(unit):
+        raise ValueRefused(f"Either {beside} or {unit}: type one unit.")
+    number = Decimal(match[1] + match[2].replace(",", "."))
+    return number, unit_named(beside or unit)
+
+
+def unit_named(text: str) -> str:
+    """A unit as it is written here; raises ValueRefused for what is none."""
+    typed = text.strip()
+    folded = typed.casefold()
+    if not typed:
+        return ""
+    if folded in _ALIASES:
+        return _ALIASES[folded]
+    if (known := next((one for one in UNITS if one.casefold() == folded), None)) is not None:
+        return known
+    if folded == "raw" or not _UNIT.fullmatch(typed):
+        usual = ", ".join(UNITS[:6])
+        raise ValueRefused(f"{typed!r} is no unit. Usual are {usual}.")
+    return typed
+
+
+def scales_that_fit(looks: Sequence[DisplayLook]) -> list[TaughtScale]:
+    """Every scale of the list with which all looks agree, with its sign; none without a look."""
+    if not looks or (unit := _unit_of(looks)) is None:
+        return []
+    told = any(look.word >= SIGN_FROM for look in looks)
+    signs: tuple[bool | None, ...] = (False, True) if told else (None,)
+    tried = (TaughtScale(scale, unit, signed) for scale in SCALES for signed in signs)
+    return [one for one in tried if all(_agrees(look, one) for look in looks)]
+
+
+def taught_by(looks: Sequence[DisplayLook]) -> TaughtScale | None:
+    """The one scale that looks at two or more words tell; None where they do not."""
+    if len({look.word for look in looks}) < 2:
+        return None
+    found = scales_that_fit(looks)
+    return found[0] if len(found) == 1 else None
+
+
+def learn(code: str, before: Sequence[DisplayLook], look: DisplayLook) -> Lesson:
+    """What one more look at a parameter comes to."""
+    known, looks = taught_by(before), _with(before, look)
+    if not scales_that_fit(looks):
+        return _contradiction(code, tuple(before), look, known)
+    scale = taught_by(looks)
+    if scale is not None:
+        kind = LessonKind.TAUGHT if known is None else LessonKind.AGREES
+        seen = ", ".join(one.text for one in looks)
+        return Lesson(kind, looks, f"{code}: {scale.text} ({seen}).{_sign_text(scale)}", scale)
+    if len({one.word for one in looks}) < 2:
+        kind = LessonKind.SAME if before else LessonKind.FIRST
+        again = " again" if before else ""
+        text = f"{code}: {look.text}{again}. Look again at another value."
+        return Lesson(kind, looks, text)
+    fits = " or ".join(dict.fromkeys(f"{one.scale:f}" for one in scales_that_fit(looks)))
+    text = f"{code}: 1 count is {fits}. Look again at a larger value ({look.text})."
+    return Lesson(LessonKind.UNSURE, looks, text)
+
+
+def _contradiction(
+    code: str, before: tuple[DisplayLook, ...], look: DisplayLook, known: TaughtScale | None
+) -> Lesson:
+    """A look with which no scale agrees: nothing is taught any more; this look begins anew."""
+    alone = scales_that_fit([look])
+    kept = (look,) if alone else ()
+    if not alone:
+        why = f"no usual scale gives {look.shown:f} for raw {look.word}"
+    else:
+        why = f"no usual scale fits {' and '.join(one.text for one in (*before[-2:], look))}"
+    check = "Was it the same parameter, and did the value stand still?"
+    if known is not None:
+        text = f"{code} is no longer taught ({known.text} before): {why}. It is shown raw. {check}"
+        return Lesson(LessonKind.ENDED, kept, text)
+    text = f"{code}: nothing is taught, {why}. {check}"
+    return Lesson(LessonKind.DISAGREES, kept, text)
+
+
+def _with(before: Sequence[DisplayLook], look: DisplayLook) -> tuple[DisplayLook, ...]:
+    """The looks with one more; a repeated one adds nothing, but for a unit.
+
+    Of too many those are left out first without which the same is known.
+    """
+    same = [one for one in before if (one.word, one.shown) == (look.word, look.shown)]
+    if same and look.unit in ("", same[0].unit):
+        return tuple(before)
+    if same and not same[0].unit:
+        return tuple(replace(one, unit=look.unit) if one is same[0] else one for one in before)
+    looks = (*before, look)
+    if len(looks) <= LOOKS_KEPT:
+        return looks
+    fewer = (looks[:at] + looks[at + 1 :] for at in range(len(looks)))
+    return next((some for some in fewer if taught_by(some) == taught_by(looks)), looks[1:])
+
+
+def _agrees(look: DisplayLook, scale: TaughtScale) -> bool:
+    """Whether a display shows this, to one step of its last digit: it cuts, rounds, and lags."""
+    number = scale.number(look.word)
+    step = Decimal(1).scaleb(min(0, int(look.shown.as_tuple().exponent)))
+    return number is not None and abs(number - look.shown) <= step
+
+
+def _unit_of(looks: Iterable[DisplayLook]) -> str | None:
+    """The unit of all looks; None where two differ."""
+    units = {look.unit for look in looks if look.unit}
+    return None if len(units) > 1 else next(iter(units), "")
+
+
+def _sign_text(scale: TaughtScale) -> str:
+    if scale.signed is None:
+        return (
+            " Whether it can be negative is open: from raw 32768 on it is shown raw until a look"
+            " there tells."
+        )
+    return " It has a sign." if scale.signed else " It has no sign."
+
+
+__all__ = [
+    "SCALES",
+    "UNITS",
+    "DisplayLook",
+    "Lesson",
+    "LessonKind",
+    "TaughtScale",
+    "learn",
+    "parse_display",
+    "scales_that_fit",
+    "taught_by",
+    "unit_named",
+]

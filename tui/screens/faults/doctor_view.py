@@ -1,0 +1,70 @@
+"""What the Faults screen tells of: a fault, else an alarm, and what it points at."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+from tui.drive.hints import reset_ready
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import FaultCode, FaultHelp, Hint, LookAt
+from tui.session.monitor.fault_record import FaultRecord
+from tui.session.reading import Reading
+
+
+@dataclass(frozen=True, slots=True)
+class DoctorView:
+    """What the Faults screen shows at one moment."""
+
+    profile: Profile
+    fault: FaultCode | None
+    present: bool
+    """Whether the drive is in this fault now."""
+    record: FaultRecord | None
+    """The trip as the panel saw it, where it did and this is the fault."""
+    readings: Mapping[str, Reading]
+    at: int = 0
+    """The row of the cursor: parameters to look at first, then the history."""
+    unread: bool = False
+    """Whether the history is being read yet."""
+    alarms: Sequence[tuple[str, int, str]] = ()
+    """Alarms that are on: word, bit and name; told where there is no fault to tell of."""
+
+    @property
+    def help(self) -> FaultHelp | None:
+        """What the fault points at; what any may be, on a family whose trips have no numbers."""
+        if self.fault is None and not self.present:
+            return None
+        return self.profile.guide.fault(self.fault.raw if self.fault else None)
+
+    @property
+    def alarm(self) -> tuple[str, int, str] | None:
+        """The alarm that is told of: the first that anything is known of."""
+        if self.fault is not None or self.present or not self.alarms:
+            return None
+        known = [one for one in self.alarms if self.profile.guide.alarm(one[0], one[1])]
+        return (known or list(self.alarms))[0]
+
+    @property
+    def hint(self) -> Hint | None:
+        """What the fault or the alarm points at."""
+        alarm = self.alarm
+        return self.profile.guide.alarm(alarm[0], alarm[1]) if alarm else self.help
+
+    @property
+    def look_at(self) -> Sequence[LookAt]:
+        """The parameters to look at."""
+        return self.hint.look_at if self.hint else ()
+
+    @property
+    def ready(self) -> bool | None:
+        """Whether the drive says that a reset can work now; None where it does not tell."""
+        good = {
+            c: r.raw for c, r in self.readings.items() if r.quality == "good" and r.raw is not None
+        }
+        return reset_ready(self.profile, good)
+
+    @property
+    def history(self) -> list[str]:
+        """The codes of the drive's history, the newest first."""
+        return self.profile.data.faults.history

@@ -1,0 +1,70 @@
+"""Monitor while its drive is not known yet: what is being done to get there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, ClassVar
+
+from rich.text import Text
+from textual.widget import Widget
+
+from tui.widgets.drawing import wrapped
+from tui.widgets.lines import Lines
+from tui.widgets.palette import FAINT, STRONG
+
+from .base import PanelScreen
+from .keys.table import OPENING, bindings
+
+if TYPE_CHECKING:
+    from .app_port import Panel
+
+DOING_LINES = 4
+
+
+def leave_opening(app: Panel) -> None:
+    """To Line, where it says why the drive that was named at the start is not shown."""
+    while any(isinstance(screen, OpeningScreen) for screen in app.screen_stack):
+        app.pop_screen()
+
+
+class OpeningScreen(PanelScreen):
+    """The first picture where a drive was named at the start; Monitor takes its place."""
+
+    BINDINGS: ClassVar = bindings(OPENING)
+    TITLE = "Monitor"
+    DEFAULT_CSS = "OpeningScreen #doing { height: 1fr; }"
+    LOOK = 0.25
+
+    def __init__(self, line: str, device: int) -> None:
+        super().__init__()
+        self._line = line
+        self._device = device
+
+    def body(self) -> Iterable[Widget]:
+        """One place, for a few words."""
+        doing = Lines(id="doing")
+        doing.show(self._lines(self.app.size.width))
+        yield doing
+
+    def draw(self, width: int) -> None:
+        """How far it is."""
+        super().draw(width)
+        self.put("doing", self._lines(width))
+
+    def _lines(self, width: int) -> list[Text]:
+        opened = self.app.line_label
+        now = f"Drive {self._device} on {opened or self._line}"
+        next_step = (
+            "It is asked which drive it is; then Monitor watches it."
+            if opened
+            else "The line is opened. Esc goes to Line, where others can be chosen."
+        )
+        room = max(10, width - 4)
+        lines = [Text(f"  {part}", STRONG) for part in wrapped(now, room, DOING_LINES)]
+        lines += [Text(f"  {part}", FAINT) for part in wrapped(next_step, room, DOING_LINES)]
+        return [Text(""), *lines]
+
+    @property
+    def name_of_screen(self) -> str:
+        """It has no drive, so the keys of Monitor mean nothing here."""
+        return OPENING

@@ -1,0 +1,44 @@
+"""The group Simply start: a first commissioning step by step, as lines; pure functions."""
+
+from __future__ import annotations
+
+from tui.drive.profile.profile import UNVERIFIED, Profile
+from tui.drive.profile.schema import StartUpStep
+from tui.widgets.drawing import wrapped
+
+from .table_view import TableLine
+
+TEXT_WIDTH, TEXT_LINES = 50, 4
+"""What is told of a step without parameters: it fits beside the groups of the smallest screen."""
+
+GROUNDS_WORDS = {
+    "analogy": "as on a sister family",
+    "unverified": "its place from no document",
+    "practice": "general practice",
+}
+"""How surely a step belongs there, where the family's own documents do not say it."""
+
+
+def start_up_items(profile: Profile) -> list[TableLine]:
+    """A heading a step, below it its parameters, or what a step without any asks for."""
+    found: list[TableLine] = []
+    for number, step in enumerate(profile.data.start_up, start=1):
+        mark = " ?" if step.confidence in UNVERIFIED else ""
+        found.append(TableLine(group=f"{number} {step.step}{mark}"))
+        found += [TableLine(code) for code in step.parameters]
+        if not step.parameters:
+            lines = wrapped(step.text, TEXT_WIDTH, TEXT_LINES)
+            found += [TableLine(text=line) for line in lines]
+    return found
+
+
+def step_help(profile: Profile, code: str) -> str:
+    """What the step is about that a parameter belongs to; empty for one of no step."""
+    step = next((one for one in profile.data.start_up if code in one.parameters), None)
+    return "" if step is None else _words_of_step(step)
+
+
+def _words_of_step(step: StartUpStep) -> str:
+    grounds = GROUNDS_WORDS.get(step.confidence, "")
+    head = f"{step.step} ({grounds})" if grounds else step.step
+    return f"{head}: {step.text} {step.note}".rstrip()

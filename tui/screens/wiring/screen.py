@@ -1,0 +1,96 @@
+"""Wiring: warnings, waiting time, pins, rules, addresses, lamps, command words, errata."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+from textual.app import ComposeResult
+
+from tui.bus.errors import LineError
+from tui.drive.family_page import PageLine, family_page, page_lines
+from tui.drive.model import model_codes, model_told
+from tui.drive.plain import plain
+from tui.drive.profile.profile import Profile
+from tui.session.console import DriveConsole
+from tui.widgets.drawing import rule
+from tui.widgets.lines import Lines
+
+from ..base import PanelScreen
+from ..keys.table import WIRING, bindings
+from .view import section_tops, wiring_lines
+
+
+class WiringScreen(PanelScreen):
+    """A page that scrolls; all that is asked of the drive is its model."""
+
+    CSS_PATH = "wiring.tcss"
+    BINDINGS: ClassVar = bindings(WIRING)
+    TITLE = "Wiring"
+
+    def __init__(self, console: DriveConsole) -> None:
+        super().__init__()
+        self.console = console
+        self._profile: Profile = console.session.profile
+        self._sections = family_page(self._profile)
+        self._page: list[PageLine] = []
+        self._width = 0
+        self._model = ""
+        self._top = 0
+
+    def body(self) -> ComposeResult:
+        """Title and page."""
+        yield Lines(id="title")
+        yield Lines(id="page")
+
+    def on_mount(self) -> None:
+        """Ask the drive for its model, once."""
+        self.run_worker(self._ask_model(), group="model")
+
+    async def _ask_model(self) -> None:
+        codes = model_codes(self._profile)
+        if not codes:
+            return
+        try:
+            found = await self.console.read(codes)
+        except LineError:
+            return  # the strip tells of a line that is lost; the page stands without
+        raws = {code: reading.raw for code, reading in found.items() if reading.raw is not None}
+        self._model = model_told(self._profile, raws)
+        self.look()
+
+    def draw(self, width: int) -> None:
+        """The page from where the person has scrolled to."""
+        super().draw(width)
+        if width != self._width:
+            self._page = page_lines(self._sections, width - 1)
+            self._width = width
+        room = self._room()
+        self._top = max(0, min(self._top, len(self._page) - room))
+        named = f"{self._profile.vendor} {self._profile.name}"
+        here = f"{self._top + 1} to {min(len(self._page), self._top + room)} of {len(self._page)}"
+        title = plain(f"{named}: {self._model}" if self._model else named)
+        self.put("title", [rule(title, width, here)])
+        self.put("page", wiring_lines(self._page[self._top : self._top + room]))
+
+    def _room(self) -> int:
+        return max(1, self.query_one("#page", Lines).size.height)
+
+    def action_scroll(self, lines: int) -> None:
+        """Up or down the page."""
+        self._top = max(0, self._top + lines)
+        self.look()
+
+    def action_page(self, pages: int) -> None:
+        """As much as stands on the screen, but a line."""
+        self.action_scroll(pages * max(1, self._room() - 1))
+
+    def action_section(self, step: int) -> None:
+        """To the beginning of the next or the previous section."""
+        tops = section_tops(self._page)
+        after = [top for top in tops if top > self._top]
+        before = [top for top in tops if top < self._top]
+        if step > 0 and after:
+            self._top = after[0]
+        elif step < 0 and before:
+            self._top = before[-1]
+        self.look()

@@ -1,0 +1,26 @@
+"""The keys of the panel that open the way to a command, for every text that names them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from tui.drive.held_back import HeldBack, WayOut
+
+KEYS: Mapping[WayOut, str] = {
+    "set-up": "6 opens Control.",
+    "take-control": "t takes the control.",
+}
+"""What a key of the panel does about it."""
+
+
+def way_by_key(held: HeldBack) -> str:
+    """The way out on a screen: its key, else what is to be done."""
+    return KEYS.get(held.way, held.remedy)
+
+
+def told_anywhere(held: HeldBack) -> str:
+    """What speaks against a command with the way out, where the panel may not be open."""
+    key = KEYS.get(held.way, "")
+    return " ".join(
+        part for part in (held.text, held.remedy, f"In the panel {key}" if key else "") if part
+    )

@@ -1,0 +1,196 @@
+"""The file with what was taught of one drive: the looks themselves, as the scale follows from them.
+
+One file a drive, by line, address, profile and what the drive says of itself, in the state folder.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import re
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.teaching import LOOKS_KEPT, DisplayLook, parse_display
+
+from ..connect.line_key import line_key
+from ..paths import state_folder
+
+if TYPE_CHECKING:
+    from ..connect.identify import DriveIdentity
+
+LONGEST = 200_000
+"""Bytes of a file that may be one of these."""
+_CODE = re.compile(r"[\x21-\x7e]{1,24}")
+
+
+class TaughtUnreadable(DriveError):
+    """What was taught of a drive cannot be read, and why."""
+
+
+class TaughtNotKept(DriveError):
+    """What was taught cannot be put on the disk, and why."""
+
+
+@dataclass(frozen=True, slots=True)
+class TaughtLooks:
+    """Looks by code of parameter, and the parameter that was confirmed to take the reference."""
+
+    looks: Mapping[str, tuple[DisplayLook, ...]] = field(default_factory=dict)
+    reference: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class TaughtDrive:
+    """Which drive is meant."""
+
+    line: str
+    device: int
+    profile: str
+    said: str
+    """What it says of itself; empty where it says nothing."""
+
+    @classmethod
+    def of(
+        cls, line_text: str, device: int, profile: str, identity: DriveIdentity | None
+    ) -> TaughtDrive:
+        """The drive at an address of a line, however that is typed."""
+        said = (identity.vendor, identity.reference, identity.name) if identity else ()
+        return cls(line_key(line_text), device, profile, " ".join(part for part in said if part))
+
+    @property
+    def file(self) -> Path:
+        """Where what was taught of it stands."""
+        readable = re.sub(r"[^A-Za-z0-9]+", "-", self.line).strip("-")[:40]
+        own = _digest(self.said) if self.said else "unsaid"
+        return _folder() / f"{readable}-{self.device}-{self.profile}-{self._place}-{own}.json"
+
+    @property
+    def _place(self) -> str:
+        return _digest(repr((self.line, self.device, self.profile)))
+
+    def found(self) -> Path | None:
+        """The file that is its own; what either side left unsaid counts as the same."""
+        if self.file.exists():
+            return self.file
+        others = sorted(_folder().glob(f"*-{self._place}-*.json"))
+        if self.said:
+            others = [path for path in others if path.stem.endswith("-unsaid")]
+        return others[0] if len(others) == 1 else None
+
+
+def load_taught(drive: TaughtDrive) -> TaughtLooks:
+    """What was kept of a drive; nothing where there is no file. Raises TaughtUnreadable."""
+    path = drive.found()
+    if path is None:
+        return TaughtLooks()
+    try:
+        if path.stat().st_size > LONGEST:
+            raise ValueRefused("it is too long")
+        return _looks_in(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, RecursionError, ValueRefused) as error:
+        raise TaughtUnreadable(
+            f"What was taught of this drive cannot be read, {path}: {_reason(error)}. Nothing"
+            " taught is used. Mend the file, or teach anew: it is kept beside the new one."
+        ) from error
+
+
+def keep_taught(drive: TaughtDrive, kept: TaughtLooks) -> None:
+    """Put it on the disk, whole or not at all; a file that cannot be read is set aside.
+
+    Raises TaughtNotKept.
+    """
+    path = drive.found() or drive.file
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        _set_aside_if_damaged(drive, path)
+        part = path.with_suffix(f".{os.getpid()}.part")
+        try:
+            with part.open("w", encoding="utf-8") as file:
+                json.dump(_as_json(drive, kept), file, indent=1)
+                file.flush()
+                os.fsync(file.fileno())
+            part.replace(path)
+        finally:
+            with suppress(OSError):
+                part.unlink(missing_ok=True)
+    except OSError as error:
+        raise TaughtNotKept(
+            f"What was taught is used until this program ends, and not kept: {path} cannot be"
+            f" written ({error.strerror or error})."
+        ) from error
+
+
+def _set_aside_if_damaged(drive: TaughtDrive, path: Path) -> None:
+    """Move a file that cannot be read out of the way of the new one; none is written over."""
+    try:
+        load_taught(drive)
+    except TaughtUnreadable:
+        number = 1
+        while (aside := path.with_suffix(f".damaged{number}")).exists():
+            number += 1
+        path.rename(aside)
+
+
+def _as_json(drive: TaughtDrive, kept: TaughtLooks) -> dict[str, object]:
+    return {
+        "line": drive.line,
+        "device": drive.device,
+        "profile": drive.profile,
+        "drive": drive.said,
+        "reference": kept.reference,
+        "looks": {
+            code: [{"raw": one.word, "shown": f"{one.shown:f} {one.unit}".strip()} for one in looks]
+            for code, looks in kept.looks.items()
+            if looks
+        },
+    }
+
+
+def _looks_in(told: object) -> TaughtLooks:
+    """What a file says; raises ValueRefused where it says something else."""
+    if not isinstance(told, dict):
+        raise ValueRefused("it is no table")
+    looks, reference = told.get("looks"), told.get("reference", "")
+    if not isinstance(looks, dict) or not isinstance(reference, str):
+        raise ValueRefused("it has no looks")
+    return TaughtLooks({_code(c): _looks_of(c, listed) for c, listed in looks.items()}, reference)
+
+
+def _code(code: object) -> str:
+    if not isinstance(code, str) or not _CODE.fullmatch(code):
+        raise ValueRefused(f"{code!r} is no code of a parameter")
+    return code
+
+
+def _looks_of(code: str, listed: object) -> tuple[DisplayLook, ...]:
+    if not isinstance(listed, list) or len(listed) > LOOKS_KEPT:
+        raise ValueRefused(f"the looks at {code} are no list, or too many")
+    return tuple(_look(code, one) for one in listed)
+
+
+def _look(code: str, told: object) -> DisplayLook:
+    word, shown = (told.get("raw"), told.get("shown")) if isinstance(told, dict) else (None, None)
+    if type(word) is not int or not 0 <= word <= 0xFFFF or not isinstance(shown, str):
+        raise ValueRefused(f"a look at {code} has no raw word and what was shown")
+    return DisplayLook(word, *parse_display(shown))
+
+
+def _reason(error: Exception) -> str:
+    """What is wrong, in a line."""
+    if isinstance(error, OSError):
+        return error.strerror or str(error)
+    return str(error).splitlines()[0].rstrip(".")[:120] if str(error) else type(error).__name__
+
+
+def _folder() -> Path:
+    return state_folder() / "taught"
+
+
+def _digest(text: str) -> str:
+    return hashlib.sha256(text.encode()).hexdigest()[:12]

@@ -1,0 +1,178 @@
+"""Teaching one drive: a look is read from it, kept with it, and its profile follows at once."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import threading
+from collections.abc import Mapping
+from decimal import Decimal
+
+from tui.drive.errors import ValueRefused
+from tui.drive.profile.profile import Profile
+from tui.drive.taught_profile import reference_of, why_no_reference, why_not_taught, with_taught
+from tui.drive.teaching import DisplayLook, Lesson, TaughtScale, learn, parse_display, taught_by
+
+from ..drive import DriveSession
+from ..read.reader import Reader
+from .kept import (
+    TaughtDrive,
+    TaughtLooks,
+    TaughtNotKept,
+    TaughtUnreadable,
+    keep_taught,
+    load_taught,
+)
+
+log = logging.getLogger(__name__)
+
+
+class Teacher:
+    """What was taught of one drive; only `look` asks the drive, the others wait for the disk."""
+
+    def __init__(self, session: DriveSession) -> None:
+        self.session = session
+        self.trouble = ""
+        """Why what was taught before is not used, or is not kept; empty while all is well."""
+        self._known = TaughtLooks()
+        self._unkept = False
+        """Whether the disk has less than what is known here."""
+        self._lock = threading.Lock()
+
+    @property
+    def family(self) -> Profile:
+        """The drive's profile without what was taught."""
+        return self.session.family
+
+    @property
+    def scales(self) -> Mapping[str, TaughtScale]:
+        """What is taught now, by code."""
+        return self.session.profile.taught
+
+    @property
+    def reference(self) -> str:
+        """The parameter that takes the reference, confirmed by a person; empty where none does."""
+        code = self._known.reference
+        return code if code and not why_no_reference(self.family, code, self.scales) else ""
+
+    def looks(self, code: str) -> tuple[DisplayLook, ...]:
+        """The looks at a parameter that are kept."""
+        return self._known.looks.get(code, ())
+
+    def recall(self) -> None:
+        """Use what was taught before; what cannot be read is told in `trouble`. Reads a file."""
+        with self._lock:
+            try:
+                self._known, self.trouble = load_taught(self._drive()), ""
+            except TaughtUnreadable as error:
+                self.trouble = str(error)
+                log.warning("%s", error)
+            self._use()
+
+    async def look(self, code: str, text: str, unit: str = "") -> Lesson:
+        """Read a word now, beside what the drive's display shows, as typed; keep what that tells.
+
+        Raises ValueRefused where nothing can be taught or was typed, and the line's errors.
+        """
+        if why := why_not_taught(self.family, code):
+            raise ValueRefused(why)
+        shown = parse_display(text, unit)
+        reading = (await Reader(self.session).read([code]))[code]
+        if reading.raw is None:
+            raise ValueRefused(f"{code} cannot be read: {reading.error}")
+        return await asyncio.to_thread(self.take, code, reading.raw, *shown)
+
+    def take(self, code: str, raw: int, shown: Decimal, unit: str) -> Lesson:
+        """One look more at a parameter; keeps what it comes to."""
+        with self._lock:
+            before = self._latest().looks.get(code, ())
+            lesson = learn(code, before, DisplayLook(raw & 0xFFFF, shown, unit))
+            self._change({code: lesson.looks}, self._known.reference)
+        return lesson
+
+    def forget(self, code: str) -> bool:
+        """Teach a parameter no longer; whether anything was kept of it."""
+        with self._lock:
+            if not self._latest().looks.get(code):
+                return False
+            self._change({code: ()}, self._known.reference)
+            return True
+
+    def confirm_reference(self, code: str) -> str:
+        """Give the reference by a parameter from now on, as a person confirms; says what follows.
+
+        Raises ValueRefused where it cannot take one.
+        """
+        with self._lock:
+            self._latest()
+            if why := why_no_reference(self.family, code, self._told()):
+                raise ValueRefused(why)
+            self._change({}, code)
+        return f"{code} takes the reference, in {self.scales[code].unit}."
+
+    def drop_reference(self) -> None:
+        """Give no reference by a taught parameter any more."""
+        with self._lock:
+            self._latest()
+            self._change({}, "")
+
+    def proposal(self) -> str:
+        """A parameter that could take the reference, once a person confirms it; else empty."""
+        if self.reference:
+            return ""
+        ways = self.family.data.teachable_references
+        scales = self.scales
+        fit = (w.parameter for w in ways if not why_no_reference(self.family, w.parameter, scales))
+        return next(fit, "")
+
+    def _latest(self) -> TaughtLooks:
+        """What is kept now: another program may have taught meanwhile."""
+        try:
+            on_disk = load_taught(self._drive())
+        except TaughtUnreadable:
+            return self._known
+        if not self._unkept:
+            self._known = on_disk
+        return self._known
+
+    def _change(self, looks: Mapping[str, tuple[DisplayLook, ...]], reference: str) -> None:
+        """Keep and use it; a scale that ended takes the confirmation of its reference along."""
+        every = {**self._known.looks, **looks}
+        self._known = TaughtLooks({c: kept for c, kept in every.items() if kept}, reference)
+        self._use()
+        if not self.reference:
+            self._known = TaughtLooks(self._known.looks)
+        try:
+            keep_taught(self._drive(), self._known)
+            self.trouble, self._unkept = "", False
+        except TaughtNotKept as error:
+            self.trouble, self._unkept = str(error), True
+            log.warning("%s", error)
+
+    def _use(self) -> None:
+        """The drive's profile, with what is known by the looks."""
+        self.session.learn(with_taught(self.family, self._told(), self._known.reference))
+
+    def _told(self) -> dict[str, TaughtScale]:
+        """The scales that the kept looks tell."""
+        found = {code: taught_by(looks) for code, looks in self._known.looks.items()}
+        return {code: scale for code, scale in found.items() if scale is not None}
+
+    def _drive(self) -> TaughtDrive:
+        session = self.session
+        return TaughtDrive.of(session.line_text, session.device, self.family.id, session.identity)
+
+
+def reference_asks(family: Profile, code: str) -> str:
+    """What a person confirms before a parameter takes the reference."""
+    way = reference_of(family, code)
+    chooses = ""
+    if way is not None and way.bits:
+        word = family.quantity("command_word")
+        bits = " and ".join(f"bit {bit}" for bit in range(16) if way.bits >> bit & 1)
+        chooses = f" Each command to run then sets {bits} of {word.code if word else 'the word'}."
+    note = f" {way.note}" if way is not None and way.note else ""
+    return (
+        f"No manual at hand says that {code} gives this drive its reference.{chooses}{note} Try it"
+        " first where the motor may turn at any speed, with the stop at hand."
+    )

@@ -1,0 +1,80 @@
+"""Which words stop an Altivar 31, 312 or 71 that stays enabled, and what locks it.
+
+Sources: ATV71 communication parameters guide; ATV312 communication variables (CMD, CMI, STT).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ..body import Body
+from ..plant.fault_history import OwnFault
+from ..plant.motor import Stop
+
+HALT, STOP_STT, INJECTION, FAST = (1 << bit for bit in (8, 12, 13, 14))
+CMI_FAST, CMI_INJECTION, CMI_STANDSTILL, CMI_LOCKED = (1 << bit for bit in (10, 11, 13, 15))
+CMI_EXTERNAL_FAULT = 1 << 3
+STT = {0: Stop.RAMP, 1: Stop.FAST, 2: Stop.FREEWHEEL, 3: Stop.INJECTION}
+EXTERNAL_FAULTS = ("EPF", "EPF1")
+EXTERNAL_REACTIONS: Mapping[int, Stop | None] = {
+    0: None,
+    1: Stop.FREEWHEEL,
+    2: Stop.RAMP,
+    6: Stop.RAMP,
+    7: Stop.FAST,
+    8: Stop.INJECTION,
+}
+"""What an external fault does, by the raw value of EPL; None: it is ignored."""
+
+
+def stop_type(body: Body) -> Stop:
+    """The normal way to stop, as STT says."""
+    return STT.get(body.setting("STT", 0), Stop.RAMP)
+
+
+def commanded_stop(body: Body, word: int, *, low_access: bool) -> Stop | None:
+    """How a command word and CMI stop a motor that stays enabled; None: they do not."""
+    cmi = extended_command(body)
+    compact = body.traits.access_levels
+    orders = (
+        (bool(cmi & CMI_FAST) and not compact, Stop.FAST),
+        (bool(cmi & CMI_INJECTION) and not compact, Stop.INJECTION),
+        (bool(word & FAST) and low_access, Stop.FAST),
+        (bool(word & INJECTION) and low_access, Stop.INJECTION),
+        (bool(word & HALT) and not compact, stop_type(body)),
+        (bool(word & STOP_STT) and compact, stop_type(body)),
+    )
+    return next((stop for given, stop in orders if given), None)
+
+
+def extended_command(body: Body) -> int:
+    """The extended command word CMI."""
+    return body.raw("extended_command_word") & 0xFFFF
+
+
+def locked(body: Body, *, stands: bool) -> bool:
+    """Whether the drive must not supply the motor.
+
+    CMI bit 15 locks at once; bit 13 keeps a motor that stands at rest (ATV31/312: reserved on
+    the ATV71).
+    """
+    cmi = extended_command(body)
+    at_rest = body.traits.access_levels and cmi & CMI_STANDSTILL
+    return bool(cmi & CMI_LOCKED) or bool(at_rest and stands)
+
+
+def external_fault(body: Body, is_on: Callable[[int], bool]) -> OwnFault | None:
+    """The external fault where CMI bit 3 (ATV31/312) or the assignment of ETF reports it.
+
+    LET = 0 turns an input round: it reports while it is open. EPL says how the drive stops, or
+    that it goes on.
+    """
+    assigned = body.setting("ETF", 0)
+    by_input = assigned != 0 and is_on(assigned) == bool(body.setting("LET", 1))
+    by_word = body.traits.access_levels and bool(extended_command(body) & CMI_EXTERNAL_FAULT)
+    stop = EXTERNAL_REACTIONS.get(body.setting("EPL", 1), Stop.FREEWHEEL)
+    codes = (f for f in body.profile.data.faults.codes if f.code.upper() in EXTERNAL_FAULTS)
+    known = next(codes, None)
+    if stop is None or known is None or not (by_input or by_word):
+        return None
+    return OwnFault(known.raw, stop, persists=True)

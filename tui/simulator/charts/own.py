@@ -1,0 +1,240 @@
+"""The chart of a drive of any make, played from its profile alone.
+
+Its states are shown by words of its own, its orders and transitions are followed as they stand
+there. What no profile tells is plain: two-wire terminals RUN and REV, a reference AI1, a ramp.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tui.drive.profile.schema import Chart, Order, OrderId, Parameter, State, StatusBit
+
+from ..body import Body, Fallback
+from ..plant.fault_history import OwnFault
+from ..plant.motor import MotorDemand, Stop
+from .own_orders import OwnOrders
+from .own_reference import OwnReference
+from .own_words import REST_KINDS, state_of_kind, with_bit, word_of
+
+OWN_REACHED_HZ = 0.1
+STOPS_BY_ORDER: dict[OrderId, Stop] = {
+    "stop": Stop.RAMP,
+    "quick-stop": Stop.FAST,
+    "freewheel": Stop.FREEWHEEL,
+    "emergency-stop": Stop.FAST,
+    "dc-braking": Stop.INJECTION,
+}
+
+
+class OwnChart:
+    """The orders and the status of one drive, after its profile."""
+
+    def __init__(self, body: Body) -> None:
+        self._body = body
+        self._orders = OwnOrders(body.profile, self._raws)
+        self._reference = OwnReference(body)
+        self._stop = Stop.RAMP
+        self._runs = False
+        """Whether the line has ordered a run."""
+        self._reverse = False
+        self._idle: State | None = None
+        """The state at rest that the line has led it to; None: the one it starts in."""
+        self._pressed = False
+        self._target_hz = 0.0
+
+    def power_up(self) -> None:
+        """Nothing was ordered by the line."""
+        self._runs = self._reverse = False
+        self._stop = Stop.RAMP
+        self._idle = None
+        self._orders.forget()
+
+    # Orders from outside
+
+    def run(self, hz: float) -> None:
+        """Run as another master left it where the line can order a run, else by the inputs."""
+        chart = self._chart
+        if chart is not None and any(order.id == "forward" for order in chart.orders):
+            self._runs, self._reverse = True, hz < 0
+            self._reference.leave(abs(hz))
+        else:
+            self._body.terminals.close("REV" if hz < 0 else "RUN")
+            self._reference.wire(abs(hz))
+
+    def refer(self, hz: float) -> None:
+        """Change the reference from outside, unless the line has given one since."""
+        if self._reference.is_earlier:
+            self._reference.leave(abs(hz))
+        elif self._wired:
+            self._reference.wire(abs(hz))
+
+    def halt(self) -> None:
+        """Open the run inputs, and end what another master left."""
+        for name in ("RUN", "REV"):
+            self._body.terminals.close(name, closed=False)
+        self._end(Stop.RAMP)
+
+    def follow(self) -> None:
+        """Look at the inputs: RESET resets a fault."""
+        pressed = self._body.terminals.closed("RESET")
+        if pressed and not self._pressed:
+            self.reset_fault()
+        self._pressed = pressed
+
+    def written(self, parameter: Parameter) -> None:
+        """Follow a word that the line wrote."""
+        chart = self._chart
+        if chart is None:
+            return
+        raw = self._body.registers.present(parameter)
+        state = self._state(chart)
+        target = self._orders.transition(chart, state, parameter, raw)
+        order = self._orders.complete(chart, state, parameter, raw)
+        self._orders.note(parameter, raw)
+        if order is not None:
+            self._obey(order)
+        elif target:
+            self._go(next(one for one in chart.states if one.id == target))
+        if target and not self._runs:
+            self._rest_in(chart, target)
+
+    def _obey(self, order: Order) -> None:
+        if order.id in ("forward", "reverse"):
+            if self._body.fault is None:
+                self._runs, self._reverse = True, order.id == "reverse"
+                self._stop = Stop.RAMP
+        elif order.id == "reset":
+            self.reset_fault()
+        elif way := STOPS_BY_ORDER.get(order.id):
+            self._end(way)
+
+    def _go(self, state: State) -> None:
+        """A transition that no order names leads to a state."""
+        if state.kind == "running":
+            self._runs = self._body.fault is None
+        elif state.kind == "fault":
+            return
+        elif self._body.fault is not None:
+            self.reset_fault()
+        else:
+            self._end(Stop.RAMP)
+
+    def _rest_in(self, chart: Chart, id: str) -> None:
+        state = next(one for one in chart.states if one.id == id)
+        self._idle = state if state.kind in REST_KINDS else self._idle
+
+    def _end(self, way: Stop) -> None:
+        self._runs = False
+        self._stop = way
+        self._body.earlier_hz = None
+
+    def trip(self, stop: Stop) -> None:
+        """Stop the motor as the fault asks; what the line ordered is over."""
+        self._end(stop)
+        self._idle = None
+
+    def reset_fault(self) -> None:
+        """Clear the fault if its cause is gone; a run input that is closed starts it again."""
+        fault = self._body.fault
+        if fault is not None and not fault.persists:
+            self._body.fault = None
+            self._stop = Stop.RAMP
+
+    def raises(self) -> OwnFault | None:
+        """No word and no input is known to make a fault."""
+        return None
+
+    @property
+    def running(self) -> bool:
+        """Whether stopped-only words are locked."""
+        return self._body.turning
+
+    # What the motor is told
+
+    @property
+    def _wired(self) -> bool:
+        closed = self._body.terminals.closed
+        return closed("RUN") or closed("REV")
+
+    @property
+    def _ordered(self) -> bool:
+        if self._body.fault is not None or self._body.fallback is Fallback.STOP:
+            return False
+        return self._runs or self._wired
+
+    def order(self) -> MotorDemand:
+        """What the motor has to do now."""
+        body = self._body
+        way = Stop.RAMP if self._ordered else self._stop
+        up, down = body.rates(way)
+        base = MotorDemand(acceleration=up, deceleration=down)
+        if self._ordered:
+            self._target_hz = self._wanted()
+            return replace(base, energised=True, target=self._target_hz)
+        self._target_hz = 0.0
+        if way is Stop.INJECTION:
+            return replace(base, injection=bool(body.motor.rotor))
+        slow = way is not Stop.FREEWHEEL and body.motor.frequency != 0
+        return replace(base, energised=slow, target=0.0)
+
+    def _wanted(self) -> float:
+        hz = self._reference.hz(by_line=self._runs)
+        closed = self._body.terminals.closed
+        backward = closed("REV") and not closed("RUN")
+        return -hz if (self._reverse if self._runs else backward) else hz
+
+    # What the line is shown
+
+    def _raws(self) -> dict[str, int]:
+        registers = self._body.registers
+        return {p.code: registers.in_force(p) for p in self._body.profile.parameters}
+
+    @property
+    def _chart(self) -> Chart | None:
+        registers, profile = self._body.registers, self._body.profile
+        deciding = [profile[one.when.parameter] for one in profile.data.charts if one.when]
+        return profile.chart({word.code: registers.in_force(word) for word in deciding})
+
+    def _state(self, chart: Chart) -> State:
+        found = None
+        if self._body.fault is not None:
+            found = state_of_kind(chart, "fault")
+        elif self._body.motor.energised or self._body.motor.braking:
+            kinds = ("running",) if self._ordered else ("stopping", "running")
+            found = state_of_kind(chart, *kinds)
+        return found or self._idle or state_of_kind(chart, *REST_KINDS) or chart.states[0]
+
+    def show(self) -> None:
+        """Put the status words of the present state into their registers."""
+        body = self._body
+        motor = body.motor
+        chart = self._chart
+        if chart is not None and chart.states:
+            state = self._state(chart)
+            body.show_code(chart.status, word_of(chart, state))
+            reached = motor.energised and abs(motor.frequency - self._target_hz) < OWN_REACHED_HZ
+            self._mark(chart, chart.reached, reached)
+            self._mark(chart, chart.alarm, body.alarms != 0)
+            if chart.direction is not None:
+                way = StatusBit(
+                    parameter=chart.direction.parameter,
+                    bit=chart.direction.bit,
+                    value=chart.direction.reverse,
+                )
+                self._mark(chart, way, motor.frequency < 0 or self._target_hz < 0)
+        body.show_raw("alarm_word", body.alarms)
+        body.show("frequency_reference", abs(self._target_hz))
+        body.show("ramp_output", motor.frequency)
+        body.show("output_frequency", motor.frequency)
+
+    def _mark(self, chart: Chart, mark: StatusBit | None, holds: bool) -> None:
+        if mark is None or (parameter := self._body.registers.named(mark.parameter)) is None:
+            return
+        word = self._body.registers.present(parameter)
+        on = holds == bool(mark.value)
+        if mark.parameter == chart.status:
+            word = with_bit(chart, word, mark.bit, on=on)
+        else:
+            word = word | 1 << mark.bit if on else word & ~(1 << mark.bit)
+        self._body.registers.put(parameter, word)

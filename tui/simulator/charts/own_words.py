@@ -1,0 +1,43 @@
+"""From a profile's own states to the status words that show them; pure functions."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+from tui.drive.chart import state_of
+from tui.drive.profile.schema import Chart, State, StateKind
+
+MOST_CLEARED = 3
+"""Bits beside a state's own that are tried together until no state before it fits."""
+REST_KINDS: tuple[StateKind, ...] = ("ready", "stopped", "blocked", "starting")
+
+
+def word_of(chart: Chart, state: State) -> int:
+    """A status word that means this state; its value where no state before it is in the way."""
+    if state_of(chart, state.value) is state:
+        return state.value
+    others = 0
+    for before in chart.states:
+        others |= before.mask
+    bits = [1 << bit for bit in range(16) if others & ~state.mask & 1 << bit]
+    for count in range(1, MOST_CLEARED + 1):
+        for chosen in combinations(bits, count):
+            word = state.value | sum(chosen)
+            if state_of(chart, word) is state:
+                return word
+    return state.value
+
+
+def state_of_kind(chart: Chart, *kinds: StateKind) -> State | None:
+    """The first state of the first of these kinds that the chart has."""
+    for kind in kinds:
+        for state in chart.states:
+            if state.kind == kind:
+                return state
+    return None
+
+
+def with_bit(chart: Chart, word: int, bit: int, *, on: bool) -> int:
+    """A status word with a bit of its own meaning, unless that would tell another state."""
+    marked = word | 1 << bit if on else word & ~(1 << bit)
+    return marked if state_of(chart, marked) is state_of(chart, word) else word

@@ -1,0 +1,77 @@
+"""What the other side of a simulated line is set to, as far as the simulator can see it."""
+
+from __future__ import annotations
+
+import contextlib
+import re
+from dataclasses import dataclass
+
+from ..spec import LineTiming
+
+_ISPEED, _OSPEED, _CFLAG = 4, 5, 2
+
+
+@dataclass(frozen=True, slots=True)
+class ClientSettings:
+    """Baud, parity and stop bits on the client's side; None: it cannot be seen."""
+
+    baud: int | None = None
+    parity: str | None = None
+    stop_bits: int | None = None
+
+    def fits(self, baud: int, form: str) -> bool:
+        """Whether a drive with this baud and format understands what comes and is understood."""
+        return (
+            self.baud in (None, baud)
+            and self.parity in (None, form[1])
+            and self.stop_bits in (None, int(form[2]))
+        )
+
+    def pace(self, timing: LineTiming) -> LineTiming:
+        """The line's timing with what the client is set to in place of its own."""
+        form = timing.format
+        if self.stop_bits is not None:
+            form = f"{form[:2]}{self.stop_bits}"
+        return LineTiming(self.baud or timing.baud, form, timing.real_time)
+
+
+def settings_of_terminal(handle: int) -> ClientSettings:
+    """Baud and stop bits that stand on a pseudo-terminal; the kernel keeps no parity there."""
+    import termios
+
+    with contextlib.suppress(termios.error):
+        state = termios.tcgetattr(handle)
+        bauds = {constant: baud for baud, constant in _bauds().items()}
+        stop_bits = 2 if state[_CFLAG] & termios.CSTOPB else 1
+        return ClientSettings(bauds.get(state[_OSPEED], 0), None, stop_bits)
+    return ClientSettings()
+
+
+def set_up_terminal(handle: int, timing: LineTiming) -> bool:
+    """Put a pseudo-terminal to a line's baud and stop bits, so that who sets nothing hears it.
+
+    False where the system has no such baud: then nothing can be told from what stands there.
+    """
+    import termios
+
+    constant = _bauds().get(timing.baud)
+    if constant is None:
+        return False
+    state = termios.tcgetattr(handle)
+    state[_ISPEED] = state[_OSPEED] = constant
+    state[_CFLAG] &= ~termios.CSTOPB
+    if timing.format[2] == "2":
+        state[_CFLAG] |= termios.CSTOPB
+    termios.tcsetattr(handle, termios.TCSANOW, state)
+    return True
+
+
+def _bauds() -> dict[int, int]:
+    """The system's constants by baud."""
+    import termios
+
+    return {
+        int(name[1:]): getattr(termios, name)
+        for name in dir(termios)
+        if re.fullmatch(r"B[1-9]\d*", name)
+    }

@@ -1,0 +1,123 @@
+"""What the terminal can show: signs beyond ASCII, colours, erasing in colour.
+
+The locale tells the signs, terminfo (or COLORTERM) the colours; nothing is asked of the terminal
+itself, which a slow link would have to answer first.
+"""
+
+from __future__ import annotations
+
+import codecs
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+from rich.color import ColorSystem
+
+UTF_8: Final = "utf-8"
+ASCII: Final = "ascii"
+TRUE_COLOURS = frozenset({"truecolor", "24bit"})
+LEAST_COLOURS: tuple[tuple[int, ColorSystem], ...] = (
+    (256, ColorSystem.EIGHT_BIT),
+    (8, ColorSystem.STANDARD),
+)
+NAMED_COLOURS: tuple[tuple[str, ColorSystem], ...] = (
+    ("256color", ColorSystem.EIGHT_BIT),
+    ("direct", ColorSystem.TRUECOLOR),
+    ("kitty", ColorSystem.TRUECOLOR),
+    ("ghostty", ColorSystem.TRUECOLOR),
+    ("alacritty", ColorSystem.TRUECOLOR),
+    ("foot", ColorSystem.TRUECOLOR),
+    ("putty", ColorSystem.STANDARD),
+    ("xterm", ColorSystem.STANDARD),
+)
+"""What a part of TERM tells where the system does not know that terminal."""
+
+LOCALE = ("LC_ALL", "LC_CTYPE", "LANG")
+"""Variables that tell the encoding, the first that is set first."""
+
+BEGINNING = Path("/proc/self/environ")
+"""The environment as the program was given it; Python changes LC_CTYPE where it is C or unset."""
+
+
+@dataclass(frozen=True, slots=True)
+class Abilities:
+    """What a terminal can show."""
+
+    encoding: str = UTF_8
+    """How characters are written, as Python names it; what it lacks becomes a plain sign."""
+    colours: ColorSystem | None = ColorSystem.TRUECOLOR
+    """None where there are none, or none are wanted."""
+    erases: bool = False
+    """Whether it erases cells in the colour that is set."""
+
+
+EVERYTHING: Final = Abilities()
+
+
+def abilities_of(
+    environment: Mapping[str, str], *, written_as: str = UTF_8, ascii: bool | None = None
+) -> Abilities:
+    """What the terminal of this environment can show; Python writes to it in `written_as`.
+
+    With `ascii` plain signs are used whatever the locale says, without them where it is False.
+    """
+    term = environment.get("TERM", "")
+    known, erases = _terminfo(term)
+    encoding = encoding_of(environment, written_as)
+    if ascii is not None:
+        encoding = ASCII if ascii else UTF_8
+    return Abilities(encoding, _colours(environment, term, known), erases)
+
+
+def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:
+    """The encoding of the locale, as Python names it.
+
+    ASCII where it tells none that is known, or where Python writes in another one.
+    """
+    if sys.platform == "win32":
+        return UTF_8  # it has no locale of this kind, and consoles that know all signs
+    told = next((value for name in LOCALE if (value := environment.get(name))), "")
+    name = told.partition(".")[2].partition("@")[0] or told
+    try:
+        "a".encode(name)
+        encoding = codecs.lookup(name).name
+        return encoding if encoding == codecs.lookup(written_as).name else ASCII
+    except (LookupError, UnicodeError, ValueError):
+        return ASCII
+
+
+def given_environment(environment: Mapping[str, str]) -> Mapping[str, str]:
+    """The environment with the locale as it was at the start of the program."""
+    try:
+        lines = BEGINNING.read_bytes().split(b"\0")
+    except OSError:
+        return environment  # no such thing on this system
+    given = dict(line.decode("utf-8", "replace").partition("=")[::2] for line in lines if line)
+    kept = {name: value for name, value in environment.items() if name not in LOCALE}
+    return kept | {name: given[name] for name in LOCALE if name in given}
+
+
+def _colours(environment: Mapping[str, str], term: str, known: int | None) -> ColorSystem | None:
+    if environment.get("NO_COLOR") or term in ("", "dumb", "unknown"):
+        return None
+    if environment.get("COLORTERM", "").lower() in TRUE_COLOURS:
+        return ColorSystem.TRUECOLOR
+    if known is None:
+        return next((system for part, system in NAMED_COLOURS if part in term), None)
+    return next((system for least, system in LEAST_COLOURS if known >= least), None)
+
+
+def _terminfo(term: str) -> tuple[int | None, bool]:
+    """How many colours a terminal has, and whether it erases in them; None where not known."""
+    try:
+        import curses
+    except ImportError:  # as on Windows
+        return None, False
+    try:
+        curses.setupterm(term or "unknown", 1)
+    except curses.error:
+        return None, False
+    erases = curses.tigetstr("ech") == b"\x1b[%p1%dX"
+    return curses.tigetnum("colors"), erases and curses.tigetflag("bce") > 0

@@ -1,0 +1,158 @@
+"""An app whose pictures go to the terminal as fast as it takes them, in as few bytes as can be.
+
+Nothing is drawn that the terminal cannot take yet: what is late is left out, never queued. So a
+key that comes back from a slow link finds no second-long row of pictures before its own.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Sequence
+
+from rich.color import ColorSystem
+from rich.console import RenderableType
+from rich.control import Control
+from textual.app import App
+from textual.filter import LineFilter, Monochrome
+from textual.screen import Screen
+
+from .abilities import EVERYTHING, UTF_8, Abilities
+from .lean import Picture, strips_of
+from .pacing import ASK, Pacing
+
+SIXTEEN = frozenset({ColorSystem.STANDARD, ColorSystem.WINDOWS})
+
+HURRY_FOR = 0.5
+"""Seconds for which what a key brings goes before what comes by itself."""
+
+
+class LeanApp(App[None]):
+    """Sends the difference between what is to be shown and what is, when the terminal can take it.
+
+    `fit_terminal` tells before it runs what the terminal and the way to it are like.
+    """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.fit_terminal(EVERYTHING)
+        self._hurries_until = float("-inf")
+        self._later: asyncio.TimerHandle | None = None
+        self._asked_first = False
+        self._begun = False
+        """Whether a frame was sent in part."""
+
+    def fit_terminal(self, abilities: Abilities, *, slow: bool = False) -> None:
+        """Use signs and colours that the terminal has.
+
+        With `slow` the link is taken for slow until it has shown its rate.
+        """
+        self._colours = abilities.colours or ColorSystem.STANDARD
+        self.plain_signs = abilities.encoding != UTF_8
+        """Whether the terminal has signs of ASCII only, or few more."""
+        self._instead = filters_for(abilities)
+        self._picture = Picture(erases=abilities.erases)
+        self._pacing = Pacing(slow=slow)
+
+    def get_line_filters(self) -> Sequence[LineFilter]:
+        """Textual's own, but for its way to leave colours out, and those of this terminal."""
+        own = [one for one in super().get_line_filters() if not isinstance(one, Monochrome)]
+        return [*own, *self._instead]
+
+    def hurry(self) -> None:
+        """What changes now is for a person who waits for it, or must see it at once."""
+        self._hurries_until = time.monotonic() + HURRY_FOR
+
+    def picture_taken(self, at: float) -> None:
+        """The terminal has drawn the oldest frame on its way, and said so at this time."""
+        self._pacing.answered(at)
+        self._send()
+
+    def _display(self, screen: Screen[object], renderable: RenderableType | None) -> None:
+        strips = strips_of(renderable)
+        if strips is None or not self._draws:
+            super()._display(screen, renderable)
+            return
+        self._picture.want(strips, self._colours)
+        self._send()
+        self.post_display_hook()
+
+    @property
+    def _draws(self) -> bool:
+        """Whether there is a terminal, and a picture of it that is complete."""
+        there = self._running and not self._closed and not self.is_headless
+        return there and self._driver is not None and not self._batch_count
+
+    def _send(self) -> None:
+        """Draw what the terminal can take now; the rest when it has drawn that."""
+        if self._picture.is_shown or not self._draws:
+            return
+        now = time.monotonic()
+        if not self._asked_first:
+            # its answer tells how long the way is, before there is anything on it
+            self._write("", now)
+            self._asked_first = self._begun = True
+        while room := self._pacing.room(now, hurry=self._begun or now < self._hurries_until):
+            if frame := self._picture.frame(room):
+                self._write(frame, now)
+            self._begun = not self._picture.is_shown
+            if not self._begun:
+                break
+        self._look_later(now)
+
+    def _write(self, frame: str, now: float) -> None:
+        assert self._driver is not None
+        if frame:
+            at = self.screen.outer_size.clamp_offset(self.cursor_position)
+            frame += Control.move_to(*at).segment.text
+            self._begin_update()
+            self._driver.write(frame)
+            self._end_update()
+        self._driver.write(ASK)
+        self._driver.flush()
+        self._pacing.sent(len(frame), now)
+
+    def _look_later(self, now: float) -> None:
+        """Where an answer does not come, nothing else would send the rest."""
+        if self._later is not None:
+            self._later.cancel()
+            self._later = None
+        wait = self._pacing.wait(now)
+        if wait is not None and not self._picture.is_shown:
+            self._later = asyncio.get_running_loop().call_later(wait, self._send)
+
+    def on_mount(self) -> None:
+        """A terminal that was left for a while may show something else."""
+        self.app_resume_signal.subscribe(self, lambda _: self._anew())
+
+    def on_resize(self) -> None:
+        """What a terminal of another size shows is not known."""
+        self._picture.clear()
+
+    def action_redraw(self) -> None:
+        """Draw the whole screen anew: something else may have written to the terminal."""
+        self._anew()
+        self.hurry()
+        self.refresh()
+
+    def _anew(self) -> None:
+        self._pacing.forget()
+        self._picture.forget()
+
+
+def filters_for(abilities: Abilities) -> list[LineFilter]:
+    """What makes a picture one that the terminal can show; nothing where it can show everything."""
+    found: list[LineFilter] = []
+    if abilities.encoding != UTF_8:
+        from .plain_signs import PlainSigns
+
+        found.append(PlainSigns(abilities.encoding))
+    if abilities.colours is None:
+        from .few_colours import NoColours
+
+        found.append(NoColours())
+    elif abilities.colours in SIXTEEN:
+        from .few_colours import SixteenColours
+
+        found.append(SixteenColours())
+    return found

@@ -1,0 +1,68 @@
+"""How colours and attributes are set on a terminal, and what has to be sent to change them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import lru_cache
+
+RESET = "0"
+FOREGROUND = frozenset({*range(30, 38), *range(90, 98)})
+BACKGROUND = frozenset({*range(40, 48), *range(100, 108)})
+EXTENDED = {38: "foreground", 48: "background"}
+NUMBERS = {2: 5, 5: 3}
+"""Numbers of an extended colour in all, by the one that follows 38 or 48."""
+
+
+@dataclass(frozen=True, slots=True)
+class CellLook:
+    """Attributes and colours of a character; a colour that is empty is the terminal's own."""
+
+    attributes: frozenset[str] = field(default_factory=frozenset)
+    foreground: str = ""
+    background: str = ""
+
+
+@lru_cache(maxsize=1024)
+def look_of(ansi: str) -> CellLook:
+    """What the numbers of a style mean, as `1;38;5;7;48;5;0`."""
+    attributes, colours = set(), {"foreground": "", "background": ""}
+    left = ansi.split(";") if ansi else []
+    while left:
+        number = int(left[0])
+        size = 1
+        if number in EXTENDED:
+            size = NUMBERS[int(left[1])]
+            colours[EXTENDED[number]] = ";".join(left[:size])
+        elif number in FOREGROUND:
+            colours["foreground"] = left[0]
+        elif number in BACKGROUND:
+            colours["background"] = left[0]
+        elif number not in (39, 49):
+            attributes.add(left[0])
+        left = left[size:]
+    return CellLook(frozenset(attributes), **colours)
+
+
+@lru_cache(maxsize=4096)
+def change(before: str, after: str) -> str:
+    """The shortest sequence from one style to another; nothing where they are the same."""
+    if before == after:
+        return ""
+    was, now = look_of(before), look_of(after)
+    anew = f"\x1b[{RESET};{after}m" if after else f"\x1b[{RESET}m"
+    taken_away = (
+        was.attributes - now.attributes
+        or (was.foreground and not now.foreground)
+        or (was.background and not now.background)
+    )
+    if taken_away:
+        return anew
+    added = sorted(now.attributes - was.attributes)
+    added += [now.foreground] if now.foreground != was.foreground else []
+    added += [now.background] if now.background != was.background else []
+    return min(f"\x1b[{';'.join(added)}m" if added else "", anew, key=len)
+
+
+def erasable(ansi: str) -> bool:
+    """Whether a blank of this style looks like an erased cell."""
+    return not look_of(ansi).attributes
