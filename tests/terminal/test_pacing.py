@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from tui.terminal.pacing import LOST_AFTER, MUTE_AFTER, PIECE_LEAST, WHOLE, Pacing
+from tui.terminal.pacing import AHEAD, LOST_AFTER, MUTE_AFTER, WHOLE, Pacing
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Link:
             self.pacing.answered(self.answers.pop(0))
 
 
-def drawn(link: Link, sizes: list[int], *, hurry: bool = False) -> float:
+def drawn(link: Link, sizes: list[int]) -> float:
     """Draw frames one after the other, with as much room as there is; the time it takes."""
     now = 0.0
     link.send(0, now)
@@ -37,7 +37,7 @@ def drawn(link: Link, sizes: list[int], *, hurry: bool = False) -> float:
         left, begun = size, True
         while left > 0:
             link.until(now)
-            room = link.pacing.room(now, hurry=hurry or begun)
+            room = link.pacing.room(now, rest=begun)
             if room:
                 link.send(min(room, left), now)
                 left -= room
@@ -58,7 +58,7 @@ def test_a_frame_waits_for_the_answer_to_the_one_before() -> None:
 
 def test_what_hurries_follows_a_small_piece_and_no_large_one() -> None:
     pacing = Pacing()
-    pacing.sent(PIECE_LEAST, 0.0)
+    pacing.sent(AHEAD, 0.0)
     assert pacing.room(0.1, hurry=True)
     pacing.sent(1, 0.1)
     assert not pacing.room(0.2, hurry=True)
@@ -109,7 +109,7 @@ def test_on_a_slow_link_no_more_than_a_second_is_on_its_way(rate: float) -> None
             link.send(min(room, 4000), now)
         longest = max(longest, link.free - now)
         now += 0.02
-    assert longest < 2 * PIECE_LEAST / rate + 0.31
+    assert longest < 2 * AHEAD / rate + 0.31
 
 
 @pytest.mark.parametrize(("rate", "way"), [(2000.0, 0.15), (2000.0, 0.3), (20000.0, 0.05)])

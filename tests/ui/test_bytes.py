@@ -25,6 +25,7 @@ from textual.widgets import Label
 from tui.terminal.lean import Picture, strips_of
 from tui.terminal.lean_app import LeanApp
 from tui.terminal.pacing import ASK, WHOLE
+from tui.terminal.sgr import of_blank
 from tui.widgets.lines import Lines, cells, runs
 
 from .bytes_per_second import compare
@@ -66,6 +67,8 @@ class Terminal:
                 size = {"2": 5, "5": 3}[left[1]]
             name = _part(left[0])
             self._pen = {**self._pen, name: ";".join(left[:size])} if name else {}
+            if name == "22":
+                self._pen = {n: look for n, look in self._pen.items() if n not in ("1", "2", "22")}
             left = left[size:]
         order = sorted(self._pen, key=lambda name: (name == "behind", name == "front", name))
         self._colour = ";".join(self._pen[name] for name in order)
@@ -147,7 +150,14 @@ async def test_the_terminal_shows_what_the_screen_holds(seed: int) -> None:
             fresh.feed("\n".join(strip.render(app.console) for strip in strips))
             assert app.terminal.text() == [strip.text for strip in strips]
             for place, (character, colour) in fresh.cells.items():
-                assert app.terminal.cells[place] == (character, colour)
+                shown, its_colour = app.terminal.cells[place]
+                assert shown == character
+                assert _seen(shown, its_colour) == _seen(character, colour)
+
+
+def _seen(character: str, colour: str) -> str:
+    """What is seen of a style: of a blank, what lies behind it."""
+    return of_blank(colour) if character == " " else colour
 
 
 class Dialog(ModalScreen[None]):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import codecs
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
 
@@ -69,6 +69,13 @@ def abilities_of(
     if ascii is not None:
         encoding = ASCII if ascii else UTF_8
     return Abilities(encoding, _colours(environment, term, known), erases)
+
+
+def fewer_colours(abilities: Abilities) -> Abilities:
+    """The same with sixteen colours at most: to set one of them takes half the bytes."""
+    if abilities.colours in (None, ColorSystem.STANDARD):
+        return abilities
+    return replace(abilities, colours=ColorSystem.STANDARD)
 
 
 def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:

@@ -18,7 +18,7 @@ from textual.strip import Strip
 
 from tui.drive.plain import commands
 
-from .sgr import change, erasable
+from .sgr import change, erasable, of_blank, same_blank
 
 Cell = tuple[str, str]
 """A character and its colours; none where the one to the left takes two cells."""
@@ -157,12 +157,15 @@ def cells_of(strip: Strip, colours: ColorSystem) -> list[Cell]:
         if control:
             continue
         ansi = Strip.render_ansi(style, colours) if style is not None else ""
+        blank = (" ", of_blank(ansi))
         if text.isascii() and text.isprintable():
-            found += [(character, ansi) for character in text]
+            found += [blank if character == " " else (character, ansi) for character in text]
             continue
         for character in text:
             width = get_character_cell_size(character)
-            if width:
+            if character == " ":
+                found.append(blank)
+            elif width:
                 found += [(character, ansi), *[("", ansi)] * (width - 1)]
             elif found and not commands(character):
                 found[-1] = (found[-1][0] + character, found[-1][1])
@@ -192,8 +195,9 @@ class Pen:
             text, ansi = cells[place] or (" ", "")
             if not moved:
                 self._put(f"\x1b[{y + 1};{x + place + 1}H")
-            self._put(change(self._ansi, ansi))
-            self._ansi = ansi
+            if text != " " or not same_blank(self._ansi, ansi):
+                self._put(change(self._ansi, ansi))
+                self._ansi = ansi
             blank = self._blank(cells, place)
             self._put(f"\x1b[{blank}X" if blank else text)
             place, moved = place + (blank or 1), not blank

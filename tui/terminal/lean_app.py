@@ -92,7 +92,8 @@ class LeanApp(App[None]):
             # its answer tells how long the way is, before there is anything on it
             self._write("", now)
             self._asked_first = self._begun = True
-        while room := self._pacing.room(now, hurry=self._begun or now < self._hurries_until):
+        hurry = now < self._hurries_until
+        while room := self._pacing.room(now, hurry=hurry, rest=self._begun):
             if frame := self._picture.frame(room):
                 self._write(frame, now)
             self._begun = not self._picture.is_shown

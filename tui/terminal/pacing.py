@@ -20,14 +20,23 @@ MUTE_AFTER: Final = 2.0
 LOST_AFTER: Final = 10.0
 """Seconds after which an answer is taken for lost where others came."""
 
-PIECE_LEAST: Final = 600
-"""Bytes that a piece of a frame may always have, and that may be on their way before it."""
+PIECE_LEAST: Final = 300
+"""Bytes that a piece of a frame may always have. SSH shows a piece once all of it has come."""
+
+AHEAD: Final = 450
+"""Bytes that may be on their way when something that hurries follows them."""
+
+AHEAD_OF_REST: Final = 900
+"""The same for the rest of a frame that has begun: the link stays full on a long way, too."""
 
 WHOLE: Final = 1 << 20
 """Bytes that no frame has."""
 
 PIECE_TIME: Final = 0.3
 """Seconds that the link may take for one piece of a frame, above its shortest round trip."""
+
+GROWTH: Final = 4
+"""How much more a piece may have after one that went through fast."""
 
 OWED_MOST: Final = 32
 """Questions that a terminal without answers is kept account of."""
@@ -62,17 +71,18 @@ class Pacing:
         """Fit the size of a piece to the time that one took."""
         if took > 2 * PIECE_TIME:
             self._piece = max(PIECE_LEAST, int(size * PIECE_TIME / took))
-        elif took < PIECE_TIME / 2 and size > self._piece / 2:
-            self._piece = min(WHOLE, 2 * self._piece)
+        elif took < PIECE_TIME / 4 and size > self._piece / 2:
+            self._piece = min(WHOLE, GROWTH * self._piece)
 
-    def room(self, now: float, *, hurry: bool = False) -> int:
+    def room(self, now: float, *, hurry: bool = False, rest: bool = False) -> int:
         """Bytes that may go out now; 0 while what went before is on its way.
 
-        What hurries (what a key brings, a stop, a fault, the rest of a frame that has begun)
-        follows a small piece at once.
+        What hurries (what a key brings, a stop, a fault) and the `rest` of a frame that has begun
+        follow a small piece at once.
         """
         on_its_way, mute = self._on_its_way(now), self._is_mute(now)
-        if on_its_way and not (hurry and (mute or sum(on_its_way) <= PIECE_LEAST)):
+        ahead = AHEAD_OF_REST if rest else AHEAD if hurry else 0
+        if on_its_way and sum(on_its_way) > ahead and not (mute and (hurry or rest)):
             return 0
         return WHOLE if mute else self._piece
 

@@ -6,6 +6,9 @@ from dataclasses import dataclass, field
 from functools import lru_cache
 
 RESET = "0"
+NOT_BOLD = "22"
+SEEN_ON_SIGNS = frozenset({"1", "2", "3"})
+"""Bold, dim, italic: a blank looks the same with them."""
 FOREGROUND = frozenset({*range(30, 38), *range(90, 98)})
 BACKGROUND = frozenset({*range(40, 48), *range(100, 108)})
 EXTENDED = {38: "foreground", 48: "background"}
@@ -50,14 +53,13 @@ def change(before: str, after: str) -> str:
         return ""
     was, now = look_of(before), look_of(after)
     anew = f"\x1b[{RESET};{after}m" if after else f"\x1b[{RESET}m"
-    taken_away = (
-        was.attributes - now.attributes
-        or (was.foreground and not now.foreground)
-        or (was.background and not now.background)
-    )
-    if taken_away:
+    gone = was.attributes - now.attributes
+    colour_gone = (was.foreground and not now.foreground) or (was.background and not now.background)
+    if colour_gone or not gone <= {"1"}:
         return anew
-    added = sorted(now.attributes - was.attributes)
+    added = [NOT_BOLD] if gone else []
+    kept = was.attributes - {"2"} if gone else was.attributes  # not bold is not dim either
+    added += sorted(now.attributes - kept)
     added += [now.foreground] if now.foreground != was.foreground else []
     added += [now.background] if now.background != was.background else []
     return min(f"\x1b[{';'.join(added)}m" if added else "", anew, key=len)
@@ -65,4 +67,15 @@ def change(before: str, after: str) -> str:
 
 def erasable(ansi: str) -> bool:
     """Whether a blank of this style looks like an erased cell."""
-    return not look_of(ansi).attributes
+    return look_of(ansi).attributes <= SEEN_ON_SIGNS
+
+
+@lru_cache(maxsize=1024)
+def of_blank(ansi: str) -> str:
+    """The style of a blank without what is seen on signs only."""
+    return look_of(ansi).background if erasable(ansi) else ansi
+
+
+def same_blank(before: str, after: str) -> bool:
+    """Whether a blank looks the same in two styles."""
+    return erasable(before) and erasable(after) and of_blank(before) == of_blank(after)

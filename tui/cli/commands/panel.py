@@ -43,8 +43,11 @@ def run_panel(
     os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
     from tui.app import DrivePanelApp
     from tui.session.connect.open_line import open_line
-    from tui.terminal.abilities import abilities_of, given_environment
+    from tui.terminal.abilities import abilities_of, fewer_colours, given_environment
 
+    abilities = abilities_of(
+        given_environment(os.environ), written_as=sys.stderr.encoding, ascii=ascii
+    )
     app = DrivePanelApp(
         open_line=_open_with_demo if start == DEMO_LINE else open_line,
         start=start,
@@ -54,9 +57,7 @@ def run_panel(
         leave_running=on_hangup == LEAVE_RUNNING,
         mouse=mouse,
         bell=bell,
-        abilities=abilities_of(
-            given_environment(os.environ), written_as=sys.stderr.encoding, ascii=ascii
-        ),
+        abilities=fewer_colours(abilities) if low_bandwidth else abilities,
         on_shown=_collect_garbage,
     )
     with ending_by_signal(app, stop=on_hangup == STOP):
