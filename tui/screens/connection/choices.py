@@ -74,7 +74,16 @@ def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
 def _offered_simulated(text: str) -> bool:
     """Whether it is one of the simulated lines, which are offered anyway."""
     # by its spelling: what simulates a line takes long to import, and this is the first picture
-    return text.replace(" ", "").casefold() in {one for one, _ in simulated_lines()[:2]}
+    offered = [one for one, _ in simulated_lines()[:2]]
+    return text.replace(" ", "").casefold() in (*offered, *map(_with_addresses, offered))
+
+
+def _with_addresses(line: str) -> str:
+    """A simulated line that names no address, with those that its drives have."""
+    ids = line.removeprefix("sim:").split(",")
+    if "@" in line:
+        return line
+    return "sim:" + ",".join(f"{one}@{place}" for place, one in enumerate(ids, 1))
 
 
 def fault_of_line(text: str) -> str:
