@@ -20,9 +20,10 @@ from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults.screen import FaultsScreen
 from tui.screens.frames.screen import FEW, FramesScreen
 from tui.screens.keys.help import HelpScreen
-from tui.screens.keys.table import ACTIONS, EVERYWHERE
+from tui.screens.keys.table import ACTIONS, EVERYWHERE, OPENING
 from tui.screens.messages.screen import MessagesScreen
 from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.opening import OpeningScreen
 from tui.screens.parameters.screen import ParametersScreen
 from tui.screens.wiring.screen import WiringScreen
 from tui.session.connect.open_line import OpenLine, demo_line
@@ -214,7 +215,8 @@ def test_every_action_has_a_method_and_words() -> None:
         MessagesScreen,
         WiringScreen,
     )
-    owners = {(screen.TITLE or "line").lower(): screen for screen in screens}
+    owners: dict[str, type] = {(screen.TITLE or "line").lower(): screen for screen in screens}
+    owners[OPENING] = OpeningScreen
     for action in ACTIONS:
         name = f"action_{action.id.partition('(')[0]}"
         for screen in action.screens:

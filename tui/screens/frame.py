@@ -6,8 +6,9 @@ It is live everywhere: whoever answers a question sees what the motor does meanw
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Iterable, Mapping
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
 
 from rich.style import Style
 from rich.text import Text
@@ -58,7 +59,9 @@ class Framed(Screen[Any]):
     """A screen, or a dialog over one, with the frame around it; the app draws it now and then."""
 
     app: Panel
-    FRAME: ClassVar[bool] = True
+    _frame_parts: Mapping[str, Lines] = MappingProxyType({})
+    _small: Lines | None = None
+    """What covers the screen while the terminal is too small for it."""
     DEFAULT_CSS = """
     Framed { layers: default frame; }
     Framed #strip { dock: top; height: 1; background: $surface; layer: frame; }
@@ -71,8 +74,9 @@ class Framed(Screen[Any]):
     def framed(self) -> Iterable[Widget]:
         """The parts of the frame as it is now: the first picture has them, too."""
         view, width = self.app.frame_now(), self.app.size.width
+        self._frame_parts = {place: Lines(id=place) for place in ("strip", "tabs", "said")}
         for place, lines in self._parts(view, width).items():
-            part = Lines(id=place)
+            part = self._frame_parts[place]
             part.show(lines)
             yield part
 
@@ -95,27 +99,33 @@ class Framed(Screen[Any]):
             return
         self._draw_small(view)
         parts = self._parts(view, width)
-        # a screen that is being made, or goes, has none of them or some
-        for said in self.query("#said").results(Lines):
-            height = len(parts["said"])
-            if said.styles.height is None or said.styles.height.value != height:
-                said.styles.height = height
+        # kept by hand: to look for them costs more than to draw them
         for place, lines in parts.items():
-            for part in self.query(f"#{place}").results(Lines):
-                part.show(lines)
+            part = self._frame_parts.get(place)
+            if part is None or not part.is_attached:
+                continue  # a screen that is being made, or goes
+            if place == "said" and self.said_rows != len(lines):
+                part.styles.height = len(lines)
+            part.show(lines)
+
+    @property
+    def said_rows(self) -> int:
+        """Rows of the message."""
+        part = self._frame_parts.get("said")
+        height = part.styles.height if part is not None else None
+        return int(height.value) if height is not None else 1
 
     def _draw_small(self, view: FrameView) -> None:
         """Cover the screen where the terminal is too small for it."""
-        there = self.query("#small").results(Lines)
-        small = next(iter(there), None)
         if not is_too_small(*self.app.size):
-            if small is not None:
-                small.remove()
+            if self._small is not None:
+                self._small.remove()
+                self._small = None
             return
-        if small is None:
-            small = Lines(id="small")
-            self.mount(small)
-        small.show(small_lines(view.strip, self.app.stops_whom, *self.size))
+        if self._small is None:
+            self._small = Lines(id="small")
+            self.mount(self._small)
+        self._small.show(small_lines(view.strip, self.app.stops_whom, *self.size))
 
 
 def said_lines(said: Said | None, width: int) -> list[Text]:

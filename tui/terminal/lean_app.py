@@ -19,9 +19,15 @@ from textual.screen import Screen
 
 from .abilities import EVERYTHING, UTF_8, Abilities
 from .lean import Picture, strips_of
-from .pacing import ASK, Pacing
+from .pacing import ASK, WHOLE, Pacing
 
 SIXTEEN = frozenset({ColorSystem.STANDARD, ColorSystem.WINDOWS})
+
+FIRST_PIECE = 60
+"""Bytes of the first piece of what hurries on a slow link: about a row."""
+
+PACKETS_APART = 0.02
+"""Seconds between that piece and the next."""
 
 HURRY_FOR = 0.5
 """Seconds for which what a key brings goes before what comes by itself."""
@@ -94,11 +100,15 @@ class LeanApp(App[None]):
             self._asked_first = self._begun = True
         hurry = now < self._hurries_until
         while room := self._pacing.room(now, hurry=hurry, rest=self._begun):
-            if frame := self._picture.frame(room):
+            first = hurry and room < WHOLE and not self._begun
+            if frame := self._picture.frame(FIRST_PIECE if first else room):
                 self._write(frame, now)
             self._begun = not self._picture.is_shown
             if not self._begun:
                 break
+            if first:  # in a packet of its own, which is shown before the rest has come
+                self._later_by(PACKETS_APART)
+                return
         self._look_later(now)
 
     def _write(self, frame: str, now: float) -> None:
@@ -115,12 +125,14 @@ class LeanApp(App[None]):
 
     def _look_later(self, now: float) -> None:
         """Where an answer does not come, nothing else would send the rest."""
-        if self._later is not None:
-            self._later.cancel()
-            self._later = None
         wait = self._pacing.wait(now)
         if wait is not None and not self._picture.is_shown:
-            self._later = asyncio.get_running_loop().call_later(wait, self._send)
+            self._later_by(wait)
+
+    def _later_by(self, seconds: float) -> None:
+        if self._later is not None:
+            self._later.cancel()
+        self._later = asyncio.get_running_loop().call_later(seconds, self._send)
 
     def on_mount(self) -> None:
         """A terminal that was left for a while may show something else."""

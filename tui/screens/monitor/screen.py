@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from decimal import Decimal, InvalidOperation
 from typing import ClassVar
 
@@ -57,6 +58,9 @@ class MonitorScreen(InputKeys):
         self._span = SPANS.index(USUAL_SPAN)
         self._timer: Timer | None = None
         self._still: Timer | None = None
+        self._told: object = None
+        """What of the latest snapshot is shown at once, as it was shown last."""
+        self._looked_at = -math.inf
         self._run_rows = 0
         self._placed: tuple[Arrangement, int, int] | None = None
 
@@ -77,7 +81,24 @@ class MonitorScreen(InputKeys):
         """Start watching."""
         beside = codes_beside(self.session.profile)
         self.console.monitor.start(period=self.app.period, extra=beside)
-        self._timer = self.set_interval(SELDOM if self.app.low_bandwidth else REFRESH, self.look)
+        self._timer = self.set_interval(REFRESH, self._look_in_time)
+
+    def _look_in_time(self) -> None:
+        """On a slow link figures seldom; a state, a fault and values that are new at once."""
+        snapshot, now = self.console.monitor.latest, self.app.clock.monotonic()
+        told = snapshot and (
+            snapshot.state.kind,
+            snapshot.state.headline,
+            snapshot.state.fault,
+            bool(snapshot.error),
+            len(snapshot.readings),
+        )
+        if told != self._told:
+            self.app.hurry()
+        elif self.app.low_bandwidth and now < self._looked_at + SELDOM:
+            return
+        self._told, self._looked_at = told, now
+        self.look()
 
     def on_unmount(self) -> None:
         """Stop watching; nobody looks any more, and nothing is commanded any more."""
@@ -121,21 +142,15 @@ class MonitorScreen(InputKeys):
         """How many rows each part has."""
         return arrange(*self.size, len(other_values(self.session.profile)))
 
-    def _said_rows(self) -> int:
-        """Rows of the message."""
-        said = self.query("#said")
-        height = said.first().styles.height if said else None
-        return int(height.value) if height is not None else 1
-
     def _place(self, room: Arrangement) -> None:
         """Give each part its rows; only where they change is anything laid out anew."""
+        bottom = max(room.bottom, self._run_rows)
+        placed = (room, bottom, self.said_rows)
+        if placed == self._placed:
+            return
         there = {part.id for part in self.query("Lines, Horizontal, Vertical")}
         if not there >= PLACED or len(self.query(".word")) < WORDS_MOST:
             return  # not made yet, or on its way out
-        bottom = max(room.bottom, self._run_rows)
-        placed = (room, bottom, self._said_rows())
-        if placed == self._placed:
-            return
         self._placed = placed
         self.set_class(not room.big, "plain")
         rows = {"top": room.top, "motor": room.values, "trend": room.trend, "words": room.words}
