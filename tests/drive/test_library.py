@@ -8,6 +8,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import tomli
 from click.testing import CliRunner
 
 from tui.cli.main import main
@@ -226,12 +227,34 @@ def test_a_profile_is_begun_from_another(tmp_path: Path, monkeypatch: pytest.Mon
     assert (begun.id, begun.parameters) == ("my-drive", source.parameters)
     assert library.matching_profiles("ATV312HU09M3") == ["atv312"], "the copy takes no drive over"
     text = path.read_text()
+    assert "rows_from" not in text, "what it shares stands in a file of one's own"
     again = CliRunner().invoke(main, ["profiles", "new", "my-drive", "--from", "atv21"])
     assert again.exit_code == 2
     assert path.read_text() == text
     for words in (("new", "x"), ("new", "My Drive", "--from", "atv21"), ("new", "--from", "atv21")):
         assert CliRunner().invoke(main, ["profiles", *words]).exit_code == 2
     assert CliRunner().invoke(main, ["profiles", "path"]).output.strip() == str(folder)
+
+
+@pytest.mark.parametrize("family", [one.id for one in library.listings()])
+def test_what_families_share_stands_once(family: str) -> None:
+    path = library.packaged_folder() / f"{family}.toml"
+    tables = tomli.loads(path.read_text("utf-8"))
+    names = tables["profile"].get("rows_from", [])
+    texts = [(library.packaged_folder() / name).read_text("utf-8") for name in names]
+    rows = {row["code"]: row for text in texts for row in tomli.loads(text)["parameters"]}
+    again = [
+        f"{row['code']}.{key}"
+        for row in tables["parameters"]
+        for key in row.keys() & rows.get(row["code"], {}).keys() - {"code"}
+    ]
+    assert again == []
+    [listing] = [one for one in library.listings() if one.id == family]
+    assert listing.parameters == len(library.load(family).parameters)
+    assert family not in SHARING or len(rows) >= SHARING[family]
+
+
+SHARING = {"atv31": 231, "atv312": 231, "powerdrive": 68, "proxidrive": 68, "varmeca": 68}
 
 
 def test_the_schema_describes_every_field() -> None:

@@ -206,6 +206,19 @@ async def test_the_order_of_words_is_said_once(tmp_path: Path) -> None:
     assert (await Reader(session).read(["ENERGY"]))["ENERGY"].raw == 0x20001
 
 
+ROW = """[[parameters]]
+code = "HOLD"
+name = "Of its own"
+number = "77"
+address = 77
+access = "r"
+group = "All"
+source = "m 1"
+confidence = "manual"
+
+"""
+
+
 def shared(tmp_path: Path, more: str, head: str = 'rows_from = ["ramps.rows"]') -> Path:
     (tmp_path / "ramps.rows").write_text(ROWS, encoding="utf-8")
     path = tmp_path / "long.toml"
@@ -221,6 +234,18 @@ def test_rows_that_families_share_stand_once(tmp_path: Path) -> None:
     ramp = profile["ACC"]
     assert (ramp.max, ramp.scale, ramp.unit, ramp.address) == (500, "0.1", "s", 9)
     assert [source.id for source in profile.data.sources] == ["shared", "m"]
+
+
+def test_a_row_of_ones_own_stands_behind_the_one_above_it(tmp_path: Path) -> None:
+    between = '[[parameters]]\ncode = "ACC"\n\n' + ROW.replace("HOLD", "OWN")
+    path = shared(tmp_path, between + ROW.replace("HOLD", "NEXT").replace("77", "78"))
+    assert library.faults_of(path) == []
+    codes = [p.code for p in library.load_file(path).parameters]
+    assert codes == ["ACC", "OWN", "NEXT", "DEC", "HOURS", "ENERGY"]
+    path.write_text(path.read_text("utf-8").replace("address = 78", "address = 77"), "utf-8")
+    [told] = library.faults_of(path)
+    line = path.read_text("utf-8").splitlines().index('code = "NEXT"') + 1
+    assert told.startswith(f"{path}:{line + 3}: "), "a place is known after rows were moved"
 
 
 def test_a_shared_row_can_be_left_out(tmp_path: Path) -> None:

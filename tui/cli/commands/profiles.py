@@ -114,7 +114,8 @@ def _begin(words: tuple[str, ...], origin: str | None) -> None:
     if new_id in known:
         raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")
     source = known[origin.strip().lower()]
-    text = new_profile_text(source.path.read_text(encoding="utf-8"), source.id, new_id)
+    text = source.path.read_text(encoding="utf-8")
+    text = new_profile_text(text, source.id, new_id, library.rows_with_shared(source))
     path = library.user_folder() / f"{new_id}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)
     try:

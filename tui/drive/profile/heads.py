@@ -20,6 +20,7 @@ HEAD_BYTES = 4096
 """Characters in which a head stands."""
 _HEADER = re.compile(r"^\[+[ \t]*([\w-]+)[^\n]*", re.MULTILINE)
 _PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
+_CODE = re.compile(r"""^\[\[parameters\]\]\ncode = (["'])(.+)\1$""", re.MULTILINE)
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,8 +93,8 @@ def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> Pro
     except UnicodeDecodeError as error:
         return ProfileFileHead(fault=f"byte {error.start} is not UTF-8 text")
     head = _section(text, "profile") or {}
-    if not own and head and "rows_from" not in head:
-        return ProfileFileHead(head, len(_PARAMETER.findall(text)))
+    if not own and head and (count := _counted(text, head, packaged)) is not None:
+        return ProfileFileHead(head, count)
     try:
         tables = _whole(path, packaged)
     except ProfileError as error:
@@ -102,6 +103,27 @@ def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> Pro
     if not isinstance(head, dict) or not isinstance(head.get("id"), str):
         return ProfileFileHead(fault="its table [profile] with an id is missing")
     return ProfileFileHead(head, len(rows) if isinstance(rows, list) else 0)
+
+
+def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
+    """How many parameters a packaged file has with those that it shares; None if not plain."""
+    if "rows_from" not in head:
+        return len(_PARAMETER.findall(text))
+    if "without" in head or (shared := _shared_texts(head, packaged)) is None:
+        return None
+    texts = (text, *shared)
+    codes = [row[1] for one in texts for row in _CODE.findall(one)]
+    plain = len(codes) == sum(len(_PARAMETER.findall(one)) for one in texts)
+    return len(set(codes)) if plain else None
+
+
+def _shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
+    """The texts of a packaged file's shared rows; None where they are not there."""
+    names = head.get("rows_from")
+    try:
+        return [(packaged / name).read_text(encoding="utf-8") for name in names or ()]
+    except (OSError, UnicodeDecodeError, TypeError):
+        return None
 
 
 @lru_cache(maxsize=256)
@@ -127,7 +149,10 @@ def _told(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
         return _whole(path, packaged)
     text = path.read_text(encoding="utf-8")
     head = _section(text, "profile")
-    if head is None or "rows_from" in head:
+    shared = _shared_texts(head, packaged) if head is not None else None
+    if shared is None or any(
+        header[1] != "parameters" for one in shared for header in _HEADER.finditer(one)
+    ):
         return _whole(path, packaged)
     found = {"identification": _section(text, "identification") or {}}
     functions = _section(text, "functions")

@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ProfileError, UnknownProfile
 from .heads import asked_of, file_head, quick_head
@@ -128,6 +128,16 @@ def load_file(path: Path) -> Profile:
         return read_help(data, (path.resolve().parent, packaged_folder()))
 
     return Profile(data, read_help)
+
+
+def rows_with_shared(listing: Listing) -> list[dict[str, Any]] | None:
+    """All parameters of a profile as a file would tell them; None where it shares none."""
+    from .shared_rows import parsed, read_tables, source_text
+
+    if "rows_from" not in parsed(source_text(listing.path)).get("profile", {}):
+        return None
+    rows: list[dict[str, Any]] = read_tables(listing.path, packaged_folder()).tables["parameters"]
+    return rows
 
 
 def all_faults_of(path: Path) -> list[str]:

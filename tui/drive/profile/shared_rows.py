@@ -1,7 +1,8 @@
 """A profile's tables with the rows that it shares with others, and where each of them stands.
 
 `profile.rows_from` names files beside the profile. Their tables come first; a row of the profile
-with the same key (code, id, raw) changes fields of the shared one, any other is added.
+with the same key (code, id, raw) changes fields of the shared one; any other is added behind the
+row that stands above it in its file, or at the end.
 """
 
 from __future__ import annotations
@@ -181,16 +182,18 @@ class _Merging:
         key = ROW_KEYS[at]
         # rows of one file do not change each other: two of one key are a fault to be told
         index = {row.get(key): n for n, row in enumerate(rows) if isinstance(row, dict)}
+        order = list(range(len(rows)))
+        above = -1
         for number, row in enumerate(value):
             known = isinstance(row, dict) and row.get(key) in index
             place = index[row[key]] if known else len(rows)
-            if known:
+            if not known:
+                rows.append({} if isinstance(row, dict) else row)
+                order.insert(order.index(above) + 1 if above in order else len(order), place)
+            if isinstance(row, dict):
                 self.into(rows[place], row, source, (*at, place), (*there, number))
-            elif isinstance(row, dict):
-                rows.append({})
-                self.into(rows[place], row, source, (*at, place), (*there, number))
-            else:
-                rows.append(row)
+            above = place
+        self._reorder(rows, at, order)
 
     def drop(self, whole: dict[str, Any], codes: list[Any], own: SourceText) -> None:
         """Leave out shared parameters."""
@@ -203,16 +206,18 @@ class _Merging:
         if not isinstance(rows, list):
             return
         kept = [place for place, code in enumerate(held) if code not in codes]
-        moved = {old: new for new, old in enumerate(kept)}
-        whole["parameters"] = [rows[place] for place in kept]
-        self.origins = {
-            _moved(path, moved): origin
-            for path, origin in self.origins.items()
-            if path[:1] != ("parameters",) or len(path) < 2 or path[1] in moved
-        }
+        self._reorder(rows, ("parameters",), kept)
 
-
-def _moved(path: TomlPath, moved: Mapping[int, int]) -> TomlPath:
-    if path[:1] == ("parameters",) and len(path) > 1 and isinstance(path[1], int):
-        return ("parameters", moved[path[1]], *path[2:])
-    return path
+    def _reorder(self, rows: list[Any], at: TomlPath, order: list[int]) -> None:
+        """Keep these rows, in this order, and know on where each came from."""
+        rows[:] = [rows[place] for place in order]
+        moved = {old: new for new, old in enumerate(order)}
+        length = len(at)
+        origins: dict[TomlPath, list[RowOrigin]] = {}
+        for path, origin in self.origins.items():
+            place = path[length] if path[:length] == at and len(path) > length else None
+            if not isinstance(place, int):
+                origins[path] = origin
+            elif place in moved:
+                origins[(*at, moved[place], *path[length + 1 :])] = origin
+        self.origins = origins
