@@ -88,7 +88,9 @@ def test_identify() -> None:
 
 def test_profiles() -> None:
     listed = told("profiles")
-    assert [set(one) for one in listed] == [{"id", "name", "vendor", "parameters"}] * len(listed)
+    assert [set(one) for one in listed] == [
+        {"id", "name", "vendor", "parameters", "own", "file", "remark"}
+    ] * len(listed)
     packaged = {path.stem for path in library.packaged_folder().glob("*.toml")}
     assert {one["id"] for one in listed} == packaged
     for one in listed:

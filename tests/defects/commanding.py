@@ -116,7 +116,7 @@ DEFECTS = (
     Defect(
         "walk-does-not-wait",
         "tui/session/command",
-        "reached = await access.wait_for(chart, {goal, ENABLED})",
+        "reached = await access.wait_for(chart, {goal, enabled})",
         "reached = next(s for s in chart.states if s.id == goal)",
         "A slow drive misses the words of its start and stays where it was.",
         ("tests/session/test_start_walk.py",),
@@ -231,8 +231,8 @@ DEFECTS = (
     Defect(
         "rest-behind-the-run-word-counts",
         "tui/session/command",
-        "last = goal == ENABLED",
-        "last = goal == ENABLED and self.session.starts.sent(self.session) is None",
+        "last = goal == enabled",
+        "last = goal == enabled and self.session.starts.sent(self.session) is None",
         "A motor whose drive was slow to start is forgotten by the next program.",
         ("tests/session/test_start_walk.py",),
     ),

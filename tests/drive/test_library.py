@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+import tomli
+from click.testing import CliRunner
 
+from tui.cli.main import main
 from tui.drive.errors import ProfileError, UnknownParameter, UnknownProfile
 from tui.drive.profile import json_schema, library
 from tui.drive.profile.profile import notations, parse_address
@@ -67,15 +71,15 @@ def test_a_small_profile_loads(tmp_path: Path) -> None:
         ("address = 100", 'address = "100"', 27, "must be of type int, not str"),
         ("address = 100", "address = 70000", 27, "must be <= 65535"),
         ('scale = "0.1"', 'scale = "0,1"', 29, "wrong form"),
-        ('scale = "0.1"', 'scale = "0.0"', 23, "scale is 0"),
+        ('scale = "0.1"', 'scale = "0.0"', 29, "scale is 0"),
         ('access = "r"', 'access = "x"', 30, "none of the values allowed"),
-        ('source = "manual 1"', 'source = "web"', 23, "does not begin with the id of a source"),
-        ('{ parameter = "FRQ" }', '{ parameter = "CUR" }', 20, "no parameter 'CUR'"),
+        ('source = "manual 1"', 'source = "web"', 32, "does not begin with the id of a source"),
+        ('{ parameter = "FRQ" }', '{ parameter = "CUR" }', 21, "no parameter 'CUR'"),
         ("code = 3\n", "code = 6\n", 15, "function 3 is missing"),
         ('vendor = "Nobody"\n', "", 1, "`vendor` is missing"),
         ('name = "Small drive"', 'name = "Small drive', 3, "not valid TOML"),
         ('group = "All"', 'group = "All"\nmin = 9\nmax = 3', 23, "above max"),
-        ('group = "All"', 'group = "All"\nenumeration = "no"', 23, "no enumeration 'no'"),
+        ('group = "All"', 'group = "All"\nenumeration = "no"', 32, "no enumeration 'no'"),
     ],
 )
 def test_a_fault_is_told_with_file_line_and_words(
@@ -151,10 +155,11 @@ def test_a_listing_reads_the_head_alone(tmp_path: Path, monkeypatch: pytest.Monk
         library.load_file(found["broken"].path)
 
 
-def test_a_listing_imports_no_decoder() -> None:
+def test_a_listing_of_packaged_profiles_checks_none() -> None:
     code = (
         "import sys; from tui.drive.profile import library; library.listings();"
-        "print([m for m in ('tomli', 'tomllib', 'tui.drive.profile.decode') if m in sys.modules])"
+        "late = ('tui.drive.profile.check', 'tui.drive.profile.shared_rows');"
+        "print([m for m in late if m in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
@@ -169,6 +174,99 @@ def test_an_own_profile_takes_the_place_of_a_packaged_one(
     (tmp_path / "profiles" / "mine.toml").write_text(text)
     found = {listing.id: listing for listing in library.listings()}
     assert (found["atv31"].name, found["atv31"].own) == ("Small drive", True)
+
+
+def own_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
+    folder = tmp_path / "profiles"
+    folder.mkdir()
+    return folder
+
+
+def test_a_head_is_read_as_toml(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = own_folder(tmp_path, monkeypatch)
+    prefixes = "[identification]\nreference_prefixes = [\n  'SMALL',  # with a comment\n]\n\n[link]"
+    text = SMALL.replace('"small"', "'small'").replace('"Small drive"', '"""Small "one\\""""')
+    (folder / "any.toml").write_text(text.replace("[link]", prefixes))
+    [own] = [listing for listing in library.listings() if listing.own]
+    assert (own.id, own.name, own.parameters, own.fault) == ("small", 'Small "one"', 1, "")
+    assert library.matching_profiles("SMALL-1") == ["small"]
+    assert library.mentions_function(own, 3)
+    assert not library.mentions_function(own, 43)
+
+
+def test_broken_and_doubled_files_are_shown_as_such(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = own_folder(tmp_path, monkeypatch)
+    (folder / "a.toml").write_text(SMALL)
+    (folder / "b.toml").write_text(SMALL)
+    (folder / "c.toml").write_text('[profile]\nid = "atv31"\nname = "Mine\n')
+    (folder / "d.toml").write_text(SMALL.replace('"small"', '"range"').replace("100", "70000"))
+    lines = CliRunner().invoke(main, ["profiles"]).output.splitlines()
+
+    def told(id: str) -> list[str]:
+        return [line.split("  (")[-1] for line in lines if line.split()[0] == id]
+
+    assert told("small") == ["your own)", "not used, a.toml has the same id)"]
+    [broken] = told("c")
+    assert broken.startswith("your own, broken: ")
+    assert "c.toml:3: not valid TOML" in broken
+    assert "must be <= 65535" in told("range")[0]
+    assert len(told("atv31")) == 1
+
+
+def test_a_profile_is_begun_from_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    folder = own_folder(tmp_path, monkeypatch)
+    done = CliRunner().invoke(main, ["profiles", "new", "my-drive", "--from", "atv312"])
+    assert done.exit_code == 0, done.output
+    path = folder / "my-drive.toml"
+    assert str(path) in done.output
+    assert library.faults_of(path) == []
+    begun, source = library.load_file(path), library.load("atv312")
+    assert (begun.id, begun.parameters) == ("my-drive", source.parameters)
+    assert library.matching_profiles("ATV312HU09M3") == ["atv312"], "the copy takes no drive over"
+    text = path.read_text()
+    assert "rows_from" not in text, "what it shares stands in a file of one's own"
+    again = CliRunner().invoke(main, ["profiles", "new", "my-drive", "--from", "atv21"])
+    assert again.exit_code == 2
+    assert path.read_text() == text
+    for words in (("new", "x"), ("new", "My Drive", "--from", "atv21"), ("new", "--from", "atv21")):
+        assert CliRunner().invoke(main, ["profiles", *words]).exit_code == 2
+    assert CliRunner().invoke(main, ["profiles", "path"]).output.strip() == str(folder)
+
+
+@pytest.mark.parametrize("family", [one.id for one in library.listings()])
+def test_what_families_share_stands_once(family: str) -> None:
+    path = library.packaged_folder() / f"{family}.toml"
+    tables = tomli.loads(path.read_text("utf-8"))
+    names = tables["profile"].get("rows_from", [])
+    texts = [(library.packaged_folder() / name).read_text("utf-8") for name in names]
+    rows = {row["code"]: row for text in texts for row in tomli.loads(text)["parameters"]}
+    again = [
+        f"{row['code']}.{key}"
+        for row in tables["parameters"]
+        for key in row.keys() & rows.get(row["code"], {}).keys() - {"code"}
+    ]
+    assert again == []
+    [listing] = [one for one in library.listings() if one.id == family]
+    assert listing.parameters == len(library.load(family).parameters)
+    assert family not in SHARING or len(rows) >= SHARING[family]
+
+
+SHARING = {"atv31": 231, "atv312": 231, "powerdrive": 68, "proxidrive": 68, "varmeca": 68}
+
+
+def test_the_schema_describes_every_field() -> None:
+    schema = json.loads(CliRunner().invoke(main, ["profiles", "--schema"]).output)
+    bare = [
+        f"{table}.{field}"
+        for table, part in schema["$defs"].items()
+        for field, shape in part["properties"].items()
+        if not shape.get("description")
+    ]
+    assert bare == []
+    assert schema["$defs"]["Parameter"]["properties"]["shift"]["description"].startswith("How many")
 
 
 @pytest.mark.parametrize(

@@ -60,6 +60,54 @@ def test_a_simulated_one_keeps_its_functions_and_limits(own_file: Path) -> None:
     assert ask(16, 200, 1) == bytes([0x90, 1]), "no such function"
 
 
+MORE = """
+[[functions]]
+code = 4
+name = "Read input registers"
+max_read = 8
+
+[[parameters]]
+code = "WATER"
+name = "Water level"
+number = "30102"
+address = 101
+function = 4
+access = "r"
+group = "Monitoring"
+source = "guide 4.1"
+confidence = "manual"
+"""
+FIELD = """
+[[parameters]]
+code = "VALVE"
+name = "Valve"
+number = "40202.4"
+address = 201
+mask = 0x3
+shift = 4
+access = "rw"
+group = "Settings"
+source = "guide 5.3"
+confidence = "manual"
+"""
+
+
+def test_a_simulated_one_has_input_registers_and_fields(own_file: Path) -> None:
+    text = own_file.read_text("utf-8") + MORE + FIELD
+    own_file.write_text(text.replace('code = "MODE"', 'code = "MODE"\nmask = 0xF'), "utf-8")
+    assert library.faults_of(own_file) == []
+    sets = {"FREQ": 482, "WATER": 77, "MODE": 2, "VALVE": 3}
+    drive = SimulatedDrive(library.load(PUMP), DriveSpec(PUMP, ADDRESS, sets=sets))
+
+    def ask(function: int, address: int) -> bytes | None:
+        return drive.line_side.answer(ADDRESS, struct.pack(">BHH", function, address, 1))
+
+    assert ask(3, 101) == struct.pack(">BBH", 3, 2, 482)
+    assert ask(4, 101) == struct.pack(">BBH", 4, 2, 77)
+    assert ask(4, 100) == bytes([0x84, 2]), "no such input register"
+    assert ask(3, 201) == struct.pack(">BBH", 3, 2, 0x32)
+
+
 @pytest.mark.parametrize(
     ("status", "trip", "state", "alarms"),
     [

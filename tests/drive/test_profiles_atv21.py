@@ -14,7 +14,8 @@ from tui.drive.read_plan import plan_reads
 from tui.drive.settings.edits import Edits
 from tui.drive.settings.limits import edit_problems
 from tui.drive.settings.writable import write_refusal
-from tui.drive.values import decode, encode, speed_from_frequency
+from tui.drive.values import decode, encode
+from tui.simulator.plant.monitoring import speed_from_frequency
 
 
 @pytest.fixture(scope="module")

@@ -21,10 +21,10 @@ from tui.drive.values import (
     percent_of,
     raw_range,
     set_bits,
-    speed_from_frequency,
     to_words,
     type_range,
 )
+from tui.simulator.plant.monitoring import speed_from_frequency
 
 PROFILES = [listing.id for listing in library.listings()]
 ALL = [(profile, p) for profile in map(library.load, PROFILES) for p in profile.parameters]

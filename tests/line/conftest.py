@@ -21,10 +21,9 @@ HERE = Path(__file__).parent
 Peer = Callable[[str, str], str]
 
 
-@pytest.fixture(scope="session")
-def built_server(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
-    """The server on libmodbus, compiled; or the reason why it could not be."""
-    target = tmp_path_factory.mktemp("libmodbus") / "modbus_server"
+def _built(source: str, folder: Path) -> Path | str:
+    """A server on libmodbus, compiled; or the reason why it could not be."""
+    target = folder / Path(source).stem
     try:
         flags = subprocess.run(
             ["pkg-config", "--cflags", "--libs", "libmodbus"],
@@ -35,8 +34,7 @@ def built_server(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
         ).stdout.split()
     except (OSError, subprocess.CalledProcessError):
         return "libmodbus is not here; it comes with the packages libmodbus-dev and pkg-config."
-    source = str(HERE / "modbus_server.c")
-    command = ["gcc", "-Wall", "-Wextra", "-Werror", "-o", str(target), source, *flags]
+    command = ["gcc", "-Wall", "-Wextra", "-Werror", "-o", str(target), str(HERE / source), *flags]
     try:
         built = subprocess.run(
             command, capture_output=True, text=True, timeout=PATIENCE, check=False
@@ -47,12 +45,32 @@ def built_server(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
     return target
 
 
+@pytest.fixture(scope="session")
+def built_server(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
+    """The server on libmodbus, or why it is not here."""
+    return _built("modbus_server.c", tmp_path_factory.mktemp("libmodbus"))
+
+
+@pytest.fixture(scope="session")
+def built_drive(tmp_path_factory: pytest.TempPathFactory) -> Path | str:
+    """The drive with awkward habits, or why it is not here."""
+    return _built("awkward_drive.c", tmp_path_factory.mktemp("libmodbus"))
+
+
 @pytest.fixture
 def libmodbus_server(built_server: Path | str) -> Path:
     """The server on libmodbus; skips where it cannot be built here."""
     if isinstance(built_server, str):
         need_peer(built_server)
     return Path(built_server)
+
+
+@pytest.fixture
+def awkward_drive(built_drive: Path | str) -> Path:
+    """The drive with awkward habits; skips where it cannot be built here."""
+    if isinstance(built_drive, str):
+        need_peer(built_drive)
+    return Path(built_drive)
 
 
 @pytest.fixture

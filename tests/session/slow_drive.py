@@ -45,12 +45,18 @@ class SlowDrive(OneDrive):
         self._coming: list[int] = []
 
     async def read(
-        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
     ) -> Reply:
         if address <= STATUS < address + count and self._coming:
             self.registers[STATUS] = self._coming.pop(0)
         await asyncio.sleep(0)
-        return await super().read(device, address, count, priority=priority)
+        return await super().read(device, address, count, priority=priority, function=function)
 
     async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
         if (forbidden := how.get("forbidden")) is not None and (why := forbidden()):

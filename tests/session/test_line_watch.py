@@ -50,10 +50,16 @@ class HeardLine(OneDrive):
         self.workers: list[LineWorker] = []
 
     async def read(
-        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
     ) -> Reply:
         self.looked.append((address, priority))
-        reply = await super().read(device, address, count, priority=priority)
+        reply = await super().read(device, address, count, priority=priority, function=function)
         self.heard = reply.time
         return reply
 

@@ -68,13 +68,19 @@ class FaultyLine(OneDrive):
         self.task: asyncio.Task[object] | None = None
 
     async def read(
-        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
     ) -> Reply:
         fault = self.faults.pop(0) if self.faults else None
         self.addresses.append(address)
         if fault is not None:
             raise fault
-        return await super().read(device, address, count, priority=priority)
+        return await super().read(device, address, count, priority=priority, function=function)
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
         worker = super().spawn(work, name)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
+from typing import Any
 
 import pytest
 
-from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.bus.line import Reply
 from tui.drive.orders import OrderRefused, stop_in_any
@@ -100,12 +100,10 @@ async def test_a_profile_that_cannot_be_read_is_stopped_by_the_word_of_all(
     await wait_for(lambda: drive.motor.frequency > 5)
     read = line.read
 
-    async def deaf(
-        device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
-    ) -> Reply:
+    async def deaf(device: int, address: int, count: int = 1, **how: Any) -> Reply:
         if address == 8401:
             raise NoAnswer(device, 3, address)
-        return await read(device, address, count, priority=priority)
+        return await read(device, address, count, **how)
 
     monkeypatch.setattr(line, "read", deaf)
     stopper = Stopper(line, journal)

@@ -223,10 +223,10 @@ async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
     order: list[str] = []
     read = line.read
 
-    async def slow(*args: int, priority: Priority = Priority.POLL) -> object:
+    async def slow(*args: int, priority: Priority = Priority.POLL, function: int = 3) -> object:
         order.append("read")
         await asyncio.sleep(0)
-        return await read(*args, priority=priority)
+        return await read(*args, priority=priority, function=function)
 
     line.read = slow  # type: ignore[method-assign, assignment]
     line.before = lambda: order.append("write")

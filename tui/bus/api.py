@@ -102,9 +102,15 @@ class ModbusLine(Protocol):
         """What the line has seen of a device."""
 
     async def read(
-        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
     ) -> Reply:
-        """Read `count` registers by function 3."""
+        """Read `count` registers by function 3, or input registers by 4."""
 
     async def write(
         self,

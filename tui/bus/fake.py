@@ -37,7 +37,15 @@ from .model import (
     Reply,
     Timing,
 )
-from .requests import BROADCAST, Diagnose, Identify, Read, ReadWrite, Request, write_request
+from .requests import (
+    BROADCAST,
+    Diagnose,
+    Identify,
+    ReadWrite,
+    Request,
+    read_request,
+    write_request,
+)
 from .schedule.pace import Pace
 from .trace import Frame
 
@@ -146,11 +154,17 @@ class FakeLine:
         return self._device(device).state
 
     async def read(
-        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
     ) -> Reply:
         """Read registers."""
         held = self._device(device).held
-        request = Read(device, address, count)
+        request = read_request(device, address, count, function)
         words = await self._exchange(request, "read", lambda: held(address, count))
         return Reply(words, self._clock())
 

@@ -10,6 +10,7 @@ from .requests import (
     LISTEN_ONLY,
     Diagnose,
     Read,
+    ReadInput,
     ReadWrite,
     Request,
     WriteMany,
@@ -66,6 +67,8 @@ class Limits:
     write_windows: tuple[Window, ...] = ()
     subfunctions: frozenset[int] = frozenset()
     broadcast_functions: frozenset[int] = frozenset()
+    max_read_4: int = 1
+    """Words of one read by function 4."""
     exceptions: Mapping[int, str] = field(default_factory=lambda: STANDARD_EXCEPTIONS)
 
 
@@ -136,6 +139,8 @@ def _bad_words(values: tuple[int, ...]) -> str:
 def _too_long(request: Request, limits: Limits) -> str:
     """What this device cannot be sent although Modbus allows it."""
     match request:
+        case ReadInput(address=address, count=count):
+            return _bad_block("read", address, count, limits.max_read_4, (), limits)
         case Read(address=address, count=count):
             return _bad_block("read", address, count, limits.max_read, limits.read_windows, limits)
         case WriteMany(address=address, values=values):

@@ -25,11 +25,11 @@ from .requests import (
     BROADCAST,
     Diagnose,
     Identify,
-    Read,
     ReadWrite,
     Request,
     diagnostic_of,
     objects_of,
+    read_request,
     write_request,
 )
 from .schedule.engine import Engine
@@ -126,10 +126,16 @@ class Line:
         return self._devices.state(device)
 
     async def read(
-        self, device: int, address: int, count: int = 1, *, priority: Priority = Priority.POLL
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
     ) -> Reply:
-        """Read `count` registers by function 3."""
-        return await self._ask(Read(device, address, count), priority)
+        """Read `count` registers by function 3, or input registers by 4."""
+        return await self._ask(read_request(device, address, count, function), priority)
 
     async def write(
         self,

@@ -52,8 +52,16 @@ class RtuTcpLink:
 Link = SerialLink | TcpLink | RtuTcpLink
 
 
-def parse_link(text: str) -> Link:
-    """The link that a person typed.
+@dataclass(frozen=True, slots=True)
+class UsualSettings:
+    """Settings of a serial line where a text names none."""
+
+    baud: int = 19200
+    format: str = "8E1"
+
+
+def parse_link(text: str, usual: UsualSettings | None = None) -> Link:
+    """The link that a person typed; `usual` are the settings where none are named.
 
     Takes `serial:PATH[,BAUD[,FORMAT]]`, a bare port (`/dev/ttyUSB0`, `COM3`, any path that
     exists), `tcp:HOST[:PORT]` and `rtu-tcp:HOST:PORT`, with IPv6 hosts in brackets, each with
@@ -62,8 +70,8 @@ def parse_link(text: str) -> Link:
     """
     text = text.strip()
     if match := _TIMEOUT.fullmatch(text):
-        return replace(_parse(match[1]), timeout=_seconds(text, match[2].strip()))
-    return _parse(text)
+        return replace(_parse(match[1], usual), timeout=_seconds(text, match[2].strip()))
+    return _parse(text, usual)
 
 
 def _seconds(text: str, typed: str) -> float:
@@ -79,11 +87,11 @@ def _seconds(text: str, typed: str) -> float:
     return seconds
 
 
-def _parse(text: str) -> Link:
+def _parse(text: str, usual: UsualSettings | None) -> Link:
     kind, colon, rest = text.partition(":")
     match kind.casefold() if colon else "":
         case "serial":
-            return _serial(text, rest)
+            return _serial(text, rest, usual or UsualSettings())
         case "tcp":
             host, port = _host_and_port(text, rest)
             return TcpLink(host, MODBUS_PORT if port is None else port)
@@ -94,21 +102,20 @@ def _parse(text: str) -> Link:
             return RtuTcpLink(host, port)
     path = text.partition(",")[0]
     if _PORT_NAME.fullmatch(path) or (path and os.path.exists(path)):
-        return _serial(text, text)
+        return _serial(text, text, usual or UsualSettings())
     raise LinkSyntaxError(f"{text or 'An empty text'} is not a line. Write {FORMS}.")
 
 
-def _serial(text: str, rest: str) -> SerialLink:
+def _serial(text: str, rest: str, usual: UsualSettings) -> SerialLink:
     path, *settings = (part.strip() for part in rest.split(","))
     if not path:
         raise LinkSyntaxError(f"{text}: the port is missing. Write {FORMS}.")
     if len(settings) > 2:
         raise LinkSyntaxError(f"{text}: too many settings. Write {FORMS}.")
-    link = SerialLink(path)
-    baud = settings[0] if settings else str(link.baud)
+    baud = settings[0] if settings else str(usual.baud)
     if not (baud.isascii() and baud.isdecimal() and 50 <= int(baud) <= 4_000_000):
         raise LinkSyntaxError(f"{text}: {baud!r} is not a baud rate. Write one such as 19200.")
-    format_ = settings[1].upper() if len(settings) > 1 else link.format
+    format_ = settings[1].upper() if len(settings) > 1 else usual.format
     if not is_format(format_):
         raise LinkSyntaxError(
             f"{text}: {format_!r} is not a format. Write 8E1, 8N1, 8O1, 8N2 or the like; "

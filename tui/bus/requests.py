@@ -17,6 +17,7 @@ from pymodbus.pdu.pdu import ModbusPDU
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
     ReadHoldingRegistersResponse,
+    ReadInputRegistersRequest,
     ReadWriteMultipleRegistersRequest,
     WriteMultipleRegistersRequest,
     WriteSingleRegisterRequest,
@@ -87,6 +88,21 @@ class Read(Request):
     @property
     def register(self) -> int:
         return self.address
+
+
+@dataclass(frozen=True, slots=True)
+class ReadInput(Read):
+    """Function 4: read `count` input registers."""
+
+    function: ClassVar[int] = 4
+
+    def message(self) -> ModbusPDU:
+        return ReadInputRegistersRequest(address=self.address, count=self.count)
+
+
+def read_request(device: int, address: int, count: int, function: int) -> Read:
+    """The request that reads by function 3 or 4."""
+    return (ReadInput if function == ReadInput.function else Read)(device, address, count)
 
 
 @dataclass(frozen=True, slots=True)
@@ -236,7 +252,7 @@ def _words_expected(function: int, count: int) -> Expectation:
 
 
 def words_of(pdu: bytes) -> tuple[int, ...]:
-    """Words of a checked reply of function 3 or 23."""
+    """Words of a checked reply of function 3, 4 or 23."""
     response = ReadHoldingRegistersResponse()
     response.decode(pdu[1:])
     return tuple(response.registers)

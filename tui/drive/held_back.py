@@ -58,7 +58,7 @@ def state_refusal(profile: Profile, chart: Chart, id: OrderId, raws: Mapping[str
     state = state_now(profile, chart, raws)
     if state.kind == "fault":
         return IN_FAULT
-    if chart.kind != "drivecom":  # one of that kind is walked from any other state
+    if chart.runs_in is None:  # else it is walked there from any other state
         try:
             choose(chart, id, raws, state)
         except OrderRefused as refused:

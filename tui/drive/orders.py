@@ -137,7 +137,6 @@ def stop_alike(profiles: Sequence[Profile]) -> bool:
 def _ways_to_stop(profile: Profile) -> tuple[object, ...]:
     return tuple(
         (
-            chart.kind,
             chart.when,
             profile[chart.status].address,
             profile[chart.command].address if chart.command else None,

@@ -69,11 +69,12 @@ class Place:
 
 @dataclass(frozen=True, slots=True)
 class ReadRequest:
-    """One function 3 request and the parameters found in its reply."""
+    """One request of function 3 or 4 and the parameters found in its reply."""
 
     address: int
     count: int
     places: tuple[Place, ...]
+    function: int = 3
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ def plan_reads(
 
 def _only(request: ReadRequest, wanted: Mapping[str, Parameter]) -> ReadRequest:
     places = tuple(place for place in request.places if place.code in wanted)
-    return ReadRequest(request.address, request.count, places)
+    return ReadRequest(request.address, request.count, places, request.function)
 
 
 @dataclass(frozen=True, slots=True)
@@ -217,15 +218,19 @@ def _runs(
     unreadable: Collection[str],
 ) -> list[ReadRequest]:
     """The cheapest split of parameters into runs of neighbours, by dynamic programming."""
-    ordered = sorted(parameters, key=lambda p: p.address)
-    best = _cheapest(profile, ordered, timing, unreadable)
-    runs: list[ReadRequest] = []
-    end = len(ordered)
-    while end:
-        start = best[end][1]
-        runs.append(request_of(ordered[start:end]))
-        end = start
-    return runs[::-1]
+    wanted = sorted(parameters, key=lambda p: p.address)
+    found: list[ReadRequest] = []
+    for function in sorted({p.function for p in wanted}):
+        ordered = [p for p in wanted if p.function == function]
+        best = _cheapest(profile, ordered, timing, unreadable)
+        runs: list[ReadRequest] = []
+        end = len(ordered)
+        while end:
+            start = best[end][1]
+            runs.append(request_of(ordered[start:end]))
+            end = start
+        found += runs[::-1]
+    return found
 
 
 def _cheapest(
@@ -253,7 +258,8 @@ def _span(run: Sequence[Parameter]) -> int:
 def request_of(run: Sequence[Parameter]) -> ReadRequest:
     """The request that reads a run of neighbours, in the order of their addresses."""
     first = run[0].address
-    return ReadRequest(first, _span(run), tuple(Place(p.code, p.address - first) for p in run))
+    places = tuple(Place(p.code, p.address - first) for p in run)
+    return ReadRequest(first, _span(run), places, run[0].function)
 
 
 def run_length(
@@ -269,21 +275,21 @@ def run_length(
     count = _span(run)
     reading = profile.data.reading
     if longest is None:
-        if len(run) == 1:
+        if len(run) == 1 or count == 1:
             return count
-        function = profile.function(3)
+        function = profile.function(run[0].function)
         longest = (function.max_read if function else None) or 1
     if reading.single_words_only or count > longest:
         return None
-    if not reading.gaps_readable and not _all_known(profile, run[0].address, count, unreadable):
+    if not reading.gaps_readable and not _all_known(profile, run[0], count, unreadable):
         return None
     return count
 
 
-def _all_known(profile: Profile, address: int, count: int, unreadable: Collection[str]) -> bool:
-    at = address
-    while at < address + count:
-        parameter = profile.at(at)
+def _all_known(profile: Profile, first: Parameter, count: int, unreadable: Collection[str]) -> bool:
+    at = first.address
+    while at < first.address + count:
+        parameter = profile.at(at, first.function)
         if parameter is None or parameter.access == "w" or parameter.code in unreadable:
             return False
         at += word_count(parameter)

@@ -50,24 +50,40 @@ def word_count(parameter: Parameter) -> int:
 
 
 def from_words(parameter: Parameter, words: Sequence[int]) -> int:
-    """The raw value in the parameter's registers, sign and word order applied."""
+    """The raw value in the parameter's registers: sign, word order and own bits applied."""
     if word_count(parameter) == 2:
         low, high = words if parameter.low_word_first else reversed(words)
         raw, width = (high << 16) | low, 32
     else:
-        raw, width = words[0], 16
+        raw, width = words[0] >> parameter.shift & parameter.mask, 16
     if parameter.type.startswith("int") and raw >= 1 << (width - 1):
         raw -= 1 << width
     return raw
 
 
-def to_words(parameter: Parameter, raw: int) -> tuple[int, ...]:
-    """The registers that carry a raw value; raises ValueRefused if it does not fit."""
+def is_field(parameter: Parameter) -> bool:
+    """Whether the parameter is some bits of its register, and others are not its own."""
+    return parameter.shift != 0 or parameter.mask != 0xFFFF
+
+
+def to_words(parameter: Parameter, raw: int, held: int | None = None) -> tuple[int, ...]:
+    """The registers that carry a raw value; raises ValueRefused if it does not fit.
+
+    `held` is the word as the drive has it, needed for a field of a register: the bits that are
+    not its own stay.
+    """
     low, high = type_range(parameter)
     if not low <= raw <= high:
         raise ValueRefused(f"{parameter.code}: {raw} does not fit {parameter.type}.")
     if word_count(parameter) == 1:
-        return (raw & 0xFFFF,)
+        own = parameter.mask << parameter.shift
+        if held is None:
+            if is_field(parameter):
+                raise ValueRefused(
+                    f"{parameter.code} is some bits of a word whose others are not known here."
+                )
+            held = 0
+        return (held & ~own & 0xFFFF | raw << parameter.shift & own,)
     pair = (raw & 0xFFFF, (raw >> 16) & 0xFFFF)
     return pair if parameter.low_word_first else (pair[1], pair[0])
 
@@ -75,6 +91,8 @@ def to_words(parameter: Parameter, raw: int) -> tuple[int, ...]:
 def type_range(parameter: Parameter) -> tuple[int, int]:
     """Lowest and highest raw value that the parameter's type can hold."""
     width = 32 if parameter.type.endswith("32") else 16
+    if is_field(parameter):
+        return 0, parameter.mask
     if parameter.type.startswith("int"):
         return -(1 << (width - 1)), (1 << (width - 1)) - 1
     return 0, (1 << width) - 1
@@ -173,7 +191,7 @@ def check_raw(
             f"{parameter.code}: {_plain(parameter, raw, scale)} is out of range, "
             f"{limits}{_doubt(parameter)}."
         )
-    to_words(parameter, raw)
+    to_words(parameter, raw, held=0)
     if is_enumeration(parameter) and raw not in names:
         raise ValueRefused(f"{parameter.code}: {raw} is none of its values.")
     taken = [bit for bit in parameter.reserved if raw >> bit & 1]
@@ -230,17 +248,6 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
     return number
 
 
-def speed_from_frequency(raw_frequency: int, poles: int) -> int:
-    """Speed in rpm from a raw output frequency in 0.01 Hz and the number of poles.
-
-    The drive's own rounding: (F x 12 + 5 x poles) / (poles x 10), cut to an integer.
-    Source: ATV21 Modbus manual 8.3, FE90. Raises ValueRefused for less than one pole.
-    """
-    if poles < 1:
-        raise ValueRefused(f"{poles} poles: a motor has at least 2.")
-    return (raw_frequency * 12 + 5 * poles) // (poles * 10)
-
-
 def percent_of(percent: Decimal, rating: Decimal) -> Decimal:
     """A percentage in the unit of its rating, to the rating's decimals, half away from zero."""
     return (percent * rating / 100).quantize(
@@ -258,10 +265,10 @@ __all__ = [
     "engineering",
     "from_words",
     "is_enumeration",
+    "is_field",
     "percent_of",
     "raw_range",
     "set_bits",
-    "speed_from_frequency",
     "to_words",
     "type_range",
     "word_count",

@@ -41,14 +41,12 @@ class Registers:
         self._protected: set[int] = set()
         self._folded = {p.code.casefold(): p for p in profile.parameters}
         for parameter in profile.parameters:
-            for offset in range(word_count(parameter)):
-                self._owner.setdefault(parameter.address + offset, parameter)
+            for address in _addresses(parameter):
+                self._owner.setdefault(address, parameter)
             self._store(parameter, initial[parameter.code])
-        self._factory = {
-            parameter.address + offset: word
-            for parameter in profile.parameters
-            for offset, word in enumerate(to_words(parameter, factory[parameter.code]))
-        }
+        self._factory: dict[int, int] = {}
+        for parameter in profile.parameters:
+            _put_words(self._factory, parameter, factory[parameter.code])
         self._own = {address for address, p in self._owner.items() if p.access == "r"}
         self._volatile = {address for address, p in self._owner.items() if is_volatile(p)}
         self._saved = {a: word for a, word in self._words.items() if a not in self._own}
@@ -139,9 +137,8 @@ class Registers:
 
     def _store(self, parameter: Parameter, raw: int) -> None:
         low, high = type_range(parameter)
-        words = to_words(parameter, min(max(raw, low), high))
-        for address, word in zip(_addresses(parameter), words, strict=True):
-            self._words[address] = self._in_force[address] = word
+        for words in (self._words, self._in_force):
+            _put_words(words, parameter, min(max(raw, low), high))
 
 
 def is_volatile(parameter: Parameter) -> bool:
@@ -151,6 +148,10 @@ def is_volatile(parameter: Parameter) -> bool:
         or parameter.access == "w"
         or parameter.quantity in UNKEPT_QUANTITIES
     )
+
+
+INPUT_REGISTERS = 0x10000
+"""What is added to the address of an input register (function 4), a space of its own."""
 
 
 def typed_raw(parameter: Parameter, raw: int) -> int:
@@ -168,4 +169,12 @@ def typed_raw(parameter: Parameter, raw: int) -> int:
 
 
 def _addresses(parameter: Parameter) -> range:
-    return range(parameter.address, parameter.address + word_count(parameter))
+    first = parameter.address + (INPUT_REGISTERS if parameter.function == 4 else 0)
+    return range(first, first + word_count(parameter))
+
+
+def _put_words(words: dict[int, int], parameter: Parameter, raw: int) -> None:
+    """Put a raw value into words by address; other fields of the same word stay."""
+    addresses = _addresses(parameter)
+    told = to_words(parameter, raw, words.get(addresses[0], 0))
+    words.update(zip(addresses, told, strict=True))

@@ -85,7 +85,7 @@ def block(
         session = await connect_drive(opened, target)
         return await _carry_out(session, target.line_text, wanted)
 
-    status = on_line(target.line_text, work, read_only=read_only or not writes)
+    status = on_line(target, work, read_only=read_only or not writes)
     if status != DONE:
         raise click.exceptions.Exit(status)
 
@@ -259,5 +259,5 @@ def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
 def _pair(text: str) -> tuple[str, str]:
     slot, sign, code = text.partition("=")
     if not sign or not slot.strip():
-        raise click.UsageError(f"{text!r} is not written SLOT=CODE, like NMA3=LCR or F875=none.")
+        raise click.UsageError(f"{text!r} is not written SLOT=CODE or SLOT=none.")
     return slot.strip(), code.strip()

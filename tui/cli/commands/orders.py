@@ -210,7 +210,7 @@ def _ordered(
             arm_drive(console)
             return await work(console)
 
-    say(on_line(target.line_text, at_console, read_only=read_only))
+    say(on_line(target, at_console, read_only=read_only))
 
 
 @click.command()

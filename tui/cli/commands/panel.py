@@ -16,10 +16,6 @@ from ..shared.signals import ending_by_signal
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
 
-DEMO = {"atv21": 35.0, "atv31": 25.0, "atv312": 42.0, "atv71": 50.0, "powerdrive": 30.0}
-"""Profiles of the demo and the frequency in Hz at which each motor runs."""
-
-
 STOP, LEAVE_RUNNING = "stop", "leave-running"
 
 YOUNGEST = 10_000
@@ -75,7 +71,9 @@ def _open_with_demo(text: str, *, read_only: bool = False, wait: float | None = 
     from tui.session.connect.open_line import demo_line, open_line
 
     if text == DEMO_LINE:
-        return demo_line(DEMO)
+        from tui.drive.profile.library import demo_drives
+
+        return demo_line({id: hertz for id, (_, hertz) in demo_drives().items()})
     return open_line(text, read_only=read_only, wait=wait)
 
 

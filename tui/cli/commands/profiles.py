@@ -14,18 +14,22 @@ from ..shared.options import json_option
 from ..shared.say import say
 
 if TYPE_CHECKING:
+    from tui.drive.profile.library import Listing
     from tui.drive.profile.profile import Profile
 
 
 @click.command()
-@click.argument("profile_id", required=False, metavar="[ID]")
+@click.argument("profile_id", required=False, metavar="[ID|new NEW-ID|path]")
+@click.argument("more", nargs=-1, metavar="")
 @click.option(
     "--check",
     "file",
-    type=click.Path(exists=True, dir_okay=False, path_type=Path),
-    metavar="FILE",
-    help="Check a profile file of your own.",
+    type=click.Path(path_type=Path),
+    metavar="FILE...",
+    help="Check profile files of your own: all faults, each with its line.",
 )
+@click.option("--from", "origin", metavar="ID", help="With new: the profile that it begins as.")
+@click.option("--schema", is_flag=True, help="Print the JSON schema: every field, described.")
 @click.option(
     "--wiring",
     is_flag=True,
@@ -34,16 +38,36 @@ if TYPE_CHECKING:
 )
 @json_option
 @told
-def profiles(profile_id: str | None, file: Path | None, wiring: bool, as_json: bool) -> None:
-    """List the profiles, show one, or check a file."""
-    if wiring and profile_id is None:
+def profiles(
+    profile_id: str | None,
+    more: tuple[str, ...],
+    file: Path | None,
+    origin: str | None,
+    schema: bool,
+    wiring: bool,
+    as_json: bool,
+) -> None:
+    """List the profiles, show one, check files, or begin one of your own.
+
+    `path` tells the folder for profiles of your own, `new NEW-ID --from ID` begins one there.
+    """
+    if wiring and (profile_id in (None, "new", "path")):
         raise click.UsageError("--wiring is of one profile: name its ID.")
     from tui.drive.profile import library
 
+    words = (*((profile_id,) if profile_id is not None else ()), *more)
     if file is not None:
-        checked = library.load_file(file)
-        _ = checked.guide.data  # the help of its faults, with what is wrong there
-        say(f"{file}: {checked.name}, {len(checked.parameters)} parameters, no fault found.")
+        check_files([file, *map(Path, words)], as_json)
+    elif schema:
+        from tui.drive.profile.json_schema import schema_text
+
+        say(schema_text().rstrip())
+    elif words[:1] == ("new",):
+        _begin(words[1:], origin)
+    elif more or origin is not None:
+        raise click.UsageError("Say one ID, or: profiles new NEW-ID --from ID.")
+    elif profile_id == "path":
+        say(str(library.user_folder()))
     elif profile_id is not None and wiring:
         _show_wiring(library.load(profile_id), as_json)
     elif profile_id is not None:
@@ -52,22 +76,93 @@ def profiles(profile_id: str | None, file: Path | None, wiring: bool, as_json: b
         _list(as_json)
 
 
+def check_files(files: list[Path], as_json: bool) -> None:
+    """Tell every fault of every file; status 2 if there is one."""
+    from tui.drive.profile import library
+
+    from ..shared.output import print_json
+
+    found = {path: library.all_faults_of(path) for path in dict.fromkeys(files)}
+    if as_json:
+        print_json([{"file": str(path), "faults": faults} for path, faults in found.items()])
+    else:
+        for path, faults in found.items():
+            if not faults:
+                checked = library.load_file(path)
+                count = len(checked.parameters)
+                say(f"{path}: {checked.name}, {count} parameters, no fault found.")
+    faults = [fault for some in found.values() for fault in some]
+    if faults:
+        from ..shared.errors import USAGE, Failure
+
+        if as_json:
+            raise click.exceptions.Exit(USAGE)
+        told_count = f"{len(faults)} fault{'s' if len(faults) > 1 else ''}"
+        raise Failure("\n".join((f"{told_count} found:", *faults)), USAGE)
+
+
+def _begin(words: tuple[str, ...], origin: str | None) -> None:
+    """Write the file of a new profile, a copy of another; never over a file."""
+    from tui.drive.profile import library
+    from tui.drive.profile.new_file import new_profile_text
+
+    if len(words) != 1 or origin is None:
+        raise click.UsageError("Say what it is to be, and what it begins as: new NEW-ID --from ID.")
+    known = {listing.id: listing for listing in library.listings()}
+    library.load(origin)  # a broken one is told, and is no start
+    new_id = words[0].strip()
+    if new_id in known:
+        raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")
+    source = known[origin.strip().lower()]
+    text = source.path.read_text(encoding="utf-8")
+    text = new_profile_text(text, source.id, new_id, library.rows_with_shared(source))
+    path = library.user_folder() / f"{new_id}.toml"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    try:
+        with path.open("x", encoding="utf-8") as file:
+            file.write(text)
+    except FileExistsError:
+        raise click.UsageError(f"{path} is there already; nothing was written.") from None
+    say(f"{path}")
+    say(f"It begins as {source.id}. Change it, then: drivepanel profiles --check {path}")
+
+
 def _list(as_json: bool) -> None:
     from tui.drive.profile import library
 
     from ..shared.output import print_json
 
-    found = library.listings()
+    found = library.all_files()
     if as_json:
         keys = ("id", "name", "vendor", "parameters")
-        print_json([{key: getattr(listing, key) for key in keys} for listing in found])
+        print_json(
+            [
+                {key: getattr(listing, key) for key in keys}
+                | {"own": listing.own, "file": str(listing.path), "remark": _remark(listing)}
+                for listing in found
+            ]
+        )
         return
     for listing in found:
-        own = "  (your own)" if listing.own else ""
+        remark = _remark(listing)
         say(
             f"{listing.id:<12} {listing.vendor:<20} {listing.name:<22}"
-            f" {listing.parameters:>4} parameters{own}"
+            f" {listing.parameters:>4} parameters{f'  ({remark})' if remark else ''}"
         )
+
+
+def _remark(listing: Listing) -> str:
+    """What sets a file apart: whose it is, that it is broken, that another counts."""
+    from tui.drive.profile import library
+
+    if listing.hidden_by is not None:
+        return f"not used, {listing.hidden_by.name} has the same id"
+    if not listing.own:
+        return f"broken: {listing.fault}" if listing.fault else ""
+    faults = [listing.fault] if listing.fault else library.faults_of(listing.path)
+    if faults:
+        return f"your own, broken: {faults[0].splitlines()[0]}"
+    return "your own"
 
 
 def _show_wiring(profile: Profile, as_json: bool) -> None:

@@ -51,7 +51,7 @@ def read(
         wanted = [session.profile.find(code).code for code in codes]
         return session, await Reader(session).read(wanted)
 
-    session, readings = on_line(target.line_text, work, read_only=read_only)
+    session, readings = on_line(target, work, read_only=read_only)
     if as_json:
         print_json(readings_json(target.line_text, session, readings))
     else:

@@ -102,7 +102,9 @@ def restore(
             return await one(opened, devices[0])
         return max([await _in_turn(opened, device, one) for device in devices])
 
-    status = on_line(line_text, work, read_only=read_only or dry_run)
+    status = on_line(
+        Target(line_text, devices[0], profile_id), work, read_only=read_only or dry_run
+    )
     if status != DONE:
         raise click.exceptions.Exit(status)
 

@@ -72,4 +72,4 @@ def run(
         as_json,
         take_control,
     )
-    on_line(target.line_text, lambda opened: run_motor(opened, target, wish), read_only=read_only)
+    on_line(target, lambda opened: run_motor(opened, target, wish), read_only=read_only)

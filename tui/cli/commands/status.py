@@ -266,7 +266,7 @@ def status(
     async def work(opened: OpenLine) -> Status:
         return await status_of_drive(await connect_drive(opened, target), opened)
 
-    found = on_line(target.line_text, work, read_only=read_only)
+    found = on_line(target, work, read_only=read_only)
     if as_json:
         print_json(status_json(target.line_text, found))
         return

@@ -90,7 +90,7 @@ def stop(
         wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
         return await _stop_all(opened, wanted, order, target.profile_id)
 
-    if worst := on_line(target.line_text, work):
+    if worst := on_line(target, work):
         raise click.exceptions.Exit(worst)
 
 

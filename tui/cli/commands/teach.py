@@ -80,7 +80,7 @@ def teach(
         _tell_trouble(teacher)
         return 0
 
-    if status := on_line(target.line_text, work, read_only=True):
+    if status := on_line(target, work, read_only=True):
         raise click.exceptions.Exit(status)
 
 

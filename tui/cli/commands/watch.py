@@ -87,7 +87,7 @@ def watch(
             await _follow(session, wanted, shown, every, count, outputs)
 
     with suppress(KeyboardInterrupt):
-        on_line(target.line_text, work, read_only=read_only)
+        on_line(target, work, read_only=read_only)
 
 
 async def _follow(

@@ -74,7 +74,7 @@ def write(
             return REFUSED_HERE if told else DONE
         return await _write(session, edits, confirmed, save=save)
 
-    status = on_line(target.line_text, work, read_only=read_only or dry_run)
+    status = on_line(target, work, read_only=read_only or dry_run)
     if status != DONE:
         raise click.exceptions.Exit(status)
 

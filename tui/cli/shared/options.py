@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 if TYPE_CHECKING:
+    from tui.bus.link import UsualSettings
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
@@ -102,19 +103,61 @@ settings_options = _target_of(profile_option, device_option)
 
 
 def on_line(
-    line_text: str,
+    where: str | Target,
     work: Callable[[OpenLine], Coroutine[Any, Any, T]],
     *,
     read_only: bool = False,
 ) -> T:
-    """Open a line, do the work, close the line whatever happens."""
+    """Open a line, do the work, close the line whatever happens.
+
+    A Target whose text names no baud or format is opened with those of its profile.
+    """
+    from tui.bus.errors import NoAnswer
     from tui.session.connect.open_line import open_line
 
-    opened = open_line(line_text, read_only=read_only, wait=CONNECT_WITHIN)
+    text = where if isinstance(where, str) else where.line_text
+    usual = None if isinstance(where, str) else _usual_settings(where.profile_id)
+    opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual)
     try:
         return asyncio.run(work(opened))
+    except NoAnswer as error:
+        if not (hint := _about_silence(opened, text, usual is not None)):
+            raise
+        raise NoAnswer(error.device, error.function, error.address, f"{error} {hint}") from error
     finally:
         opened.close()
+
+
+def _usual_settings(profile_id: str | None) -> UsualSettings | None:
+    """The settings that drives of a profile leave the factory with; None where it is not known."""
+    from tui.bus.link import UsualSettings
+    from tui.drive.errors import DriveError
+    from tui.drive.profile import library
+
+    if profile_id is None:
+        return None
+    try:
+        link = library.load(profile_id).data.link
+    except DriveError:
+        return None  # told by whoever needs the profile; a stop does without
+    return UsualSettings(link.baud, link.format)
+
+
+def _about_silence(opened: OpenLine, text: str, by_profile: bool) -> str:
+    """What to look at where nothing answers; empty for a line without settings of its own."""
+    from tui.bus.link import SerialLink, UsualSettings, parse_link
+
+    link = opened.line.link
+    if not isinstance(link, SerialLink) or opened.simulation is not None:
+        return ""
+    other = UsualSettings(link.baud + 1, "8N1" if link.format != "8N1" else "8E1")
+    plain = parse_link(text, other)
+    named = isinstance(plain, SerialLink) and (plain.baud, plain.format) == (link.baud, link.format)
+    whose = "as typed" if named else "the profile's own" if by_profile else "as no others are named"
+    return (
+        f"Are address, wiring, {link.baud} baud and {link.format} ({whose}) those of the drive?"
+        f" Others: serial:{link.path},BAUD,FORMAT."
+    )
 
 
 async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:

@@ -83,7 +83,7 @@ def set_of_drive(target: Target) -> tuple[DriveSession, ParameterSet]:
         session = await connect_drive(opened, target)
         return session, await take_set(session)
 
-    return on_line(target.line_text, work, read_only=True)
+    return on_line(target, work, read_only=True)
 
 
 async def take_set(session: DriveSession) -> ParameterSet:

@@ -1,4 +1,4 @@
-"""The four words that a person watches beside the monitoring set, as the Altivar 71 shows them.
+"""The four words that a person watches beside the monitoring set.
 
 Each is an address with a format. A word that is not assigned, not known to the drive or
 protected shows `-----`, never a number.

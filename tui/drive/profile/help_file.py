@@ -6,20 +6,17 @@ picture of a drive waits for none of it.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator
 from pathlib import Path
 
-import msgspec
-import tomli
-
 from ..errors import ProfileError
+from .decode import decode_tables, line_of
 from .schema import AlarmHelp, FaultHelp, HelpData, Hint, ProfileData
+from .shared_rows import source_text
 
 FOLDER = "help"
 HelpPlace = tuple[str, int]
 """A row of a help file: the table, and which of it."""
-_PLACE = re.compile(r" - at `\$(?:\.(\w+)\[(\d+)\])?.*`$")
 
 
 def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
@@ -27,18 +24,17 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
 
     `folders` hold profiles; the file is sought in their folder `help`, the first found counts.
     From a file that does not stand beside the profile (the first folder) what does not fit is
-    left out: it belongs to another edition. Raises ProfileError with the file, the line and the
-    fault.
+    left out: it belongs to another edition. Raises ProfileError with each fault, its file and line.
     """
     name = (data.faults.help_file or data.profile.id) + ".toml"
     found = next((f / FOLDER / name for f in folders if (f / FOLDER / name).is_file()), None)
     if found is None:
         return HelpData(faults=list(data.faults.help))
-    text = _text(found)
-    told = _decoded(text, found)
+    source = source_text(found)
+    told = decode_tables(source, HelpData)
     findings = list(help_findings(data, told))
     if findings and found.parent.parent == folders[0]:
-        lines = [f"{found}:{_line(text, place)}: {fault}" for place, fault in findings]
+        lines = [f"{found}:{line_of(source, place)}: {fault}" for place, fault in findings]
         raise ProfileError("\n".join(lines))
     wrong = {place for place, _ in findings}
     own = {one.raw for one in data.faults.help}
@@ -49,33 +45,6 @@ def read_help(data: ProfileData, folders: tuple[Path, ...]) -> HelpData:
     ]
     alarms = [one for index, one in enumerate(told.alarms) if ("alarms", index) not in wrong]
     return HelpData(faults=[*data.faults.help, *faults], alarms=alarms)
-
-
-def _text(path: Path) -> str:
-    try:
-        return path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ProfileError(f"{path}: cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
-
-
-def _decoded(text: str, path: Path) -> HelpData:
-    """The data of a help file; raises ProfileError with file, line and fault."""
-    try:
-        return msgspec.convert(tomli.loads(text), HelpData)
-    except tomli.TOMLDecodeError as error:
-        raise ProfileError(f"{path}: not valid TOML: {error}.") from error
-    except msgspec.ValidationError as error:
-        place = _PLACE.search(str(error))
-        line = _line(text, (place[1], int(place[2]))) if place and place[1] else 1
-        raise ProfileError(f"{path}:{line}: {error}.") from error
-
-
-def _line(text: str, place: HelpPlace) -> int:
-    """The line, from 1, at which a row begins; 1 where it is not found."""
-    heads = list(re.finditer(rf"^\[\[{re.escape(place[0])}\]\]", text, re.MULTILINE))
-    return text.count("\n", 0, heads[place[1]].start()) + 1 if place[1] < len(heads) else 1
 
 
 def help_findings(data: ProfileData, told: HelpData) -> Iterator[tuple[HelpPlace, str]]:

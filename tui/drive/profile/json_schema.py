@@ -12,6 +12,7 @@ from typing import Any
 
 import msgspec
 
+from .field_texts import field_text
 from .schema import HelpData, ProfileData, Table
 
 SCHEMA_FORMS: dict[str, tuple[type[Table], str]] = {
@@ -25,6 +26,10 @@ def profile_schema(form: str = "profile") -> dict[str, Any]:
     """The schema as a dictionary, generated from the structs that files are decoded into."""
     kind, title = SCHEMA_FORMS[form]
     (reference,), parts = msgspec.json.schema_components([kind], ref_template="#/$defs/{name}")
+    for table, part in parts.items():
+        for field, shape in part.get("properties", {}).items():
+            if text := field_text(table, field):
+                shape["description"] = text
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": title,

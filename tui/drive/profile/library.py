@@ -1,25 +1,24 @@
 """Finding and loading profiles: those that come with the panel and the user's own.
 
-A listing reads the first table of a file and counts its parameters, no more: a large profile
-costs nothing until it is used.
+A listing reads the first table of a packaged file and counts its parameters, no more: a large
+profile costs nothing until it is used. A file of the user's own is read as a whole.
 """
 
 from __future__ import annotations
 
 import os
-import re
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from ..errors import ProfileError, UnknownProfile
-from .profile import Profile
-from .schema import HelpData
+from .heads import asked_of, file_head, quick_head
 
-_HEAD_KEY = re.compile(r'^(id|name|vendor|version|summary)\s*=\s*"((?:[^"\\]|\\.)*)"', re.MULTILINE)
-_NEXT_TABLE = re.compile(r"^\[(?!profile\])", re.MULTILINE)
-_PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
+if TYPE_CHECKING:
+    from .profile import Profile
+    from .schema import HelpData
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,6 +34,10 @@ class Listing:
     path: Path
     own: bool
     """True for a profile of the user's own folder."""
+    fault: str = ""
+    """Why the file cannot be used, where its head or its TOML is broken."""
+    hidden_by: Path | None = None
+    """The file that counts in its place, as it has the same id."""
 
 
 def packaged_folder() -> Path:
@@ -70,29 +73,32 @@ def listings() -> list[Listing]:
     A file whose head cannot be read is listed under its file name, so that it is seen; using
     it then tells the fault.
     """
-    found: dict[str, Listing] = {}
+    return [listing for listing in all_files() if listing.hidden_by is None]
+
+
+def all_files() -> list[Listing]:
+    """Every profile file by id, those that another with the same id hides too, behind it."""
+    first: dict[str, Path] = {}
+    found = []
     for path, own in profile_files():
         listing = _listing(path, own)
-        found.setdefault(listing.id, listing)
-    return [found[key] for key in sorted(found)]
+        found.append(replace(listing, hidden_by=first.get(listing.id)))
+        first.setdefault(listing.id, path)
+    return sorted(found, key=lambda listing: listing.id)
 
 
 def _listing(path: Path, own: bool) -> Listing:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return Listing(path.stem, path.stem, "", "", "cannot be read", 0, path, own)
-    end = _NEXT_TABLE.search(text)
-    head = dict(_HEAD_KEY.findall(text[: end.start() if end else len(text)]))
+    head = file_head(path, own, packaged_folder())
     return Listing(
-        id=head.get("id", path.stem),
-        name=head.get("name", path.stem),
-        vendor=head.get("vendor", ""),
-        version=head.get("version", ""),
-        summary=head.get("summary", ""),
-        parameters=len(_PARAMETER.findall(text)),
+        id=head.text("id") or path.stem,
+        name=head.text("name") or path.stem,
+        vendor=head.text("vendor"),
+        version=head.text("version"),
+        summary=head.text("summary"),
+        parameters=head.parameters,
         path=path,
         own=own,
+        fault=head.fault,
     )
 
 
@@ -111,17 +117,10 @@ def load(profile_id: str) -> Profile:
 
 def load_file(path: Path) -> Profile:
     """The profile in a file, checked strictly; raises ProfileError."""
-    from .check import check
-    from .decode import decode_profile
+    from .check import checked_data
+    from .profile import Profile
 
-    try:
-        text = path.read_text(encoding="utf-8")
-    except OSError as error:
-        raise ProfileError(f"{path}: cannot be read: {error.strerror}.") from error
-    except UnicodeDecodeError as error:
-        raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
-    data = decode_profile(text, str(path))
-    check(data, str(path), text)
+    data = checked_data(path, packaged_folder())
 
     def read_help() -> HelpData:
         from .help_file import read_help
@@ -131,37 +130,81 @@ def load_file(path: Path) -> Profile:
     return Profile(data, read_help)
 
 
-def matching_profiles(reference: str) -> list[str]:
-    """Ids of the profiles whose reference beginnings fit an identification, best first.
+def rows_with_shared(listing: Listing) -> list[dict[str, Any]] | None:
+    """All parameters of a profile as a file would tell them; None where it shares none."""
+    from .shared_rows import parsed, read_tables, source_text
 
-    Reads only the line with `reference_prefixes` of each file.
-    """
+    if "rows_from" not in parsed(source_text(listing.path)).get("profile", {}):
+        return None
+    rows: list[dict[str, Any]] = read_tables(listing.path, packaged_folder()).tables["parameters"]
+    return rows
+
+
+def all_faults_of(path: Path) -> list[str]:
+    """Every fault of a profile file and of the help of its faults; it can do without the help."""
+    from .check import examined
+    from .help_file import read_help
+
+    try:
+        data, faults = examined(path, packaged_folder())
+    except ProfileError as error:
+        return [str(error)]
+    told = [str(fault) for fault in faults]
+    try:
+        if data is not None:
+            read_help(data, (path.resolve().parent, packaged_folder()))
+    except ProfileError as error:
+        told += str(error).splitlines()
+    return told
+
+
+def faults_of(path: Path) -> list[str]:
+    """Every fault of a profile file, each with file and line; none where it can be used."""
+    from .check import examined
+
+    try:
+        return [str(fault) for fault in examined(path, packaged_folder())[1]]
+    except ProfileError as error:
+        return [str(error)]
+
+
+def matching_profiles(reference: str) -> list[str]:
+    """Ids of the profiles whose reference beginnings fit an identification, best first."""
     wanted = reference.strip().upper()
     fits: list[tuple[int, str]] = []
     for listing in listings():
-        longest = max(
-            (len(p) for p in _prefixes(listing.path) if wanted.startswith(p.upper())), default=0
-        )
+        prefixes = asked_of(listing.path, listing.own, packaged_folder()).prefixes
+        longest = max((len(p) for p in prefixes if wanted.startswith(p.upper())), default=0)
         if longest:
             fits.append((longest, listing.id))
     return [profile_id for _, profile_id in sorted(fits, reverse=True)]
 
 
-def mentions_function(path: Path, code: int) -> bool:
-    """Whether a profile file declares a Modbus function, without decoding the file."""
-    try:
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError):
-        return False
-    return re.search(rf"^\[\[functions\]\]\s+code\s*=\s*{code}\b", text, re.MULTILINE) is not None
+def mentions_function(listing: Listing, code: int) -> bool:
+    """Whether a profile declares a Modbus function, without decoding the file."""
+    return code in asked_of(listing.path, listing.own, packaged_folder()).functions
 
 
-_PREFIXES = re.compile(r"^reference_prefixes\s*=\s*\[([^\]]*)\]", re.MULTILINE)
+@lru_cache(maxsize=64)
+def version_shown(profile_id: str | None, version: str) -> str:
+    """The version that a drive of a family tells, as a person reads it: 0201 may be 2.1."""
+    listing = next((one for one in listings() if one.id == profile_id), None)
+    if listing is None or len(version) != 4 or not version.isdecimal():
+        return version
+    told = asked_of(listing.path, listing.own, packaged_folder())
+    if told.version_digits != "two-and-two":
+        return version
+    return f"{int(version[:2])}.{int(version[2:])}"
 
 
-def _prefixes(path: Path) -> list[str]:
-    try:
-        match = _PREFIXES.search(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError):
-        return []
-    return re.findall(r'"([^"]+)"', match[1]) if match else []
+def demo_drives() -> dict[str, tuple[str, float]]:
+    """By id, names of the families of the demo and the frequency in Hz at which each motor runs.
+
+    Only the beginning of each file is read.
+    """
+    found: dict[str, tuple[str, float]] = {}
+    for path, _ in profile_files():
+        head = quick_head(path)
+        if head.demo_hz is not None and head.text("id"):
+            found.setdefault(head.text("id"), (head.text("name"), head.demo_hz))
+    return dict(sorted(found.items()))

@@ -6,12 +6,21 @@ import difflib
 import re
 from collections.abc import Callable, Collection, Iterable, Mapping
 from decimal import Decimal
-from functools import cached_property
+from functools import cached_property, lru_cache
 
 from ..errors import UnknownParameter
 from ..teaching import TaughtScale
 from .guide import FaultGuide
-from .schema import Chart, FaultCode, Function, HelpData, Parameter, ProfileData, Quantity
+from .schema import (
+    Chart,
+    FaultCode,
+    Function,
+    HelpData,
+    Parameter,
+    ParameterGroup,
+    ProfileData,
+    Quantity,
+)
 
 _HEX = re.compile(r"^(?:16#|0x)([0-9a-f]+)$", re.IGNORECASE)
 _WORD = re.compile(r"^w ?([0-9 ]+)$", re.IGNORECASE)
@@ -42,7 +51,9 @@ class Profile:
         self.parameters = tuple(data.parameters)
         self._by_code = {p.code: p for p in self.parameters}
         self._by_folded = _unique(self.parameters)
-        self._by_address = {p.address: p for p in self.parameters}
+        self._by_address: dict[tuple[int, int], Parameter] = {}
+        for one in self.parameters:
+            self._by_address.setdefault((one.function, one.address), one)
         self._by_quantity: dict[Quantity, Parameter] = {
             p.quantity: p for p in self.parameters if p.quantity is not None
         }
@@ -81,9 +92,12 @@ class Profile:
         """The parameter with exactly this code, or None."""
         return self._by_code.get(code)
 
-    def at(self, address: int) -> Parameter | None:
-        """The parameter at a wire address, or None."""
-        return self._by_address.get(address)
+    def at(self, address: int, function: int = 3) -> Parameter | None:
+        """The parameter at a wire address, the first of its fields where it has several, or None.
+
+        `function` is 4 for an input register.
+        """
+        return self._by_address.get((function, address))
 
     def quantity(self, quantity: Quantity) -> Parameter | None:
         """The parameter that carries a quantity on this family, or None."""
@@ -119,7 +133,7 @@ class Profile:
         if exact is not None:
             return exact
         address = parse_address(wanted)
-        if address is not None and (found := self._by_address.get(address)):
+        if address is not None and (found := self.at(address) or self.at(address, 4)):
             return found
         near = difflib.get_close_matches(wanted.casefold(), self._by_folded, n=3, cutoff=0.5)
         hint = ", ".join(dict.fromkeys(self._by_folded[n].code for n in near))
@@ -171,6 +185,19 @@ def mark_of(profile: Profile, parameter: Parameter) -> str:
     if parameter.code in profile.taught:
         return "taught"
     return "" if is_verified(parameter) else "?"
+
+
+# a profile stays as it was loaded, and every row of a table asks
+@lru_cache(maxsize=32)
+def told_groups(profile: Profile) -> Mapping[str, ParameterGroup]:
+    """By name, the groups of which the profile says what they hold."""
+    return {group.name: group for group in profile.data.groups}
+
+
+def group_holds(profile: Profile, parameter: Parameter) -> str:
+    """What the parameter's group holds: settings, commands or measurements."""
+    group = told_groups(profile).get(parameter.group)
+    return group.holds if group is not None else "settings"
 
 
 def parse_address(text: str) -> int | None:

@@ -9,7 +9,6 @@ from ..shown import number_of
 from .edits import Edit, Edits
 from .limits import limit_pairs, multiple_limits, number_in, passed_side
 from .multiple import value_of
-from .write_sequence import RESETS_OTHERS
 
 
 def builds_on(
@@ -29,7 +28,7 @@ def builds_on(
     if follows is not None and follows.parameter in missed:
         return follows.parameter
     for code in missed:
-        if code.casefold() in RESETS_OTHERS:
+        if profile[code].resets_others:
             return code
     # of what was refused it may not be known what the drive holds now: what it held before
     held = {e.code: e.old for e in edits if e.code in missed and e.old is not None}

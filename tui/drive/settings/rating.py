@@ -43,7 +43,4 @@ def same_rating(
 
 def rated(parameter: Parameter) -> bool:
     """Whether a setting belongs to one rating of drive and motor, or to one model."""
-    if parameter.quantity in RATED or parameter.unit in ("A", "kW", "HP"):
-        return True
-    told = parameter.factory_text.casefold() if parameter.factory is None else ""
-    return any(word in told for word in ("rating", "model", "mains voltage"))
+    return parameter.rated or parameter.quantity in RATED or parameter.unit in ("A", "kW", "HP")

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from functools import lru_cache
 from typing import Literal
 
-from ..profile.profile import Profile, is_verified
+from ..profile.profile import Profile, group_holds, is_verified, told_groups
 from ..profile.schema import Block, LinkSetting, Parameter, Quantity, StateKind
 
 RefusalReason = Literal["read-only", "forbidden", "order", "unverified", "running"]
@@ -25,15 +25,6 @@ ORDER_QUANTITIES: frozenset[Quantity] = frozenset(
     }
 )
 """Quantities that are orders: they have screens and commands of their own."""
-COMMAND_GROUP = "Command"
-"""The group of a profile that holds orders; only who commands is a setting there."""
-MEASURED_GROUPS = frozenset(
-    {"Monitoring", "Status", "Faults", "Fault history", "Input and output values"}
-)
-"""Groups of measurements and counters, though some can be written (set back)."""
-ORDER_CODES = frozenset({"fcs"})
-"""Codes, in small letters, of orders that no field of a profile tells from settings:
-FCS (Altivar 31, 312, 71) loads whole configurations over the present one."""
 AT_REST: frozenset[StateKind] = frozenset({"blocked", "ready", "stopped", "fault"})
 """Kinds of state in which the motor surely is not commanded to turn."""
 CUTTING = frozenset({"address", "baud", "format", "parity", "protocol"})
@@ -56,16 +47,19 @@ def is_order(profile: Profile, parameter: Parameter) -> bool:
         or parameter.quantity in ORDER_QUANTITIES
     ):
         return True
-    if parameter.group == COMMAND_GROUP and parameter.quantity != "command_channel":
+    if parameter.holds == "command":
         return True
-    if parameter.code.casefold() in ORDER_CODES:
+    # who commands is chosen by a setting, though it stands among the commands
+    if group_holds(profile, parameter) == "commands" and parameter.quantity != "command_channel":
         return True
     return parameter.code in _order_codes(profile)
 
 
 def is_setting(profile: Profile, parameter: Parameter) -> bool:
     """Whether a parameter is a setting: kept by the drive, no measurement and no order."""
-    if parameter.access not in ("rw", "rw-stopped") or parameter.group in MEASURED_GROUPS:
+    if parameter.access not in ("rw", "rw-stopped"):
+        return False
+    if group_holds(profile, parameter) == "measurements":
         return False
     return not is_order(profile, parameter)
 
@@ -128,14 +122,10 @@ _STORAGE = {
 }
 
 
-OPTION_CODES = {"PX-MODBUS": "15.01"}
-"""By group, the word that tells which option is fitted: with another one than its factory value
-says, the group's parameters mean something else (PX-MODBUS manual 4)."""
-
-
 def option_code(profile: Profile, parameter: Parameter) -> Parameter | None:
     """The word that must hold its factory value before the parameter may be written, or None."""
-    code = OPTION_CODES.get(parameter.group, "")
+    group = told_groups(profile).get(parameter.group)
+    code = group.needs_factory if group is not None else ""
     return profile.get(code) if code != parameter.code else None
 
 

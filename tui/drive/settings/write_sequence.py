@@ -10,9 +10,8 @@ from .edits import Edit, Edits
 from .limits import limit_pairs, multiple_limits, number_in
 from .writable import line_setting
 
-RESETS_OTHERS = ("cfg", "bfr", "lac")
-"""Codes, in small letters, whose writing changes other settings, in the order of writing:
-macro configuration, standard frequency of the motor, access level (Altivar 31, 312, 71)."""
+LAST_OF_THOSE = 9
+"""Highest rank of what changes other settings as it is written."""
 
 
 def ordered(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> list[Edit]:
@@ -39,14 +38,13 @@ def ordered(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> list[Edi
 
 
 def _rank(profile: Profile, code: str, sources: Collection[str]) -> int:
-    folded = code.casefold()
-    if folded in RESETS_OTHERS:
-        return RESETS_OTHERS.index(folded)
+    if rank := profile[code].resets_others:
+        return rank
     setting = line_setting(profile, code)
     if setting is not None:
         late = {"address": 3, "baud": 2, "format": 2, "parity": 2, "protocol": 2}
-        return len(RESETS_OTHERS) + 2 + late.get(setting.role, 1)
-    return len(RESETS_OTHERS) + (0 if code in sources else 1)
+        return LAST_OF_THOSE + 1 + 2 + late.get(setting.role, 1)
+    return LAST_OF_THOSE + 1 + (0 if code in sources else 1)
 
 
 def _before(profile: Profile, edits: Edits, raws: Mapping[str, int]) -> dict[str, set[str]]:

@@ -3,25 +3,43 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 from rich.text import Text
 
 from tui.bus.errors import LinkSyntaxError
+from tui.drive.profile.library import demo_drives
 from tui.session.connect.open_line import check_line
 from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT, PLAIN, RUNNING, STRONG
 
-LINE_FORMS = (
-    "serial:/dev/ttyUSB0,19200,8E1 (and ,timeout=2 for slow drives)",
-    "tcp:192.168.0.10:502",
-    "rtu-tcp:192.168.0.10:4001",
-    "sim:atv71@2,atv21",
-)
+COUNTED = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
-SIMULATED_LINES = (
-    ("sim:atv21,atv31,atv312,atv71,powerdrive", "five drives"),
-    ("sim:atv71@2", "an Altivar 71"),
-)
+
+def line_forms() -> tuple[str, ...]:
+    """How a line is written, by examples."""
+    return (
+        "serial:/dev/ttyUSB0,19200,8E1 (and ,timeout=2 for slow drives)",
+        "tcp:192.168.0.10:502",
+        "rtu-tcp:192.168.0.10:4001",
+        *(text for text, _ in simulated_lines()[2:]),
+    )
+
+
+@lru_cache(maxsize=1)
+def simulated_lines() -> tuple[tuple[str, str], ...]:
+    """Lines to try without a drive: those of the demo, the fastest alone, and it with another."""
+    shown = demo_drives()
+    if not shown:
+        return ()
+    count = COUNTED[len(shown)] if len(shown) < len(COUNTED) else str(len(shown))
+    first, fastest = next(iter(shown)), max(shown, key=lambda one: shown[one][1])
+    name = shown[fastest][0]
+    return (
+        (f"sim:{','.join(shown)}", f"{count} drives"),
+        (f"sim:{fastest}@2", f"{'an' if name[:1] in 'AEIOU' else 'a'} {name}"),
+        (f"sim:{fastest}@2,{first}", "two drives"),
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,14 +67,23 @@ def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
     return [
         Group("Serial ports", serial, "none found"),
         Group("Recent", lately, "none yet: n types one"),
-        Group("Simulated", tuple(LineChoice(text, about) for text, about in SIMULATED_LINES)),
+        Group("Simulated", tuple(LineChoice(text, about) for text, about in simulated_lines()[:2])),
     ]
 
 
 def _offered_simulated(text: str) -> bool:
     """Whether it is one of the simulated lines, which are offered anyway."""
     # by its spelling: what simulates a line takes long to import, and this is the first picture
-    return text.replace(" ", "").casefold() in {one for one, _ in SIMULATED_LINES}
+    offered = [one for one, _ in simulated_lines()[:2]]
+    return text.replace(" ", "").casefold() in (*offered, *map(_with_addresses, offered))
+
+
+def _with_addresses(line: str) -> str:
+    """A simulated line that names no address, with those that its drives have."""
+    ids = line.removeprefix("sim:").split(",")
+    if "@" in line:
+        return line
+    return "sim:" + ",".join(f"{one}@{place}" for place, one in enumerate(ids, 1))
 
 
 def fault_of_line(text: str) -> str:

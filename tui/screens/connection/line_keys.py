@@ -12,7 +12,7 @@ from tui.bus.errors import LineError, LinkSyntaxError
 from tui.drive.errors import DriveError
 
 from ..opening import leave_opening
-from .choices import LINE_FORMS, LineChoice, fault_of_line, same_line
+from .choices import LineChoice, fault_of_line, line_forms, same_line
 from .line_form import ADDRESSES
 from .scanning import Scanning
 
@@ -40,7 +40,7 @@ class LineKeys(Scanning):
             if text:
                 self.open_line(text)
 
-        about = "\n".join(LINE_FORMS)
+        about = "\n".join(line_forms())
         dialog = Ask(
             "Line to open", fault_of_line, text=self.app.line_text, about=about, takes="opens it"
         )

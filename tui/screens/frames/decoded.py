@@ -11,9 +11,10 @@ from tui.drive.profile.profile import Profile
 from tui.drive.shown import shown
 from tui.drive.values import from_words, word_count
 
-READ, WRITE_ONE, WRITE_MANY, READ_WRITE, IDENTIFY_DRIVE = 3, 6, 16, 23, 43
+READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE, IDENTIFY_DRIVE = 3, 4, 6, 16, 23, 43
 FUNCTIONS: Mapping[int, str] = {
     READ: "read",
+    READ_INPUT: "read input",
     WRITE_ONE: "write",
     WRITE_MANY: "write",
     READ_WRITE: "read and write",
@@ -68,7 +69,8 @@ def decoded(
         if pdu is None:
             found.append("")
             continue
-        words = _Words(pdu.device, profile_of(pdu.device), raws_of(pdu.device))
+        space = READ_INPUT if pdu.function == READ_INPUT else READ
+        words = _Words(pdu.device, profile_of(pdu.device), raws_of(pdu.device), space)
         try:
             if frame.direction == "out":
                 asked = _asked(pdu)
@@ -81,7 +83,7 @@ def decoded(
 
 
 def _asked(pdu: Pdu) -> Asked | None:
-    if pdu.function not in (READ, READ_WRITE):
+    if pdu.function not in (READ, READ_INPUT, READ_WRITE):
         return None
     address, count = struct.unpack_from(">HH", pdu.body)
     return Asked(pdu.device, pdu.function, address, count)
@@ -91,7 +93,7 @@ def _request(pdu: Pdu, words: _Words) -> str:
     who, name = pdu.device or "all", FUNCTIONS.get(pdu.function, f"function {pdu.function}")
     head = f"{who} {name}"
     match pdu.function:
-        case 3:
+        case 3 | 4:
             address, count = struct.unpack_from(">HH", pdu.body)
             return f"{head} {words.names(address, count)}"
         case 6:
@@ -112,7 +114,7 @@ def _reply(pdu: Pdu, asked: Asked | None, words: _Words) -> str:
     if pdu.function & EXCEPTION_BIT:
         name = FUNCTIONS.get(pdu.function & ~EXCEPTION_BIT, "")
         return f"{pdu.device} refuses to {name or 'do it'}: exception {pdu.body[0]}"
-    if pdu.function in (READ, READ_WRITE):
+    if pdu.function in (READ, READ_INPUT, READ_WRITE):
         raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
         if asked is None or (asked.device, asked.function) != (pdu.device, pdu.function):
             return f"{pdu.device} {len(raws)} words"
@@ -137,6 +139,7 @@ class _Words:
     device: int
     profile: Profile | None
     raws: Mapping[str, int]
+    function: int = READ
 
     def names(self, address: int, count: int) -> str:
         """The parameters of a stretch of words; the address where none is known."""
@@ -160,7 +163,7 @@ class _Words:
         """Code, value and address of each parameter in a stretch of words."""
         at = 0
         while at < len(raws):
-            parameter = self.profile.at(address + at) if self.profile else None
+            parameter = self.profile.at(address + at, self.function) if self.profile else None
             if parameter is None or self.profile is None:
                 yield "", f"16#{raws[at]:04X}", str(address + at)
                 at += 1

@@ -12,7 +12,7 @@ QUICK = "Quick stop at once, where the drive has one, else its ramp stop; needs 
 EMERGENCY = "Emergency stop at once, else the quick stop, else the ramp stop; needs no arming."
 COAST = "Let the motor coast; asks, needs no arming. A coasting hoist falls."
 BRAKE = "Brake by direct current, where the drive has that; asks, needs no arming."
-TAKE = "Take the control from the terminals (Leroy-Somer 6.43); armed, locked only, asks."
+TAKE = "Take the control from the terminals, where a drive has that; armed, locked only, asks."
 HAND_BACK = "Give the control back to the terminals; a run command waiting there counts then; asks."
 TEACH = "Teach the scale of a raw value: type what the drive's own display shows."
 GIVE_BY = "Give the reference by a preset whose scale was taught, or no more; asks."
@@ -31,8 +31,18 @@ COMMAND_ACTIONS = (
     *on((MONITOR, FAULTS), ("reset", "x", "reset", RESET)),
     *on(
         (MONITOR,),
-        ("step_reference(1)", "up", "", "Raise the reference by 1 Hz, at most to HSP; armed."),
-        ("step_reference(-1)", "down", "", "Lower the reference by 1 Hz, at most to LSP; armed."),
+        (
+            "step_reference(1)",
+            "up",
+            "",
+            "Raise the reference by 1 Hz, at most to its limit; armed.",
+        ),
+        (
+            "step_reference(-1)",
+            "down",
+            "",
+            "Lower the reference by 1 Hz, at most to its limit; armed.",
+        ),
         ("step_reference(5)", "pageup", "", "Raise the reference by 5 Hz; armed."),
         ("step_reference(-5)", "pagedown", "", "Lower the reference by 5 Hz; armed."),
         ("options", "o", "", OPTIONS),

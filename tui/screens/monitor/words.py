@@ -26,7 +26,7 @@ SHORT_NAMES: Mapping[str, str] = {
     "no quick stop": "",
     "remote": "",
     "direction of the output": "reverse",
-    "limit of the reference": "outside LSP..HSP",
+    "limit of the reference": "outside its limits",
 }
 """What is short for the words of a bit that is 1; nothing for what is so while all is well."""
 CODE_CELLS, RAW_CELLS = 6, 9

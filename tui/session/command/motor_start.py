@@ -15,8 +15,6 @@ from .access import STATE_POLL_INTERVAL, CommandAccess
 
 LOOKS = 10
 """Looks within which the direction of a start must be the ordered one."""
-ENABLED = "enabled"
-"""The state of the Drivecom charts in which the motor runs."""
 
 
 @dataclass(slots=True)
@@ -45,8 +43,8 @@ class MotorStart:
         await record_start(self.session, "reverse" if id == "reverse" else "forward", access.permit)
         try:
             await self._write_reference_again()
-            if chart.kind == "drivecom":
-                await self._walk(chart, same[0])
+            if chart.runs_in is not None:
+                await self._walk(chart, same[0], chart.runs_in)
             else:
                 order = choose(chart, id, access.raws)
                 self.sent = True
@@ -102,18 +100,18 @@ class MotorStart:
         if starts is not None:
             (starts.sent if self.sent else starts.never_sent)(self.session)
 
-    async def _walk(self, chart: Chart, run: Order) -> None:
+    async def _walk(self, chart: Chart, run: Order, enabled: str) -> None:
         """From the state now to the running one, each state seen before the next command."""
         access = self.access
         state = await access.state(chart)
-        way = walk(chart, state.id, ENABLED)
+        way = walk(chart, state.id, enabled)
         for goal, word in way:
-            last = goal == ENABLED
+            last = goal == enabled
             if last:
                 self.sent = True
             await access.write_command(chart, run.words[-1] if last else word, run.name)
-            reached = await access.wait_for(chart, {goal, ENABLED})
-            if reached.id not in (goal, ENABLED):
+            reached = await access.wait_for(chart, {goal, enabled})
+            if reached.id not in (goal, enabled):
                 names = {s.id: s.name for s in chart.states}
                 raise OrderRefused(
                     f"The drive stays in {reached.name} and does not go to {names[goal]}"

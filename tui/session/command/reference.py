@@ -75,7 +75,7 @@ def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]
     """The reference that a person typed; Hz unless told otherwise.
 
     Raises ValueRefused for what is no reference, has no place on this drive, or lies outside
-    LSP..HSP (LL..UL), as far as these are known.
+    the lowest and the highest speed, as far as these are known.
     """
     match = _TYPED.fullmatch(text)
     if match is None:
@@ -103,7 +103,7 @@ def parse_reference(profile: Profile, text: str, readings: Mapping[str, Reading]
 
 
 def within_limits(profile: Profile, hertz: Decimal, readings: Mapping[str, Reading]) -> Decimal:
-    """A stepped reference in Hz, at most to the limits LSP..HSP (LL..UL) that are known."""
+    """A stepped reference in Hz, at most to the limits that are known."""
     low, high, most = (_number(profile, quantity, readings) for quantity in LIMITS)
     for limit in (high, most):
         if limit:

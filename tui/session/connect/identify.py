@@ -43,10 +43,8 @@ class DriveIdentity:
 
     @property
     def version_text(self) -> str:
-        """The version as a person reads it: 0201 is 2.1."""
-        if len(self.version) == 4 and self.version.isdecimal():
-            return f"{int(self.version[:2])}.{int(self.version[2:])}"
-        return self.version
+        """The version as a person reads it."""
+        return library.version_shown(self.profile, self.version)
 
 
 @dataclass(frozen=True, slots=True)
@@ -133,7 +131,7 @@ async def _nameless_families(line: Askable, device: int, priority: Priority) -> 
 def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
     found: dict[int, tuple[str, ...]] = {}
     for listing in library.listings():
-        if library.mentions_function(listing.path, IDENTIFY):
+        if library.mentions_function(listing, IDENTIFY):
             continue
         try:
             profile = library.load(listing.id)
@@ -141,6 +139,6 @@ def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
             # a profile that cannot be used is told where it is chosen; it ends no search
             continue
         status = profile.quantity("status_word")
-        if status is not None:
+        if status is not None and status.function == 3:
             found[status.address] = (*found.get(status.address, ()), profile.id)
     return found

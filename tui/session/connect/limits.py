@@ -10,12 +10,13 @@ from tui.drive.profile.schema import Block
 def limits_of(profile: Profile) -> Limits:
     """What a drive of this family may be sent; the line refuses everything else."""
     functions = {function.code: function for function in profile.data.functions}
-    read, write, both = (functions.get(code) for code in (3, 16, 23))
+    read, inputs, write, both = (functions.get(code) for code in (3, 4, 16, 23))
     diagnose = functions.get(8)
     return Limits(
         functions=frozenset(functions),
         max_read=(read.max_read if read else None) or 1,
         max_write=(write.max_write if write else None) or 1,
+        max_read_4=(inputs.max_read if inputs else None) or 1,
         max_read_23=(both.max_read if both else None) or 0,
         max_write_23=(both.max_write if both else None) or 0,
         single_words_only=profile.data.reading.single_words_only,

@@ -16,7 +16,7 @@ from .line_key import SIMULATED_PREFIX
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
-    from tui.bus.link import Link
+    from tui.bus.link import Link, UsualSettings
     from tui.simulator import DriveSpec, Simulation
 
 
@@ -48,8 +48,14 @@ class OpenLine:
             self.simulation.stop()
 
 
-def open_line(text: str, *, read_only: bool = False, wait: float | None = None) -> OpenLine:
-    """The line that a person means, opened.
+def open_line(
+    text: str,
+    *,
+    read_only: bool = False,
+    wait: float | None = None,
+    usual: UsualSettings | None = None,
+) -> OpenLine:
+    """The line that a person means, opened; `usual` are serial settings where none are named.
 
     With `wait` it returns connected, or raises the line's error after so many seconds;
     without, it connects by itself. Raises LinkSyntaxError, UnknownProfile, ProfileError.
@@ -64,7 +70,7 @@ def open_line(text: str, *, read_only: bool = False, wait: float | None = None) 
     from tui.bus.line import Line
     from tui.bus.link import parse_link
 
-    return _opened(OpenLine(text, Line(parse_link(text), read_only=read_only)), wait)
+    return _opened(OpenLine(text, Line(parse_link(text, usual), read_only=read_only)), wait)
 
 
 def check_line(text: str) -> None:

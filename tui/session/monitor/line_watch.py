@@ -17,7 +17,7 @@ from tui.drive.channel import channel_codes
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Quantity
+from tui.drive.profile.schema import Parameter, Quantity
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
@@ -229,8 +229,9 @@ class LineWatch:
             return period - silent
         # past its time-out it has acted: it need no longer go before the others
         priority = Priority.FEED if silent < kept.watch.timeout else Priority.POLL
+        word = _any_word(kept.session.profile)
         await self._line.read(
-            kept.session.device, _any_word(kept.session.profile), 1, priority=priority
+            kept.session.device, word.address, 1, priority=priority, function=word.function
         )
         return period
 
@@ -286,10 +287,10 @@ def _last_that_brought(look: Look | None) -> Look | None:
     return look.before if look is not None and look.error else look
 
 
-def _any_word(profile: Profile) -> int:
+def _any_word(profile: Profile) -> Parameter:
     """A word that every drive of the family has: one that tells its state, if there is one."""
     codes = _state_codes(profile) or monitoring_codes(profile)
-    return profile[codes[0]].address
+    return profile[codes[0]]
 
 
 def _glance_codes(profile: Profile) -> list[str]:

@@ -196,7 +196,13 @@ class Reader:
             status = self.profile.quantity("status_word")
             if status is None:
                 raise
-            await self.line.read(self.device, status.address, 1, priority=Priority.OPERATOR_READ)
+            await self.line.read(
+                self.device,
+                status.address,
+                1,
+                priority=Priority.OPERATOR_READ,
+                function=status.function,
+            )
             text = "no answer: perhaps this drive has no such word"
             now = self.session.clock.monotonic()
             parameters = (self.profile[place.code] for place in request.places)
@@ -241,7 +247,11 @@ class Reader:
         several = len(request.places) > 1 or block is not None
         try:
             reply = await self.line.read(
-                self.device, request.address, request.count, priority=priority
+                self.device,
+                request.address,
+                request.count,
+                priority=priority,
+                function=request.function,
             )
         except DeviceException as refusal:
             if several:
@@ -270,7 +280,11 @@ class Reader:
         count = word_count(parameter)
         try:
             reply: Reply = await self.line.read(
-                self.device, parameter.address, count, priority=priority
+                self.device,
+                parameter.address,
+                count,
+                priority=priority,
+                function=parameter.function,
             )
         except DeviceException as refusal:
             return self._refusal(parameter, refusal)

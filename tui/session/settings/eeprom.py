@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.drive.profile.profile import is_verified
@@ -118,15 +118,15 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
     """Wait until the order's bit or value has gone and the EEPROM is no longer written."""
     profile = retrying.session.profile
     status = profile.quantity("extended_status_word")
-    codes = [order.parameter, *([status.code] if status else [])]
+    told = [order.done.parameter] if order.done else []
+    codes = [order.parameter, *([status.code] if status else []), *told]
     end = retrying.session.clock.monotonic() + SAVING_LONGEST
     while retrying.session.clock.monotonic() < end:
         try:
             raws = await retrying.ask_raws(codes)
         except NoAnswer:
             raws = {}  # a drive that is busy with its memory may not answer for a moment
-        held = raws.get(order.parameter, order.raw)
-        pending = held & order.raw if order.bit else held == order.raw
+        pending = _is_pending(order, raws)
         known = status is not None and not retrying.why_absent(status.code)
         busy = profile.data.memory.busy_mask
         word = raws.get(status.code, busy) if status is not None and known else 0
@@ -137,6 +137,16 @@ async def _until_done(retrying: RetryingReader, order: MemoryOrder) -> None:
         f"The drive is not done after {SAVING_LONGEST:g} s: look at its display, and read"
         f" {order.parameter} before anything is written."
     )
+
+
+def _is_pending(order: MemoryOrder, raws: Mapping[str, int]) -> bool:
+    """Whether the drive has not yet said that it is done."""
+    if order.done is not None:
+        return raws.get(order.done.parameter) not in order.done.values
+    if order.keeps_value:
+        return False
+    held = raws.get(order.parameter, order.raw)
+    return bool(held & order.raw) if order.bit else held == order.raw
 
 
 async def _told(session: DriveSession, retrying: RetryingReader) -> str:

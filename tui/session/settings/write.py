@@ -10,7 +10,7 @@ from tui.bus.errors import DeviceException, LineError, RequestRefused, Supersede
 from tui.drive.errors import DriveError
 from tui.drive.profile.schema import Parameter
 from tui.drive.shown import depends_on, shown_text
-from tui.drive.values import from_words, to_words
+from tui.drive.values import from_words, is_field, to_words, word_count
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
@@ -53,6 +53,7 @@ class Writer:
         if self.permit is not None:
             self.permit.check()
             await self._read_scale(parameter)
+        held = await self._held_word(parameter) if is_field(parameter) else None
         before = session.image.get(code)
         answer, back = "ok", None
         session.image.doubt(code)
@@ -60,7 +61,7 @@ class Writer:
             await session.line.write(
                 session.device,
                 parameter.address,
-                to_words(parameter, raw),
+                to_words(parameter, raw, held),
                 priority=priority,
                 replaceable=replaceable,
                 forbidden=self.permit.refusal if self.permit is not None else None,
@@ -94,14 +95,25 @@ class Writer:
         if unknown := [code for code in depends_on(parameter) if code not in known]:
             await Reader(self.session).read(unknown)
 
+    async def _held_word(self, parameter: Parameter) -> int:
+        """The word that a field stands in, read now: its other bits must stay."""
+        reply = await self.session.line.read(
+            self.session.device, parameter.address, 1, priority=Priority.OPERATOR_WRITE
+        )
+        return reply.words[0]
+
     async def _read_back(self, parameter: Parameter) -> int | None:
         """What the drive holds now; None where it does not tell."""
         if parameter.access == "w":
             return None
-        count = len(to_words(parameter, 0))
+        count = word_count(parameter)
         try:
             reply = await self.session.line.read(
-                self.session.device, parameter.address, count, priority=Priority.OPERATOR_WRITE
+                self.session.device,
+                parameter.address,
+                count,
+                priority=Priority.OPERATOR_WRITE,
+                function=parameter.function,
             )
         except DeviceException:
             return None

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from ..body import Body
 from ..plant.motor import Stop
 from ..plant.terminals import FULL_VOLTS
-from .channels import Channels, channel_bit, channel_marks
+from .channels import ChannelsInForce, channel_bit, channel_marks
 
 INPUT_BITS = 0x003F
 """Bits of IOLR that are inputs."""
@@ -80,7 +80,7 @@ def show_inputs(body: Body) -> None:
             body.registers.put(analogue, round(volts * ANALOGUE_COUNTS))
 
 
-def show_channels(body: Body, channels: Channels, *, second_ramp: bool) -> None:
+def show_channels(body: Body, channels: ChannelsInForce, *, second_ramp: bool) -> None:
     """Put the channels in force into CCC, CRC, LRS3 and LRS7."""
     body.show_code("CCC", channel_bit(channels.command))
     body.show_code("CRC", channel_bit(channels.reference))

@@ -66,7 +66,7 @@ Active = Callable[[int], bool]
 
 
 @dataclass(frozen=True, slots=True)
-class Channels:
+class ChannelsInForce:
     """The channels in force."""
 
     command: ChannelPlace
@@ -92,7 +92,7 @@ def switch_is_on(raw: int, closed: Callable[[str], bool], word: int) -> bool:
     return False
 
 
-def channels_in_force(setting: ReadSetting, active: Active) -> Channels:
+def channels_in_force(setting: ReadSetting, active: Active) -> ChannelsInForce:
     """The channels that the settings give, with the switches as they are now."""
     second = active(setting("RFC", 96))
     first_b = not second and setting("FR1B", 0) != 0 and active(setting("RCB", 96))
@@ -113,8 +113,8 @@ def channels_in_force(setting: ReadSetting, active: Active) -> Channels:
         command = (
             ChannelPlace.DISPLAY if reference is ChannelPlace.DISPLAY else ChannelPlace.TERMINALS
         )
-        return Channels(command, reference, raw, command_2, second, first_b, local=True)
-    return Channels(command, reference, raw, command_2, second, first_b)
+        return ChannelsInForce(command, reference, raw, command_2, second, first_b, local=True)
+    return ChannelsInForce(command, reference, raw, command_2, second, first_b)
 
 
 def channel_bit(place: ChannelPlace) -> int:
@@ -131,7 +131,7 @@ def extended_status_bits(place: ChannelPlace) -> tuple[bool, bool]:
     return place is not ChannelPlace.LINE, True
 
 
-def channel_marks(channels: Channels, *, second_ramp: bool) -> tuple[int, int]:
+def channel_marks(channels: ChannelsInForce, *, second_ramp: bool) -> tuple[int, int]:
     """LRS3 and LRS7, as far as the channels and the ramp show in them."""
     second = (channels.reference_2, channels.command_2, second_ramp)
     each = (

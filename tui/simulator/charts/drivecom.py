@@ -13,7 +13,7 @@ from tui.drive.profile.schema import Parameter
 from ..body import Body, Fallback
 from ..plant.fault_history import OwnFault
 from ..plant.motor import MotorDemand, Stop
-from .channels import COPIES_COMMAND, COPIES_REFERENCE, ChannelPlace, Channels
+from .channels import COPIES_COMMAND, COPIES_REFERENCE, ChannelPlace, ChannelsInForce
 from .drivecom_channels import DrivecomChannels
 from .drivecom_machine import DrivecomMachine
 from .drivecom_reference import DrivecomReference
@@ -22,7 +22,7 @@ from .drivecom_status import Appearance, show_drivecom
 from .drivecom_stops import commanded_stop, extended_command, external_fault, locked, stop_type
 from .io_profile import io_status
 from .line_command import LineCommand
-from .wiring import Wiring
+from .wiring import TerminalWiring
 
 FAULT_RESET = 1 << 7
 CMI_SECOND_RAMP = 1 << 4
@@ -38,7 +38,7 @@ class DrivecomChart:
         self._command = LineCommand(body)
         self._reference = DrivecomReference(body)
         self._channels = DrivecomChannels(body)
-        self._wiring = Wiring(body)
+        self._wiring = TerminalWiring(body)
         self._target_hz = 0.0
         self._resets = False
         """Whether the assigned fault reset was given at the last look."""
@@ -101,7 +101,7 @@ class DrivecomChart:
         if self._wired_run():
             self._machine.enable()
 
-    def _copy_reference(self, before: Channels, now: Channels) -> None:
+    def _copy_reference(self, before: ChannelsInForce, now: ChannelsInForce) -> None:
         copies = self._body.setting("COP", 0) in COPIES_REFERENCE
         if copies and self._copies(to_2=now.reference_2) and now.reference is ChannelPlace.LINE:
             self._reference.leave(abs(self._wanted(before)))
@@ -110,7 +110,7 @@ class DrivecomChart:
         """Channel 1 is copied to channel 2, in the I/O profile the other way too."""
         return to_2 or self._command.is_io
 
-    def _change_channel(self, before: Channels, now: Channels) -> None:
+    def _change_channel(self, before: ChannelsInForce, now: ChannelsInForce) -> None:
         """Another channel commands: what it orders holds from now on, or what was copied to it."""
         running = self._ordered(before)
         self._machine.leaving = False
@@ -129,7 +129,7 @@ class DrivecomChart:
         if not self._command.is_io:
             self._obey(command_of(self._command.word))
 
-    def _ordered(self, channels: Channels) -> bool:
+    def _ordered(self, channels: ChannelsInForce) -> bool:
         """Whether the motor was ordered to run under these channels."""
         if channels.command is ChannelPlace.TERMINALS:
             return self._wiring.order.run
@@ -249,7 +249,7 @@ class DrivecomChart:
         second = bool(extended_command(self._body) & CMI_SECOND_RAMP)
         return second and self._body.traits.access_levels
 
-    def _wanted(self, channels: Channels | None = None) -> float:
+    def _wanted(self, channels: ChannelsInForce | None = None) -> float:
         """The signed reference in Hz before LSP and HSP, under the channels in force or others."""
         channels = channels or self._channels.now
         hz = self._reference.size(channels)

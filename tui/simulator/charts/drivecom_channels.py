@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ..body import Body
 from ..rules import MODBUS_COMMAND, MODBUS_REFERENCE
-from .channels import ChannelPlace, Channels, channels_in_force, switch_is_on
+from .channels import ChannelPlace, ChannelsInForce, channels_in_force, switch_is_on
 
 COMMISSIONED = {"FR1": MODBUS_REFERENCE, "CD1": MODBUS_COMMAND}
 """Channels of a drive whose profile has no words for them."""
@@ -18,14 +18,14 @@ class DrivecomChannels:
         self._body = body
         self.line_spoke = False
         """Whether the line gave a command; below access level L3 it commands from then on."""
-        self.now = Channels(ChannelPlace.LINE, ChannelPlace.LINE)
+        self.now = ChannelsInForce(ChannelPlace.LINE, ChannelPlace.LINE)
 
     def power_up(self) -> None:
         """The line has not spoken yet."""
         self.line_spoke = False
         self.now = self._look()
 
-    def follow(self) -> tuple[Channels, Channels]:
+    def follow(self) -> tuple[ChannelsInForce, ChannelsInForce]:
         """Look again; the channels before and now."""
         before, self.now = self.now, self._look()
         return before, self.now
@@ -35,11 +35,11 @@ class DrivecomChannels:
         word = self._body.raw("command_word") & 0xFFFF
         return switch_is_on(raw, self._body.terminals.closed, word)
 
-    def _look(self) -> Channels:
+    def _look(self) -> ChannelsInForce:
         channels = channels_in_force(self._setting, self.is_on)
         if self.low_access and not channels.local:
             place = ChannelPlace.LINE if self.line_spoke else ChannelPlace.TERMINALS
-            return Channels(place, place)
+            return ChannelsInForce(place, place)
         return channels
 
     def _setting(self, code: str, default: int) -> int:

@@ -9,7 +9,7 @@ from __future__ import annotations
 from tui.drive.profile.schema import Parameter
 
 from ..body import Body, Fallback
-from .channels import ChannelPlace, Channels
+from .channels import ChannelPlace, ChannelsInForce
 
 CMI_HIGH_RESOLUTION, CMI_REVERSE = 1 << 9, 1 << 12
 FULL_COUNT = 32767
@@ -32,7 +32,7 @@ class DrivecomReference:
             return body.motor.frequency
         return self.cut(wanted)
 
-    def size(self, channels: Channels) -> float:
+    def size(self, channels: ChannelsInForce) -> float:
         """The reference in Hz that the channel in force gives, before its limits.
 
         From the line it may be negative; 0 from a channel that nothing is simulated of.
@@ -45,7 +45,7 @@ class DrivecomReference:
             return low + self._body.terminals.level(f"AI{channels.input}") * (high - low)
         return 0.0
 
-    def wire(self, channels: Channels, hz: float) -> None:
+    def wire(self, channels: ChannelsInForce, hz: float) -> None:
         """Put the analogue input of a channel to what gives this reference in Hz."""
         low, high = self.limits()
         part = (hz - low) / (high - low) if high > low else 0.0

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from ..body import Body
 from ..plant.motor import Stop
 from .altivar_words import show_altivar_words, show_channels
-from .channels import Channels, extended_status_bits
+from .channels import ChannelsInForce, extended_status_bits
 from .drivecom_stops import CMI_LOCKED, extended_command
 
 WARM_MOTOR = 100.0
@@ -21,7 +21,7 @@ class Appearance:
     """What a chart tells about itself."""
 
     state_bits: int
-    channels: Channels
+    channels: ChannelsInForce
     going: bool
     """The motor is supplied."""
     reached: bool
@@ -47,7 +47,7 @@ def status_word(body: Body, seen: Appearance) -> int:
     return seen.state_bits | sum(1 << bit for given, bit in marks if given)
 
 
-def _remote(body: Body, channels: Channels) -> bool:
+def _remote(body: Body, channels: ChannelsInForce) -> bool:
     """Bit 9: no forced local (ATV31/312); command or reference by a network (ATV71)."""
     if body.traits.remote_always:
         return not channels.local

@@ -18,7 +18,7 @@ from .own_reference import OwnReference
 from .own_words import REST_KINDS, state_of_kind, with_bit, word_of
 
 OWN_REACHED_HZ = 0.1
-STOPS: dict[OrderId, Stop] = {
+STOPS_BY_ORDER: dict[OrderId, Stop] = {
     "stop": Stop.RAMP,
     "quick-stop": Stop.FAST,
     "freewheel": Stop.FREEWHEEL,
@@ -106,7 +106,7 @@ class OwnChart:
                 self._stop = Stop.RAMP
         elif order.id == "reset":
             self.reset_fault()
-        elif way := STOPS.get(order.id):
+        elif way := STOPS_BY_ORDER.get(order.id):
             self._end(way)
 
     def _go(self, state: State) -> None:

@@ -23,7 +23,7 @@ class WiredOrder:
     reverse: bool = False
 
 
-class Wiring:
+class TerminalWiring:
     """Follows the inputs that run one drive.
 
     On two wires a closed contact runs the motor for as long as it is closed, after a reset too;

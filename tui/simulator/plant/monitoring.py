@@ -5,8 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 
+from tui.drive.errors import ValueRefused
 from tui.drive.profile.schema import Quantity
-from tui.drive.values import speed_from_frequency
 
 from ..body import Body
 from .motor import MotorState
@@ -112,3 +112,14 @@ def _show_speed(body: Body) -> None:
     if parameter.unit == "Hz":
         rpm = body.motor.rotor
     body.show("speed", rpm if signed else abs(rpm))
+
+
+def speed_from_frequency(raw_frequency: int, poles: int) -> int:
+    """Speed in rpm from a raw output frequency in 0.01 Hz and the number of poles.
+
+    The drive's own rounding: (F x 12 + 5 x poles) / (poles x 10), cut to an integer.
+    Source: ATV21 Modbus manual 8.3, FE90. Raises ValueRefused for less than one pole.
+    """
+    if poles < 1:
+        raise ValueRefused(f"{poles} poles: a motor has at least 2.")
+    return (raw_frequency * 12 + 5 * poles) // (poles * 10)

@@ -10,7 +10,7 @@ from tui.drive.settings.multiple import counts_of
 from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_enumeration, raw_range, to_words, word_count
 
-from ..registers import Registers
+from ..registers import INPUT_REGISTERS, Registers
 from ..rules import Traits
 
 NO_VALUE = 0x8000
@@ -68,7 +68,10 @@ class DriveWords:
             return [self._slot_word(block, place) for place in range(count)]
         if self._reading.single_words_only and count != 1:
             raise Refused(self._refusals.wrong_shape)
-        words = [self._word(a) for a in range(address, address + count)]
+        if function.code == 4:
+            words = [self._input_word(a) for a in range(address, address + count)]
+        else:
+            words = [self._word(a) for a in range(address, address + count)]
         missing = words.count(None)
         if missing == count or (missing and not self._fills_gaps()):
             raise Refused(self._unknown_read())
@@ -81,6 +84,10 @@ class DriveWords:
     def _unknown_read(self) -> int | None:
         silent = self._refusals.unknown_address is None
         return None if silent else self._reading.unknown_exception
+
+    def _input_word(self, address: int) -> int | None:
+        known = address <= 0xFFFF and self._registers.owner(INPUT_REGISTERS + address)
+        return self._registers.word(INPUT_REGISTERS + address) if known else None
 
     def _word(self, address: int) -> int | None:
         if address > 0xFFFF:

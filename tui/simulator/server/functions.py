@@ -175,6 +175,7 @@ def _identify(server: Server, function: Function, body: bytes) -> bytes:
 
 _HANDLERS: Mapping[int, Callable[[Server, Function, bytes], bytes]] = {
     3: _read,
+    4: _read,
     6: _write_one,
     8: _diagnose,
     16: _write_many,

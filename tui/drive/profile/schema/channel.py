@@ -14,6 +14,7 @@ class ChannelRow(Table, frozen=True, kw_only=True):
 
     parameter: str
     when: list[When] = []
+    """Conditions under which the row counts; all must hold."""
     mask: WordAddress = 0xFFFF
     """Bits that tell it, before the shift."""
     shift: Annotated[int, Meta(ge=0, le=15)] = 0
@@ -30,6 +31,7 @@ class ChannelSwitch(Table, frozen=True, kw_only=True):
     fixed: list[int]
     """Raw values with which nothing is switched."""
     when: list[When] = []
+    """Conditions under which it switches; all must hold."""
     does: str
     """What it does otherwise, behind its name and value."""
 
@@ -38,8 +40,11 @@ class Channels(Table, frozen=True, kw_only=True):
     """Who commands and who gives the reference; of several rows the first that holds counts."""
 
     command: list[ChannelRow] = []
+    """Words that tell who commands."""
     reference: list[ChannelRow] = []
+    """Words that tell who gives the reference."""
     switches: list[ChannelSwitch] = []
+    """Parameters by which another channel can come into force."""
     remedy: str = ""
     """What makes the line command the drive, as a sentence."""
     source: str = ""

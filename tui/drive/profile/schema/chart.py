@@ -141,7 +141,11 @@ class Chart(Table, frozen=True, kw_only=True):
 
     id: Identifier
     name: str
-    kind: Literal["drivecom", "io", "altivar21", "leroy-somer"]
+    kind: Identifier = "plain"
+    """How a simulated drive plays it, where that knows more than its states and orders."""
+    runs_in: Identifier | None = None
+    """The running state to which a start leads through the transitions, a command at a time;
+    without it the words of an order are written as they stand."""
     when: When | None = None
     """Where it applies; absent: always, or where no other does."""
     status: str

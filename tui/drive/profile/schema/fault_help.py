@@ -62,4 +62,6 @@ class HelpData(Table, frozen=True, kw_only=True):
     """A whole help file."""
 
     faults: list[FaultHelp] = []
+    """What each fault points at."""
     alarms: list[AlarmHelp] = []
+    """What each alarm bit points at."""

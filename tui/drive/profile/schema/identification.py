@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from msgspec import Meta
 
-from .base import BitNumber, Identifier, Table
+from .base import BitNumber, DecimalText, Identifier, Table
 
 
 class Source(Table, frozen=True, kw_only=True):
@@ -34,6 +34,13 @@ class ProfileHead(Table, frozen=True, kw_only=True):
     vendor: str
     version: str
     summary: str = ""
+    demo_hz: DecimalText | None = None
+    """Frequency at which its motor runs in the demo; absent: it is not in the demo."""
+    rows_from: list[str] = []
+    """Files of rows that several families share, beside this file; a row with the same key here
+    says what differs."""
+    without: list[str] = []
+    """Codes of shared parameters that this family does not have."""
 
 
 class IdentificationObject(Table, frozen=True, kw_only=True):
@@ -62,6 +69,8 @@ class Identification(Table, frozen=True, kw_only=True):
     reference_prefixes: list[str] = []
     """Beginnings of object 1 (reference) that belong to this family."""
     objects: list[IdentificationObject] = []
+    version_digits: Literal["as-told", "two-and-two"] = "as-told"
+    """`two-and-two` where 0201 means version 2.1."""
     conformity: int = 1
     highest_read_device_id: Annotated[int, Meta(ge=1, le=4)] = 1
     exception_has_mei_byte: bool = False

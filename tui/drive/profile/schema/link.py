@@ -95,6 +95,8 @@ class ReadShapes(Table, frozen=True, kw_only=True):
     """Word that stands for an unknown or protected parameter inside a longer read."""
     unknown_exception: int | None = 2
     """Exception for a read of unknown words only; absent where the manual names none."""
+    low_word_first: bool = True
+    """Order of the two words of 32-bit values, where a parameter does not say otherwise."""
     gaps_readable: bool = False
     """True where a read may run over addresses that carry no parameter."""
     note: str = ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from .base import RawWord, Table
+from .base import RawWord, Table, When
 
 
 class MemoryOrder(Table, frozen=True, kw_only=True):
@@ -17,6 +17,10 @@ class MemoryOrder(Table, frozen=True, kw_only=True):
     """What exactly happens, for the person who is asked."""
     at_rest_mask: RawWord = 0
     """Bits of the extended status word that must be 0 before."""
+    keeps_value: bool = False
+    """True where the word keeps the value that was written: it does not tell when it is done."""
+    done: When | None = None
+    """What tells that it is done, where the word itself does not."""
     groups: str = ""
     """A word that chooses the groups of settings; nothing happens while it is 0."""
     source: str = ""

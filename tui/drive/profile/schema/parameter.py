@@ -171,6 +171,17 @@ Quantity = Literal[
 """What a parameter means across families: the same name, the same thing."""
 
 
+class ParameterGroup(Table, frozen=True, kw_only=True):
+    """What the parameters of a group are, where they are not settings."""
+
+    name: str
+    """As the parameters have it in `group`."""
+    holds: Literal["settings", "commands", "measurements"] = "settings"
+    needs_factory: str = ""
+    """A word that says which option is fitted: the group means what it says while that word
+    holds its factory value, and is not written otherwise."""
+
+
 class Parameter(Table, frozen=True, kw_only=True):
     """One word (or pair of words) of a drive."""
 
@@ -179,9 +190,16 @@ class Parameter(Table, frozen=True, kw_only=True):
     number: str
     """Address as the manual writes it: W9001, 16#FD00, 1.05."""
     address: WordAddress
+    function: Literal[3, 4] = 3
+    """The function that reads it: 3, or 4 for an input register, which nothing writes."""
     type: WordType = "uint16"
     low_word_first: bool = True
-    """Order of the two words of a 32-bit value."""
+    """Order of the two words of a 32-bit value; without it that of `reading`."""
+    mask: Annotated[int, Meta(ge=1, le=0xFFFF)] = 0xFFFF
+    """Bits of the word that are this parameter, once shifted down; the others are not its own,
+    and stay as they are when it is written."""
+    shift: BitNumber = 0
+    """How many bits the word is shifted down first."""
     sure_up_to: int | None = None
     """Highest raw value whose meaning is sure; one above it is marked `?`."""
     unit: str = ""
@@ -222,6 +240,12 @@ class Parameter(Table, frozen=True, kw_only=True):
     storage: Storage = "unknown"
     effective: Effective = "at-once"
     group: str
+    holds: Literal["command"] | None = None
+    """`command` where it is one, whatever its group holds."""
+    resets_others: Annotated[int, Meta(ge=0, le=9)] = 0
+    """Not 0 where writing it changes other settings: 1 is written before 2, both before others."""
+    rated: bool = False
+    """True where its value belongs to one rating of drive and motor, or to one model."""
     quantity: Quantity | None = None
     """What the parameter means across families; at most one parameter a quantity."""
     forbidden: str = ""

@@ -11,7 +11,7 @@ from .identification import Erratum, Identification, ProfileHead, Source
 from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkSettings, ReadShapes
 from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
-from .parameter import Enumeration, Parameter
+from .parameter import Enumeration, Parameter, ParameterGroup
 from .start_up import StartUpStep
 from .wiring import Wiring
 
@@ -43,5 +43,6 @@ class ProfileData(Table, frozen=True, kw_only=True):
     connectors: list[Connector] = []
     line_rules: list[LineRule] = []
     wiring: Wiring = Wiring()
+    groups: list[ParameterGroup] = []
     enumerations: list[Enumeration] = []
     parameters: list[Parameter]

@@ -50,7 +50,12 @@ class Wiring(Table, frozen=True, kw_only=True):
     """What a person has to know before touching the line or the drive."""
 
     warnings: list[FamilyWarning] = []
+    """What surprises, hurts or breaks."""
     opening: Opening | None = None
+    """How long to wait before the drive is opened."""
     signals: list[SignalName] = []
+    """What other standards call the signals of the line."""
     signals_source: str = ""
+    """Where those names are told."""
     lamps: list[Lamp] = []
+    """Lamps and signs of the display."""

@@ -1,0 +1,271 @@
+"""`profiles --check`: every fault in one run, where it stands, and what is allowed there."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from click.testing import CliRunner
+
+from tui.cli.main import main
+from tui.drive.profile import library
+from tui.drive.profile.toml_lines import toml_lines
+
+COMMANDED = (Path(__file__).parent / "pump.toml").read_text(encoding="utf-8")
+RUNNING = '{ id = "running", name = "Running", kind = "running", mask = 0x0002, value = 0x0002 },'
+FAULT = '  { id = "fault", name = "Fault", kind = "fault", mask = 0x0004, value = 0x0004 },\n'
+PAIR = """
+[[parameters]]
+code = "PAIR"
+name = "Counter"
+number = "40303"
+address = 302
+type = "uint32"
+access = "r"
+group = "Monitoring"
+source = "guide 4.3"
+confidence = "manual"
+"""
+WRITTEN_PAIR = PAIR.replace('"r"', '"rw"')
+SOURCE = """
+[[control_sources]]
+id = "line"
+name = "The line"
+command = { sources = ["Modbus"] }
+reference = { sources = ["Modbus"] }
+settings = [{ parameter = "MODE", value = 7 }]
+"""
+
+Change = tuple[str, str]
+
+# what is changed, what is told, and a text of the line that it is told of
+FAULTS: dict[str, tuple[list[Change], str, str]] = {
+    "no stop": (
+        [('  { id = "stop", name = "Stop", words = [0] },\n', "")],
+        "it can run a motor and has no stop",
+        "orders = [",
+    ),
+    "a stop in some states only": (
+        [('"Stop", words = [0] }', '"Stop", words = [0], states = ["running"] }')],
+        "no stop holds in every state",
+        "orders = [",
+    ),
+    "nothing is seen to run": (
+        [(RUNNING, RUNNING.replace('kind = "running"', 'kind = "stopped"'))],
+        "no state of the kind running",
+        "states = [\n",
+    ),
+    "no way to the running state": (
+        [('status = "STAT"\n', 'status = "STAT"\nruns_in = "running"\n')],
+        "no command leads from ready to running",
+        "runs_in",
+    ),
+    "a running state that no transition leads to": (
+        [
+            (
+                'status = "STAT"\n',
+                'status = "STAT"\ntransitions = [{ source = "running", target = "ready" }]\n',
+            )
+        ],
+        "no transition leads to the running state running",
+        'id = "running"',
+    ),
+    "a fault that is not seen": (
+        [(FAULT, ""), ('[faults]\nparameter = "TRIP"\n', "[faults]\n")],
+        "would look healthy",
+        "states = [\n",
+    ),
+    "a hidden state": (
+        [(FAULT, ""), (RUNNING, f"{RUNNING}\n{FAULT.replace('0x0004', '0x0006')}")],
+        "state fault is never seen: running above it",
+        'id = "fault"',
+    ),
+    "two words at one address": (
+        [("address = 202", "address = 203")],
+        "address 203 is already that of",
+        "address = 203\nunit",
+    ),
+    "a pair over another word": (
+        [("\n[[enumerations]]", f"{PAIR.replace('302', '299')}\n[[enumerations]]")],
+        "PAIR is uint32 and takes 299 and 300",
+        "address = 299",
+    ),
+    "a pair that could not be written": (
+        [("\n[[enumerations]]", f"{WRITTEN_PAIR}\n[[enumerations]]")],
+        "written by function 16",
+        'access = "rw"\ngroup = "Monitoring"',
+    ),
+    "a factory value past its limit": (
+        [("factory = 300", "factory = 7000")],
+        "factory 7000 is outside its limits, 10 to 6000",
+        "factory = 7000",
+    ),
+    "letters as a key of scales": (
+        [
+            (
+                'scale = "0.01"',
+                'scale_by = { parameter = "MODE", scales = { high = "0.1" } }',
+            )
+        ],
+        "'high' is not a raw value in decimal",
+        "scale_by",
+    ),
+    "one fault twice": (
+        [("raw = 7, code", "raw = 1, code")],
+        "fault 1 is there twice",
+        'raw = 1, code = "COM"',
+    ),
+    "a word that is not there": (
+        [('parameter = "KEEP"\nraw', 'parameter = "KEPT"\nraw')],
+        "no parameter 'KEPT'. Did you mean KEEP?",
+        'parameter = "KEPT"',
+    ),
+    "limits in a circle": (
+        [
+            ("min = 10\n", 'min = 10\nmax_from = "TOUT"\n'),
+            ("min = 0\nmax = 60\n", 'min = 0\nmax = 60\nmax_from = "RAMP"\n'),
+        ],
+        "RAMP <= TOUT <= RAMP",
+        'max_from = "TOUT"',
+    ),
+    "a proposed value that is none": (
+        [("\n[[enumerations]]", f"{SOURCE}\n[[enumerations]]")],
+        "MODE = 7: is none of its values: 0 By hand, 1 Pressure, 2 Level",
+        "value = 7",
+    ),
+    "a factory value that is no name": (
+        [('2 = "Level" }\nfactory = 0', '2 = "Level" }\nfactory = 5')],
+        "MODE = 5: is none of its values",
+        "factory = 5",
+    ),
+    "no source": (
+        [('source = "guide 5.2"', 'source = ""')],
+        "ids: guide",
+        'source = ""',
+    ),
+    "bits of two fields": (
+        [
+            ("address = 202", "address = 201"),
+            ('code = "TOUT"', 'mask = 3\ncode = "TOUT"'),
+            ('code = "MODE"', 'mask = 7\nshift = 1\ncode = "MODE"'),
+        ],
+        "bits 16#0002 of address 201 are also those of MODE",
+        "address = 201\nunit",
+    ),
+    "an input register without its function": (
+        [('code = "FREQ"', 'function = 4\ncode = "FREQ"')],
+        "function 4 is not among the functions",
+        "function = 4",
+    ),
+    "a group that nobody is in": (
+        [("\n[[enumerations]]", '\n[[groups]]\nname = "Pumps"\n\n[[enumerations]]')],
+        "no parameter is in the group 'Pumps'",
+        'name = "Pumps"',
+    ),
+    "a field that is none": (
+        [("min = 10\n", "mini = 10\n")],
+        "there is no field `mini` here; did you mean min",
+        "mini = 10",
+    ),
+    "a name that is none": (
+        [('access = "rw-stopped"\nstorage', 'access = "stopped"\nstorage')],
+        "Allowed: r, rw, rw-stopped, w",
+        'access = "stopped"',
+    ),
+    "a number out of range": (
+        [("address = 300", "address = 70000")],
+        "allowed is 0 to 65535",
+        "address = 70000",
+    ),
+    "an id that is a word of the command": (
+        [('id = "example-pump"', 'id = "path"')],
+        "'path' cannot be an id",
+        'id = "path"',
+    ),
+    "a field too few": (
+        [('number = "40301"\n', "")],
+        "the field `number` is missing",
+        '[[parameters]]\ncode = "CTRL"',
+    ),
+}
+
+
+def checked(tmp_path: Path, text: str) -> list[str]:
+    path = tmp_path / "own.toml"
+    path.write_text(text, encoding="utf-8")
+    return library.faults_of(path)
+
+
+def test_the_profile_that_is_broken_below_is_right(tmp_path: Path) -> None:
+    assert checked(tmp_path, COMMANDED) == []
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_a_fault_is_told_where_it_stands(tmp_path: Path, name: str) -> None:
+    changes, told, at = FAULTS[name]
+    text = COMMANDED
+    for right, wrong in changes:
+        assert text.count(right) == 1, right
+        text = text.replace(right, wrong)
+    found = checked(tmp_path, text)
+    [fault] = [one for one in found if told in one] or [f"not told, but: {found}"]
+    line = text[: text.index(at)].count("\n") + 1
+    assert fault.startswith(f"{tmp_path / 'own.toml'}:{line}: "), fault
+
+
+def test_all_faults_are_told_in_one_run(tmp_path: Path) -> None:
+    """Those of the form do not hide those of the rest."""
+    some = ("a field that is none", "a number out of range", "no stop", "one fault twice",
+            "a word that is not there", "a field too few", "a hidden state")  # fmt: skip
+    text = COMMANDED
+    for name in some:
+        for right, wrong in FAULTS[name][0]:
+            text = text.replace(right, wrong)
+    found = checked(tmp_path, text)
+    assert [name for name in some if not any(FAULTS[name][1] in one for one in found)] == []
+    lines = [int(one.split(":")[1]) for one in found]
+    assert lines == sorted(lines)
+
+
+def test_several_files_are_checked(tmp_path: Path) -> None:
+    right, wrong, no_toml = (tmp_path / f"{n}.toml" for n in ("right", "wrong", "none"))
+    right.write_text(COMMANDED, encoding="utf-8")
+    wrong.write_text(COMMANDED.replace("factory = 300", "factory = 7000"), encoding="utf-8")
+    no_toml.write_text('[profile]\nid = "x\n', encoding="utf-8")
+    done = CliRunner().invoke(main, ["profiles", "--check", *map(str, (right, wrong, no_toml))])
+    assert done.exit_code == 2
+    assert "right.toml: Example pump drive, 8 parameters, no fault found" in done.output
+    assert "outside its limits" in done.output
+    assert "none.toml:2: not valid TOML" in done.output
+    told = CliRunner().invoke(main, ["profiles", "--json", "--check", str(right), str(wrong)])
+    assert told.exit_code == 2
+    assert [len(one["faults"]) for one in json.loads(told.output)] == [0, 1]
+
+
+def test_lines_of_every_kind_of_place() -> None:
+    text = '''a = 1 # [no.header]
+"b.c".d = """
+[not]
+"""
+[x]
+list = [ # of tables
+  { k = "}" },
+  { k = [1,
+     2] },
+]
+[[rows]]
+n = 'it''s'
+[[rows]]
+[rows.inner]
+m = 1
+[[rows.more]]
+o = 1979-05-27
+'''.replace("it''s", "its")
+    lines = toml_lines(text)
+    assert lines["a",] == 1
+    assert lines["b.c", "d"] == 2
+    assert ("not",) not in lines
+    assert lines["x", "list", 1, "k", 1] == 9
+    assert (lines["rows", 0, "n"], lines["rows", 1], lines["rows", 1, "inner", "m"]) == (12, 13, 15)
+    assert lines["rows", 1, "more", 0, "o"] == 17

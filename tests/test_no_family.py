@@ -1,0 +1,95 @@
+"""The panel knows a drive family by its profile alone: no name, code or group of one in Python.
+
+`tui/simulator` plays families and is left out.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import get_args
+
+import pytest
+
+from tui.drive.profile import library
+from tui.drive.profile.schema import Quantity
+
+TUI = Path(__file__).parents[1] / "tui"
+FILES = sorted(path for path in TUI.rglob("*.py") if (TUI / "simulator") not in path.parents)
+PROFILES = [library.load(listing.id) for listing in library.listings()]
+NAMES = re.compile(
+    r"(?i)\batv ?\d|altivar|leroy|power ?drive|proxidrive|varmeca|drivecom|\bpx-|telemecanique"
+)
+CODES = {parameter.code.casefold() for profile in PROFILES for parameter in profile.parameters}
+TITLES = {"Faults", "Monitoring", "Identification"}
+"""Groups that are titles of screens or tables of the language as well."""
+GROUPS = {parameter.group for profile in PROFILES for parameter in profile.parameters} - TITLES
+WORDS = {"add", "cos", "cod", "inr", "in", "os", "typ", "fan", "pro", "dis", "bit", "no", "if",
+         "run", "time", "int", "f1", "f2"}  # fmt: skip
+"""Codes that are words of English or of programs as well."""
+SPOKEN = re.compile(r"\b(HSP|LSP|TFR|FRH|RFR|ETA|CMD|LFRD?|CMI|CHCF|DOTD|FA\d\d|F\d{3})\b")
+"""Codes that would be said to a person."""
+
+
+def texts(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and text of every string that is no docstring."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    alone = {
+        id(node.value)
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Constant) and isinstance(node.value, str) and id(node) not in alone:
+            yield node.lineno, node.value
+
+
+def known_families(path: Path) -> list[str]:
+    """What a module knows of a family, each with its line."""
+    found = []
+    for line, text in texts(path):
+        name = NAMES.search(text)
+        code = text.casefold() in CODES - WORDS and len(text) > 1
+        spoken = SPOKEN.search(text)
+        if name or code or spoken:
+            found.append(f"{path.relative_to(TUI)}:{line}: {text!r}")
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for node in ast.walk(tree):
+        # a name of a group in a comparison with one, or in a set of them
+        if isinstance(node, ast.Compare | ast.Set | ast.Dict | ast.Call) and (
+            "group" in ast.unparse(node) or isinstance(node, ast.Set)
+        ):
+            inside = (n for n in ast.walk(node) if isinstance(n, ast.Constant))
+            found += [f"{path.name}:{n.lineno}: {n.value!r}" for n in inside if n.value in GROUPS]
+    return found
+
+
+@pytest.mark.parametrize("path", FILES, ids=lambda path: str(path.relative_to(TUI)))
+def test_a_module_names_no_family(path: Path) -> None:
+    assert known_families(path) == []
+
+
+def test_the_table_of_what_python_knows_is_empty() -> None:
+    text = (TUI.parent / "docs" / "architecture.md").read_text(encoding="utf-8")
+    part = text.split("## Where Python still knows a family")[1].split("\n## ")[0]
+    assert [line for line in part.splitlines() if line.startswith("|")] == []
+
+
+@pytest.mark.parametrize(
+    "planted",
+    ['RESETS = ("cfg", "bfr")', 'if parameter.group == "Command": pass', 'DEMO = {"atv21": 35.0}',
+     'TEXT = "at most to HSP"', 'if chart.kind == "drivecom": pass', 'WORD = "15.01"'],
+)  # fmt: skip
+def test_what_is_planted_is_found(
+    planted: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    module = tmp_path / "planted.py"
+    module.write_text(planted, encoding="utf-8")
+    monkeypatch.setattr(f"{__name__}.TUI", tmp_path)
+    assert known_families(module) != []
+
+
+def test_quantities_are_no_codes() -> None:
+    assert not {quantity for quantity in get_args(Quantity) if quantity in CODES}

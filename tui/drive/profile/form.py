@@ -1,0 +1,208 @@
+"""Whether tables have the form of a profile: every fault of it, with what is allowed there."""
+
+from __future__ import annotations
+
+import difflib
+import re
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import Any
+
+import msgspec.inspect as shapes
+
+from .schema import ProfileData
+from .toml_lines import TomlPath
+
+TOLD_SINGLY = 12
+"""Allowed values that are told one by one; of more the nearest are."""
+TEXT_FORMS = {
+    r"^[0-9]+(\.[0-9]+)?$": 'a decimal number in quotes, such as "0.1"',
+    r"^[a-z][a-z0-9_-]*$": "small letters, digits, - and _, a letter first",
+    r"^8[NEO][12]$": "8N1, 8N2, 8E1 or 8O1",
+}
+_ABSENT = object()
+
+
+@dataclass(slots=True)
+class FormFaults:
+    """What is wrong with the form of some tables, and the tables with that set right."""
+
+    found: list[tuple[TomlPath, str]] = field(default_factory=list)
+    invented: list[TomlPath] = field(default_factory=list)
+    """Places whose value had to be invented: nothing more can be said of them."""
+
+
+@lru_cache(maxsize=4)
+def shape_of(form: type) -> shapes.Type:
+    """A form of files as its fields and their types."""
+    return shapes.type_info(form)
+
+
+def form_faults(
+    tables: dict[str, Any], form: type = ProfileData
+) -> tuple[FormFaults, dict[str, Any]]:
+    """Every fault of form, and tables without them, so that the rest can be looked at too."""
+    faults = FormFaults()
+    mended = _mended(shape_of(form), tables, (), faults)
+    return faults, mended if isinstance(mended, dict) else {}
+
+
+def _mended(shape: shapes.Type, value: Any, path: TomlPath, faults: FormFaults) -> Any:
+    """The value where it has its form; else _ABSENT, with the fault noted."""
+    if isinstance(shape, shapes.StructType) and isinstance(value, dict):
+        return _struct(shape, value, path, faults)
+    if isinstance(shape, shapes.ListType) and isinstance(value, list):
+        return _list(shape, value, path, faults)
+    if isinstance(shape, shapes.DictType) and isinstance(value, dict):
+        kept = {k: _mended(shape.value_type, v, (*path, k), faults) for k, v in value.items()}
+        return {key: one for key, one in kept.items() if one is not _ABSENT}
+    if isinstance(shape, shapes.UnionType):
+        inner = next(t for t in shape.types if not isinstance(t, shapes.NoneType))
+        return _mended(inner, value, path, faults)
+    if fault := _scalar_fault(shape, value):
+        faults.found.append((path, fault))
+        return _ABSENT
+    return value
+
+
+def _struct(
+    shape: shapes.StructType, value: dict[str, Any], path: TomlPath, faults: FormFaults
+) -> dict[str, Any]:
+    fields = {one.encode_name: one for one in shape.fields}
+    kept: dict[str, Any] = {}
+    for key, inner in value.items():
+        if key not in fields:
+            faults.found.append(
+                ((*path, key), f"there is no field `{key}` here{_instead(key, list(fields))}")
+            )
+            continue
+        one = _mended(fields[key].type, inner, (*path, key), faults)
+        if one is not _ABSENT:
+            kept[key] = one
+    for key, one_field in fields.items():
+        if one_field.required and key not in kept:
+            if key not in value:
+                faults.found.append((path, f"the field `{key}` is missing: {allowed(one_field)}"))
+            faults.invented.append((*path, key))
+            kept[key] = _invented(one_field.type)
+    return kept
+
+
+def _list(shape: shapes.ListType, value: list[Any], path: TomlPath, faults: FormFaults) -> Any:
+    kept = []
+    for index, inner in enumerate(value):
+        one = _mended(shape.item_type, inner, (*path, index), faults)
+        if one is _ABSENT:
+            # the place is kept, so that those behind it keep their lines
+            faults.invented.append((*path, index))
+            one = _invented(shape.item_type)
+        kept.append(one)
+    if shape.min_length and len(value) < shape.min_length:
+        faults.found.append((path, f"must hold at least {shape.min_length}"))
+        return _ABSENT
+    if shape.max_length and len(value) > shape.max_length:
+        faults.found.append((path, f"must hold at most {shape.max_length}"))
+        return _ABSENT
+    return kept
+
+
+def _scalar_fault(shape: shapes.Type, value: Any) -> str:
+    told = type(value).__name__
+    match shape:
+        case shapes.BoolType():
+            return "" if isinstance(value, bool) else f"must be true or false, not {told}"
+        case shapes.IntType(ge=low, le=high):
+            if isinstance(value, bool) or not isinstance(value, int):
+                return f"must be of type int, not {told}{_between(low, high)}"
+            if low is not None and value < low:
+                return f"must be >= {low}, not {value}{_between(low, high)}"
+            if high is not None and value > high:
+                return f"must be <= {high}, not {value}{_between(low, high)}"
+        case shapes.StrType(pattern=pattern):
+            if not isinstance(value, str):
+                return f"must be of type str (a text in quotes), not {told}"
+            if pattern and not re.search(pattern, value):
+                form = TEXT_FORMS.get(pattern, pattern)
+                return f"{value!r} has the wrong form; allowed is {form}"
+        case shapes.LiteralType(values=values):
+            if value not in values or isinstance(value, bool):
+                return f"{value!r} is none of the values allowed here{_instead(value, values)}"
+        case _:
+            return f"must be {_kind(shape)}, not {told}"
+    return ""
+
+
+def _between(low: object, high: object) -> str:
+    return "" if low is None and high is None else f"; allowed is {low} to {high}"
+
+
+def _instead(wrong: object, choice: Any) -> str:
+    """What is allowed in place of something: all of it, or the nearest of very many."""
+    texts = [str(one) for one in choice]
+    near = difflib.get_close_matches(str(wrong), texts, n=3, cutoff=0.5)
+    hint = f"; did you mean {' or '.join(near)}?" if near else "."
+    if len(texts) <= TOLD_SINGLY:
+        return f"{hint} Allowed: {', '.join(texts)}"
+    return f"{hint} Allowed are {len(texts)}, told by `drivepanel profiles --schema`"
+
+
+def _kind(shape: shapes.Type) -> str:
+    match shape:
+        case shapes.StructType():
+            return (
+                f"a table with {', '.join(one.encode_name for one in shape.fields[:TOLD_SINGLY])}"
+            )
+        case shapes.DictType():
+            return "a table of names by raw value"
+        case shapes.ListType():
+            return f"a list of which each is {_kind(shape.item_type)}"
+        case shapes.LiteralType(values=values):
+            return f"one of {', '.join(map(str, values[:TOLD_SINGLY]))}"
+        case shapes.IntType(ge=low, le=high):
+            return f"a number{_between(low, high).replace('; allowed is', ' from')}"
+        case shapes.BoolType():
+            return "true or false"
+        case shapes.UnionType(types=types):
+            return _kind(types[0])
+    return "a text in quotes"
+
+
+def allowed(one: shapes.Field) -> str:
+    """What a field takes, in words."""
+    return _kind(one.type)
+
+
+def _invented(shape: shapes.Type) -> Any:
+    match shape:
+        case shapes.StructType(fields=fields):
+            return {one.encode_name: _invented(one.type) for one in fields if one.required}
+        case shapes.LiteralType(values=values):
+            return values[0]
+        case shapes.IntType(ge=low):
+            return low or 0
+        case shapes.BoolType():
+            return False
+        case shapes.DictType():
+            return {}
+        case shapes.ListType(item_type=item, min_length=least):
+            return [_invented(item) for _ in range(least or 0)]
+        case shapes.UnionType(types=types):
+            return _invented(types[0])
+        case shapes.StrType(pattern=pattern):
+            return {r"^8[NEO][12]$": "8E1", r"^[0-9]+(\.[0-9]+)?$": "1"}.get(pattern or "", "x")
+    return None
+
+
+def place_label(tables: dict[str, Any], path: TomlPath) -> str:
+    """A place in words: keys, rows by number, and the code of the row in brackets."""
+    steps = ".".join(str(s) if isinstance(s, str) else f"#{s + 1}" for s in path)
+    node: Any = tables
+    owner = ""
+    for step in path:
+        try:
+            node = node[step]
+        except (KeyError, IndexError, TypeError):
+            break
+        if isinstance(node, dict):
+            owner = str(node.get("code") or node.get("id") or owner)
+    return f"{steps or 'the file'}{f' ({owner})' if owner else ''}"

@@ -1,0 +1,181 @@
+"""What can be told of a profile without decoding it: its head, and how a drive is asked who it is.
+
+Everything is read as TOML. Of a packaged file only the tables that are asked for are; of a file
+of the user's own the whole is, so that a broken one is known for what it is.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import lru_cache
+from pathlib import Path
+from typing import Any
+
+from ..errors import ProfileError
+
+HEAD_BYTES = 4096
+"""Characters in which a head stands."""
+_HEADER = re.compile(r"^\[+[ \t]*([\w-]+)[^\n]*", re.MULTILINE)
+_PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
+_CODE = re.compile(r"""^\[\[parameters\]\]\ncode = (["'])(.+)\1$""", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class ProfileFileHead:
+    """The first table of a file as it stands there, unchecked."""
+
+    table: Mapping[str, Any] = field(default_factory=dict)
+    parameters: int = 0
+    fault: str = ""
+
+    def text(self, key: str) -> str:
+        """A text of the head; empty where there is none."""
+        value = self.table.get(key, "")
+        return value if isinstance(value, str) else ""
+
+    @property
+    def demo_hz(self) -> float | None:
+        """Frequency of its motor in the demo."""
+        try:
+            return float(self.text("demo_hz"))
+        except ValueError:
+            return None
+
+
+@dataclass(frozen=True, slots=True)
+class AskedOf:
+    """How a drive of a family is found on a line."""
+
+    prefixes: tuple[str, ...] = ()
+    """Beginnings of its reference."""
+    functions: frozenset[int] = frozenset()
+    version_digits: str = "as-told"
+
+
+def file_head(path: Path, own: bool, packaged: Path) -> ProfileFileHead:
+    """The head of a file; a broken one says so in `fault`."""
+    return _head(path, own, packaged, _stamp(path))
+
+
+def quick_head(path: Path) -> ProfileFileHead:
+    """The head of a file out of its first characters; empty where it is not there alone."""
+    try:
+        with path.open(encoding="utf-8") as file:
+            text = file.read(HEAD_BYTES)
+    except (OSError, UnicodeDecodeError):
+        return ProfileFileHead()
+    return ProfileFileHead(_section(text, "profile") or {})
+
+
+def asked_of(path: Path, own: bool, packaged: Path) -> AskedOf:
+    """How a drive of a file's family is found; empty for a broken file."""
+    return _asked(path, own, packaged, _stamp(path))
+
+
+def _stamp(path: Path) -> tuple[int, int]:
+    """Changes whenever the file does."""
+    try:
+        told = os.stat(path)
+    except OSError:
+        return 0, 0
+    return told.st_mtime_ns, told.st_size
+
+
+@lru_cache(maxsize=256)
+def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> ProfileFileHead:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except OSError as error:
+        return ProfileFileHead(fault=f"cannot be read: {error.strerror}")
+    except UnicodeDecodeError as error:
+        return ProfileFileHead(fault=f"byte {error.start} is not UTF-8 text")
+    head = _section(text, "profile") or {}
+    if not own and head and (count := _counted(text, head, packaged)) is not None:
+        return ProfileFileHead(head, count)
+    try:
+        tables = _whole(path, packaged)
+    except ProfileError as error:
+        return ProfileFileHead(head, len(_PARAMETER.findall(text)), str(error))
+    head, rows = tables.get("profile", {}), tables.get("parameters", [])
+    if not isinstance(head, dict) or not isinstance(head.get("id"), str):
+        return ProfileFileHead(fault="its table [profile] with an id is missing")
+    return ProfileFileHead(head, len(rows) if isinstance(rows, list) else 0)
+
+
+def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
+    """How many parameters a packaged file has with those that it shares; None if not plain."""
+    if "rows_from" not in head:
+        return len(_PARAMETER.findall(text))
+    if "without" in head or (shared := _shared_texts(head, packaged)) is None:
+        return None
+    texts = (text, *shared)
+    codes = [row[1] for one in texts for row in _CODE.findall(one)]
+    plain = len(codes) == sum(len(_PARAMETER.findall(one)) for one in texts)
+    return len(set(codes)) if plain else None
+
+
+def _shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
+    """The texts of a packaged file's shared rows; None where they are not there."""
+    names = head.get("rows_from")
+    try:
+        return [(packaged / name).read_text(encoding="utf-8") for name in names or ()]
+    except (OSError, UnicodeDecodeError, TypeError):
+        return None
+
+
+@lru_cache(maxsize=256)
+def _asked(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> AskedOf:
+    try:
+        tables = _told(path, own, packaged)
+    except (OSError, UnicodeDecodeError, ProfileError):
+        return AskedOf()
+    named, functions = tables.get("identification"), tables.get("functions")
+    prefixes = named.get("reference_prefixes") if isinstance(named, dict) else None
+    rows = functions if isinstance(functions, list) else []
+    codes = [row.get("code") for row in rows if isinstance(row, dict)]
+    return AskedOf(
+        tuple(p for p in prefixes if isinstance(p, str)) if isinstance(prefixes, list) else (),
+        frozenset(code for code in codes if isinstance(code, int)),
+        str(named.get("version_digits", "")) if isinstance(named, dict) else "",
+    )
+
+
+def _told(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
+    """The tables identification and functions, among others."""
+    if own:
+        return _whole(path, packaged)
+    text = path.read_text(encoding="utf-8")
+    head = _section(text, "profile")
+    shared = _shared_texts(head, packaged) if head is not None else None
+    if shared is None or any(
+        header[1] != "parameters" for one in shared for header in _HEADER.finditer(one)
+    ):
+        return _whole(path, packaged)
+    found = {"identification": _section(text, "identification") or {}}
+    functions = _section(text, "functions")
+    return {**found, "functions": functions} if functions else _whole(path, packaged)
+
+
+def _whole(path: Path, packaged: Path) -> Mapping[str, Any]:
+    from .shared_rows import read_tables
+
+    return read_tables(path, packaged).tables
+
+
+def _section(text: str, name: str) -> Any:
+    """A table of the top read by itself; None where that cannot be done."""
+    import tomli
+
+    headers = list(_HEADER.finditer(text))
+    own = [n for n, header in enumerate(headers) if header[1] == name]
+    if not own or own != list(range(own[0], own[-1] + 1)):
+        return None
+    last = own[-1] + 1
+    end = headers[last].start() if last < len(headers) else len(text)
+    try:
+        return tomli.loads(text[headers[own[0]].start() : end]).get(name)
+    except tomli.TOMLDecodeError:
+        return None

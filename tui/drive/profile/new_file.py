@@ -1,0 +1,77 @@
+"""The text of a new profile that begins as a copy of another."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ..errors import ProfileError
+
+_HEAD = re.compile(r"^\[profile\][^\n]*\n.*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
+_ID = re.compile(r"""^id[ \t]*=[ \t]*(?:"[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
+_PREFIXES = re.compile(r"^reference_prefixes[ \t]*=[ \t]*\[[^\]]*\]", re.MULTILINE)
+_DEMO = re.compile(r"^(?:demo_hz|rows_from|without)\b[^\n]*\n", re.MULTILINE)
+_ROWS = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
+_BARE = re.compile(r"[A-Za-z0-9_-]+")
+IDENTIFIER = re.compile(r"[a-z][a-z0-9_-]*")
+
+
+def new_profile_text(
+    source: str, old_id: str, new_id: str, rows: Iterable[Mapping[str, Any]] | None = None
+) -> str:
+    """A profile's text under another id; no drive is recognised as it before somebody says so.
+
+    `rows` are all its parameters where it shares some: a profile of one's own has them itself.
+    Raises ProfileError for an id that cannot be one, and for a file without a plain head.
+    """
+    if not IDENTIFIER.fullmatch(new_id):
+        raise ProfileError(
+            f"{new_id!r} cannot be an id: small letters, digits, - and _, a letter first."
+        )
+    head = _HEAD.search(source)
+    if head is None or not _ID.search(head[0]):
+        raise ProfileError(f"The profile {old_id} has no plain table [profile] to copy.")
+    changed = _DEMO.sub("", _ID.sub(f'id = "{new_id}"', head[0], count=1))
+    text = source[: head.start()] + changed + source[head.end() :]
+    if rows is not None:
+        text = f"{_until_rows(text)}\n" + "\n".join(_row_text(row) for row in rows)
+    return _PREFIXES.sub(
+        '# beginnings of the reference that the drive tells, such as ["NEW12"]\n'
+        "reference_prefixes = []",
+        text,
+        count=1,
+    )
+
+
+def _until_rows(text: str) -> str:
+    """What stands before the parameters, which are last in a file."""
+    first = _ROWS.search(text)
+    return text[: first.start()] if first else text
+
+
+def _row_text(row: Mapping[str, Any]) -> str:
+    return "\n".join(["[[parameters]]", *(f"{key} = {_written(row[key])}" for key in row), ""])
+
+
+def _written(value: Any) -> str:
+    """A value as TOML writes it."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int():
+            return str(value)
+        case dict():
+            return f"{{ {', '.join(f'{_key(key)} = {_written(value[key])}' for key in value)} }}"
+        case list():
+            parts = [_written(one) for one in value]
+            long = any(isinstance(one, dict) for one in value)
+            if long:
+                return "[\n" + "".join(f"  {part},\n" for part in parts) + "]"
+            return f"[{', '.join(parts)}]"
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _key(key: str) -> str:
+    return key if _BARE.fullmatch(key) else json.dumps(key, ensure_ascii=False)

@@ -1,0 +1,22 @@
+"""What a profile's form cannot express: each module a subject, each rule told with its place."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from ..schema import ProfileData
+from ..toml_lines import TomlPath
+from . import charts, limits, names, parameters, registers
+
+Finding = tuple[TomlPath, str]
+"""Where something is wrong, and what."""
+
+RULES: tuple[Callable[[ProfileData], Iterator[Finding]], ...] = (
+    *parameters.PARAMETER_RULES,
+    *registers.REGISTER_RULES,
+    *names.NAME_RULES,
+    *limits.LIMIT_RULES,
+    *charts.CHART_RULES,
+)
+
+__all__ = ["RULES", "Finding"]

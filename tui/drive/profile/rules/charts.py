@@ -1,0 +1,162 @@
+"""Rules for state charts: what runs can be stopped, seen running, and seen in fault."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..schema import Chart, ProfileData
+from ..toml_lines import TomlPath
+
+RUN_ORDERS = frozenset({"forward", "reverse"})
+SURE_STOPS = ("stop", "quick-stop", "freewheel")
+"""Orders that bring a motor to rest in any family."""
+NOT_TURNING = frozenset({"blocked", "ready", "stopped"})
+
+
+def names_of_states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """States that transitions and orders name, and words to write with a place for them."""
+    for index, chart in enumerate(data.charts):
+        at: TomlPath = ("charts", index)
+        ids = [state.id for state in chart.states]
+        known = f"there are: {', '.join(ids)}."
+        for place, step in enumerate(chart.transitions):
+            for state in (step.source, step.target):
+                if state not in ids:
+                    yield (
+                        (*at, "transitions", place),
+                        f"chart {chart.id}: there is no state {state!r}; {known}",
+                    )
+        for place, order in enumerate(chart.orders):
+            here = (*at, "orders", place)
+            for state in order.states:
+                if state not in ids:
+                    yield here, f"order {order.id}: there is no state {state!r}; {known}"
+            if not order.words or not (order.parameter or chart.command):
+                yield (
+                    here,
+                    f"order {order.id}: nothing to write, or nowhere: it needs words, and a"
+                    " parameter or the chart's command.",
+                )
+        if chart.runs_in is not None and chart.runs_in not in {
+            state.id for state in chart.states if state.kind == "running"
+        }:
+            yield (
+                (*at, "runs_in"),
+                f"chart {chart.id}: runs_in {chart.runs_in!r} is no state of the kind running.",
+            )
+
+
+def states(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Each state of a chart can be seen."""
+    for index, chart in enumerate(data.charts):
+        for place, state in enumerate(chart.states):
+            at: TomlPath = ("charts", index, "states", place)
+            if state.value & ~state.mask:
+                yield (
+                    at,
+                    f"chart {chart.id}: state {state.id} has value bits outside its mask.",
+                )
+            for before in chart.states[:place]:
+                if not before.mask & ~state.mask and state.value & before.mask == before.value:
+                    yield (
+                        at,
+                        f"chart {chart.id}: state {state.id} is never seen: {before.id} above it"
+                        " fits each of its words, and the first that fits counts. Put it before,"
+                        " or give the other a wider mask.",
+                    )
+                    break
+
+
+def stops_always(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """A motor that can be run can be stopped, in whatever state it is."""
+    for index, chart in enumerate(data.charts):
+        if not _runs(chart):
+            continue
+        ways = [order for order in chart.orders if order.id in SURE_STOPS]
+        at: TomlPath = ("charts", index, "orders")
+        if not ways:
+            yield (
+                at,
+                f"chart {chart.id}: it can run a motor and has no stop: add an order with the id"
+                f" {', '.join(SURE_STOPS)}.",
+            )
+        elif not any(not order.states and not order.when for order in ways):
+            yield (
+                at,
+                f"chart {chart.id}: no stop holds in every state: one of its orders"
+                f" {', '.join(dict.fromkeys(order.id for order in ways))} must have neither"
+                " states nor when.",
+            )
+
+
+def running(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """An order to run leads to a state in which the drive is seen to run."""
+    for index, chart in enumerate(data.charts):
+        if not _runs(chart):
+            continue
+        kinds = {state.kind for state in chart.states}
+        if "running" not in kinds:
+            yield (
+                ("charts", index, "states"),
+                f"chart {chart.id}: it can run a motor and has no state of the kind running.",
+            )
+        if chart.runs_in is not None:
+            for state in chart.states:
+                if state.kind in NOT_TURNING and not _leads(chart, state.id, chart.runs_in):
+                    yield (
+                        ("charts", index, "runs_in"),
+                        f"chart {chart.id}: no command leads from {state.id} to {chart.runs_in}:"
+                        " a transition with a command is missing.",
+                    )
+    for index, chart in enumerate(data.charts):
+        led_to = {step.target for step in chart.transitions}
+        for place, state in enumerate(chart.states):
+            if chart.transitions and state.kind == "running" and state.id not in led_to:
+                yield (
+                    ("charts", index, "states", place),
+                    f"chart {chart.id}: no transition leads to the running state {state.id}.",
+                )
+
+
+def faults_seen(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """A tripped drive is seen as tripped."""
+    if data.faults.parameter:
+        return
+    for index, chart in enumerate(data.charts):
+        kinds = {state.kind for state in chart.states}
+        if kinds != {"unknown"} and "fault" not in kinds:
+            yield (
+                ("charts", index, "states"),
+                f"chart {chart.id}: a drive in fault would look healthy: add a state of the kind"
+                " fault, or faults.parameter with the word that holds the fault.",
+            )
+
+
+def conditions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Of several charts each but one says when it holds."""
+    without = [n for n, chart in enumerate(data.charts) if chart.when is None]
+    for index in without[1:]:
+        yield (
+            ("charts", index, "id"),
+            f"chart {data.charts[index].id}: it never holds, since"
+            f" {data.charts[without[0]].id} above it has no condition either: add when.",
+        )
+
+
+def _runs(chart: Chart) -> bool:
+    return any(order.id in RUN_ORDERS for order in chart.orders)
+
+
+def _leads(chart: Chart, source: str, goal: str) -> bool:
+    reached, left = {source}, [source]
+    while left:
+        at = left.pop()
+        for step in chart.transitions:
+            by_command = step.command is not None and step.edge_bit is None
+            if step.source == at and by_command and step.target not in reached:
+                reached.add(step.target)
+                left.append(step.target)
+    return goal in reached
+
+
+CHART_RULES = (names_of_states, states, stops_always, running, faults_seen, conditions)

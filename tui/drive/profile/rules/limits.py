@@ -1,0 +1,143 @@
+"""Rules for limits and for values that a profile proposes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tui.drive.values import is_enumeration, raw_range, type_range
+
+from ..schema import Parameter, ProfileData
+from ..toml_lines import TomlPath
+
+
+def circles(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Limits that lead back to where they began, and scales that follow each other."""
+    known = {parameter.code for parameter in data.parameters}
+    above: dict[str, set[str]] = {}
+    follows: dict[str, set[str]] = {}
+    for parameter in data.parameters:
+        if parameter.max_from in known:
+            above.setdefault(parameter.code, set()).add(parameter.max_from)
+        if parameter.min_from in known:
+            above.setdefault(parameter.min_from, set()).add(parameter.code)
+        if parameter.scale_by and parameter.scale_by.parameter in known:
+            follows.setdefault(parameter.code, set()).add(parameter.scale_by.parameter)
+    for index, parameter in enumerate(data.parameters):
+        if way := _circle(above, parameter.code):
+            key = "max_from" if parameter.max_from else "min_from"
+            yield (
+                ("parameters", index, key),
+                f"parameter {parameter.code}: its limits go round in a circle: {' <= '.join(way)}.",
+            )
+        if way := _circle(follows, parameter.code):
+            yield (
+                ("parameters", index, "scale_by"),
+                f"parameter {parameter.code}: its scale follows itself: {' by '.join(way)}.",
+            )
+
+
+def _circle(ways: dict[str, set[str]], start: str) -> list[str]:
+    """A way from a code back to itself; empty where there is none."""
+    open_ways = [[start]]
+    seen: set[str] = set()
+    while open_ways:
+        way = open_ways.pop()
+        for code in sorted(ways.get(way[-1], ())):
+            if code == start:
+                return [*way, code]
+            if code not in seen:
+                seen.add(code)
+                open_ways.append([*way, code])
+    return []
+
+
+def proposed_values(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Each value that is proposed or compared can be held by its parameter."""
+    parameters = {parameter.code: parameter for parameter in data.parameters}
+    names = {one.id: one.values for one in data.enumerations}
+    for place, code, raw in _proposed(data):
+        parameter = parameters.get(code)
+        if parameter is None:
+            continue
+        own = {**names.get(parameter.enumeration, {}), **parameter.values}
+        if fault := _refused(parameter, raw, own):
+            yield place, f"{code} = {raw}: {fault}"
+
+
+def _proposed(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
+    for index, source in enumerate(data.control_sources):
+        for place, one in enumerate(source.settings):
+            yield ("control_sources", index, "settings", place), one.parameter, one.value
+    yield from _of_the_line(data)
+    for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
+        if order is not None and not order.bit:
+            yield ("memory", key, "raw"), order.parameter, order.raw
+    for index, parameter in enumerate(data.parameters):
+        if parameter.factory is not None and is_enumeration(parameter):
+            yield ("parameters", index, "factory"), parameter.code, parameter.factory
+
+
+def _of_the_line(data: ProfileData) -> Iterator[tuple[TomlPath, str, int]]:
+    for index, setting in enumerate(data.link.settings):
+        at: TomlPath = ("link", "settings", index)
+        if setting.factory is not None:
+            yield (*at, "factory"), setting.parameter, setting.factory
+        for place, choice in enumerate(setting.choices):
+            yield (*at, "choices", place), setting.parameter, choice.raw
+    if watch := data.communication_fault:
+        if watch.off is not None:
+            yield ("communication_fault", "off"), watch.timeout, watch.off
+        for place, reaction in enumerate(watch.reactions):
+            yield ("communication_fault", "reactions", place), watch.reaction, reaction.raw
+
+
+def _refused(parameter: Parameter, raw: int, names: dict[str, str]) -> str:
+    """Why a parameter cannot hold a raw value; empty where it can."""
+    if str(raw) in names:
+        return ""
+    low, high = type_range(parameter)
+    # a word may be written as it goes on the wire, whatever its sign
+    if not low <= raw <= high and not 0 <= raw <= 0xFFFF:
+        return f"does not fit {parameter.type}: {low} to {high}."
+    if names and is_enumeration(parameter):
+        told = ", ".join(f"{key} {text}" for key, text in names.items())
+        return f"is none of its values: {told}."
+    least, most = raw_range(parameter)
+    if not least <= raw <= most:
+        return f"is outside its limits, {least} to {most}."
+    return ""
+
+
+def factory_settings(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Factory settings that follow another parameter, against that one's own factory setting."""
+    factory = {p.code: p.factory for p in data.parameters}
+    for index, parameter in enumerate(data.parameters):
+        by = parameter.factory_by
+        if by is None:
+            continue
+        place: TomlPath = ("parameters", index, "factory_by")
+        for raw in by.raws:
+            if not raw.lstrip("-").isdecimal():
+                yield place, f"parameter {parameter.code}: {raw!r} is not a raw value in decimal."
+        if by.raws.get(str(factory.get(by.parameter))) != parameter.factory:
+            yield (
+                place,
+                f"parameter {parameter.code}: factory is not what factory_by gives for the"
+                f" factory setting of {by.parameter}.",
+            )
+
+
+def start_up(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """A parameter stands in one step of the first commissioning."""
+    seen: dict[str, str] = {}
+    for index, step in enumerate(data.start_up):
+        for code in step.parameters:
+            if code in seen:
+                yield (
+                    ("start_up", index),
+                    f"step {step.step}: {code} stands in step {seen[code]} already.",
+                )
+            seen.setdefault(code, step.step)
+
+
+LIMIT_RULES = (circles, proposed_values, factory_settings, start_up)

@@ -1,0 +1,88 @@
+"""Rules for registers: what lies where, and by which functions it can be had."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..schema import Parameter, ProfileData
+from ..toml_lines import TomlPath
+
+
+def overlaps(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """Two parameters in one register are fields of it that share no bit."""
+    held: dict[tuple[int, int], list[Parameter]] = {}
+    for index, parameter in enumerate(data.parameters):
+        long = parameter.type.endswith("32")
+        for address in range(parameter.address, parameter.address + (2 if long else 1)):
+            others = held.setdefault((parameter.function, address), [])
+            for other in others:
+                if fault := _clash(parameter, other, address):
+                    yield ("parameters", index, "address"), f"parameter {parameter.code}: {fault}"
+                    break
+            others.append(parameter)
+
+
+def _clash(parameter: Parameter, other: Parameter, address: int) -> str:
+    """Why two parameters cannot both lie at an address; empty where they can."""
+    if parameter.type.endswith("32") or other.type.endswith("32"):
+        pair = parameter if parameter.type.endswith("32") else other
+        return (
+            f"address {address} is also in {other.code}: {pair.code} is {pair.type} and takes"
+            f" {pair.address} and {pair.address + 1}."
+        )
+    bits, others = (p.mask << p.shift for p in (parameter, other))
+    if not bits & others:
+        return ""
+    if bits == others == 0xFFFF:
+        return f"address {address} is already that of {other.code}; fields need mask and shift."
+    return f"bits 16#{bits & others:04X} of address {address} are also those of {other.code}."
+
+
+def functions(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """What is read and written needs its functions."""
+    codes = {function.code for function in data.functions}
+    read_by = {parameter.function for parameter in data.parameters}
+    if 3 not in codes and (3 in read_by or 4 not in codes):
+        yield ("functions",), "function 3 is missing: nothing could be read."
+    writes = codes & {6, 16}
+    for index, parameter in enumerate(data.parameters):
+        place = ("parameters", index)
+        if parameter.function == 4 and 4 not in codes:
+            yield (
+                (*place, "function"),
+                f"parameter {parameter.code}: function 4 is not among the functions: add it.",
+            )
+        if parameter.access == "r" or parameter.forbidden:
+            continue
+        if parameter.type.endswith("32") and 16 not in codes:
+            yield (
+                (*place, "access"),
+                f"parameter {parameter.code}: two words are written by function 16, which is not"
+                " among the functions: add it, or set access r.",
+            )
+        elif not writes:
+            yield (
+                (*place, "access"),
+                f"parameter {parameter.code}: neither function 6 nor 16 is among the functions:"
+                " nothing can be written.",
+            )
+
+
+def whole_words(data: ProfileData) -> Iterator[tuple[TomlPath, str]]:
+    """A command needs no read before it: its word is nobody else's."""
+    fields = {p.code for p in data.parameters if p.shift or p.mask != 0xFFFF}
+    for index, chart in enumerate(data.charts):
+        places: list[tuple[TomlPath, str]] = [(("charts", index, "command"), chart.command)]
+        places += [
+            (("charts", index, "orders", n, "parameter"), order.parameter)
+            for n, order in enumerate(chart.orders)
+        ]
+        for place, code in places:
+            if code in fields:
+                yield (
+                    place,
+                    f"chart {chart.id}: {code} is some bits of a word; a command is a whole word.",
+                )
+
+
+REGISTER_RULES = (whole_words, overlaps, functions)

@@ -1,0 +1,223 @@
+"""A profile's tables with the rows that it shares with others, and where each of them stands.
+
+`profile.rows_from` names files beside the profile. Their tables come first; a row of the profile
+with the same key (code, id, raw) changes fields of the shared one; any other is added behind the
+row that stands above it in its file, or at the end.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path, PurePosixPath
+from typing import Any
+
+import tomli
+
+from ..errors import ProfileError
+from .toml_lines import TomlPath, toml_lines
+
+ROW_KEYS: Mapping[TomlPath, str] = {
+    ("sources",): "id",
+    ("errata",): "place",
+    ("functions",): "code",
+    ("blocks",): "id",
+    ("exceptions",): "code",
+    ("charts",): "id",
+    ("command_examples",): "word",
+    ("references",): "parameter",
+    ("teachable_references",): "parameter",
+    ("faults", "codes"): "raw",
+    ("faults", "help"): "raw",
+    ("control_sources",): "id",
+    ("start_up",): "step",
+    ("connectors",): "name",
+    ("groups",): "name",
+    ("enumerations",): "id",
+    ("parameters",): "code",
+}
+"""By the place of a list of rows, the field that tells its rows apart."""
+
+
+@dataclass(frozen=True)
+class SourceText:
+    """One file of a profile."""
+
+    file: str
+    text: str
+
+    @cached_property
+    def lines(self) -> Mapping[TomlPath, int]:
+        """Line by path; worked out where somebody asks."""
+        return toml_lines(self.text)
+
+
+RowOrigin = tuple[SourceText, TomlPath]
+
+
+@dataclass(frozen=True)
+class ProfileTables:
+    """The tables of a profile as they count, with the file that each row came from."""
+
+    tables: dict[str, Any]
+    origins: Mapping[TomlPath, list[RowOrigin]] = field(default_factory=dict)
+    """By path, where it stands, the profile's own file first; rows only, if several files."""
+
+    def place(self, path: TomlPath) -> tuple[str, int]:
+        """File and line of a path; of the row that it is in, where it stands nowhere itself."""
+        for length in range(len(path), -1, -1):
+            for source, start in self.origins.get(path[:length], ()):
+                if (line := source.lines.get((*start, *path[length:]))) is not None:
+                    return source.file, line
+        for length in range(len(path), -1, -1):
+            for source, start in self.origins.get(path[:length], ()):
+                for rest in range(len(path), length - 1, -1):
+                    line = source.lines.get((*start, *path[length:rest]))
+                    if line is not None:
+                        return source.file, line
+        return "", 1
+
+
+def read_tables(path: Path, packaged: Path) -> ProfileTables:
+    """The tables of a profile file with its shared rows; raises ProfileError.
+
+    `packaged` is the folder in which a file of shared rows is looked for that is not beside the
+    profile.
+    """
+    own = source_text(path)
+    tables = parsed(own)
+    head = tables.get("profile")
+    names = head.get("rows_from", []) if isinstance(head, dict) else []
+    merging = _Merging()
+    if not isinstance(names, list) or not names:
+        merging.origins[()] = [(own, ())]
+        return ProfileTables(_word_order(tables), merging.origins)
+    whole: dict[str, Any] = {}
+    for name in names:
+        shared = source_text(_shared_file(own, path, packaged, name))
+        merging.into(whole, parsed(shared), shared, (), ())
+    without = head.get("without", []) if isinstance(head, dict) else []
+    merging.drop(whole, without if isinstance(without, list) else [], own)
+    merging.into(whole, tables, own, (), ())
+    return ProfileTables(_word_order(whole), merging.origins)
+
+
+def source_text(path: Path) -> SourceText:
+    """The text of a file; raises ProfileError."""
+    try:
+        return SourceText(str(path), path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ProfileError(f"{path}: cannot be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise ProfileError(f"{path}: byte {error.start} is not UTF-8 text.") from error
+
+
+def parsed(source: SourceText) -> dict[str, Any]:
+    """The tables of a text; raises ProfileError with the line where it is no TOML."""
+    try:
+        return tomli.loads(source.text)
+    except tomli.TOMLDecodeError as error:
+        line = getattr(error, "lineno", 1)
+        raise ProfileError(f"{source.file}:{line}: not valid TOML: {error}.") from error
+
+
+def _shared_file(own: SourceText, path: Path, packaged: Path, name: object) -> Path:
+    place = f"{own.file}:{own.lines.get(('profile', 'rows_from'), 1)}"
+    if not isinstance(name, str) or PurePosixPath(name).is_absolute() or ".." in Path(name).parts:
+        raise ProfileError(f"{place}: rows_from: {name!r} is no file beside the profile.")
+    for folder in (path.parent, packaged):
+        if (found := folder / name).is_file():
+            return found
+    raise ProfileError(f"{place}: rows_from: there is no file {name!r} beside the profile.")
+
+
+def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
+    """The tables, with the family's order of words at each 32-bit value that tells none."""
+    reading, rows = tables.get("reading"), tables.get("parameters")
+    order = reading.get("low_word_first") if isinstance(reading, dict) else None
+    if isinstance(order, bool) and isinstance(rows, list):
+        for row in rows:
+            if isinstance(row, dict) and row.get("type") in ("uint32", "int32"):
+                row.setdefault("low_word_first", order)
+    return tables
+
+
+class _Merging:
+    """Tables of several files put together, later files over earlier ones."""
+
+    def __init__(self) -> None:
+        self.origins: dict[TomlPath, list[RowOrigin]] = {}
+
+    def into(
+        self,
+        whole: dict[str, Any],
+        tables: Mapping[str, Any],
+        source: SourceText,
+        at: TomlPath,
+        there: TomlPath,
+    ) -> None:
+        """Put one file's table over what there is, at the same path."""
+        self.origins.setdefault(at, []).insert(0, (source, there))
+        for key, value in tables.items():
+            path = (*at, key)
+            held = whole.get(key)
+            if path in ROW_KEYS and isinstance(value, list):
+                rows = whole[key] = held if isinstance(held, list) else []
+                self._rows(rows, value, source, path, (*there, key))
+            elif isinstance(value, dict) and not (at and isinstance(at[-1], int)):
+                inner = whole[key] = held if isinstance(held, dict) else {}
+                self.into(inner, value, source, path, (*there, key))
+            else:
+                whole[key] = value
+
+    def _rows(
+        self,
+        rows: list[Any],
+        value: list[Any],
+        source: SourceText,
+        at: TomlPath,
+        there: TomlPath,
+    ) -> None:
+        key = ROW_KEYS[at]
+        # rows of one file do not change each other: two of one key are a fault to be told
+        index = {row.get(key): n for n, row in enumerate(rows) if isinstance(row, dict)}
+        order = list(range(len(rows)))
+        above = -1
+        for number, row in enumerate(value):
+            known = isinstance(row, dict) and row.get(key) in index
+            place = index[row[key]] if known else len(rows)
+            if not known:
+                rows.append({} if isinstance(row, dict) else row)
+                order.insert(order.index(above) + 1 if above in order else len(order), place)
+            if isinstance(row, dict):
+                self.into(rows[place], row, source, (*at, place), (*there, number))
+            above = place
+        self._reorder(rows, at, order)
+
+    def drop(self, whole: dict[str, Any], codes: list[Any], own: SourceText) -> None:
+        """Leave out shared parameters."""
+        rows = whole.get("parameters")
+        held = [r.get("code") for r in rows] if isinstance(rows, list) else []
+        for code in codes:
+            if code not in held:
+                line = own.lines.get(("profile", "without"), 1)
+                raise ProfileError(f"{own.file}:{line}: without: no shared row has {code!r}.")
+        if not isinstance(rows, list):
+            return
+        kept = [place for place, code in enumerate(held) if code not in codes]
+        self._reorder(rows, ("parameters",), kept)
+
+    def _reorder(self, rows: list[Any], at: TomlPath, order: list[int]) -> None:
+        """Keep these rows, in this order, and know on where each came from."""
+        rows[:] = [rows[place] for place in order]
+        moved = {old: new for new, old in enumerate(order)}
+        length = len(at)
+        origins: dict[TomlPath, list[RowOrigin]] = {}
+        for path, origin in self.origins.items():
+            place = path[length] if path[:length] == at and len(path) > length else None
+            if not isinstance(place, int):
+                origins[path] = origin
+            elif place in moved:
+                origins[(*at, moved[place], *path[length + 1 :])] = origin
+        self.origins = origins
