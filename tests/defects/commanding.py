@@ -149,8 +149,8 @@ DEFECTS = (
     Defect(
         "reference-clamped",
         "tui/session/command",
-        "_check_limits(profile, hertz, readings)\n    conversion",
-        "number = within_limits(profile, hertz, readings)\n    conversion",
+        "_check_limits(profile, hertz, readings)\n    if",
+        "number = within_limits(profile, hertz, readings)\n    if",
         "A reference that was mistyped runs the motor at its limit instead of being refused.",
         ("tests/session/test_command.py::test_references_that_are_refused",),
     ),

@@ -18,7 +18,7 @@ TEACH = "Teach the scale of a raw value: type what the drive's own display shows
 GIVE_BY = "Give the reference by a preset whose scale was taught, or no more; asks."
 TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
 
-RESET = "Reset a fault; armed, asks. A run command that stands elsewhere may start the motor."
+RESET_HELP = "Reset a fault; armed, asks. A run command that stands elsewhere may start the motor."
 INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V. Never on a real line."
 
 COMMAND_ACTIONS = (
@@ -28,7 +28,7 @@ COMMAND_ACTIONS = (
         ("run_line('reverse')", "v", "reverse", REVERSE),
         ("run_line('reference')", "f", "ref", REFER),
     ),
-    *on((MONITOR, FAULTS), ("reset", "x", "reset", RESET)),
+    *on((MONITOR, FAULTS), ("reset", "x", "reset", RESET_HELP)),
     *on(
         (MONITOR,),
         (
