@@ -60,7 +60,8 @@ def telling_drive(folder: Path) -> Iterator[Drive]:
 
 def main() -> None:
     """Serve until nobody tells anything any more."""
-    spec = DriveSpec("atv71", 1, run_hz=RUN_HZ, wander=True)
+    # it goes on where nobody asks it between two programs
+    spec = DriveSpec("atv71", 1, sets={"SLL": 0}, run_hz=RUN_HZ, wander=True)
     with Simulation([spec], timing=LineTiming(BAUD, FORMAT, True)) as simulation:
         simulation.serve_pty(sys.argv[1])
         print("ready", flush=True)
