@@ -20,7 +20,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
 async def asked(made: Bench) -> None:
     assert made.app.opened is not None
     made.app.opened.simulation = made.simulation
-    await made.pilot.press("D")
+    await made.pilot.press("l")
     await until(made.pilot, lambda: isinstance(made.app.screen, Ask))
 
 
@@ -49,6 +49,6 @@ async def test_a_wrong_text_is_told_and_sets_nothing() -> None:
 
 async def test_on_a_real_line_it_asks_nothing() -> None:
     async with bench("atv312") as made:
-        await made.pilot.press("D")
+        await made.pilot.press("l")
         await until(made.pilot, lambda: NOT_SIMULATED[:40] in said(made.app))
         assert not isinstance(made.app.screen, Ask)

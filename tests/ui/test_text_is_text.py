@@ -98,7 +98,15 @@ async def rating(made: Bench) -> None:
 async def inputs(made: Bench) -> None:
     assert made.app.opened is not None
     made.app.opened.simulation = made.simulation
-    await dialog(made, "D")
+    await dialog(made, "l")
+
+
+async def teaching(made: Bench) -> None:
+    await made.pilot.press("3")
+    await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
+    await made.pilot.press("slash", *"5.01", "enter")
+    await until(made.pilot, lambda: "5.01" in shown(made.app, "detail"))
+    await dialog(made, "L")
 
 
 async def parameters(made: Bench) -> None:
@@ -177,6 +185,7 @@ async def connection(made: Bench) -> None:
 WAYS: dict[str, tuple[str, Way]] = {
     "monitor": ("atv71", monitor),
     "rating": ("atv21", rating),
+    "teaching": ("powerdrive", teaching),
     "inputs": ("atv21", inputs),
     "parameters": ("atv71", parameters),
     "scanner": ("atv71", blocks),
@@ -185,6 +194,7 @@ WAYS: dict[str, tuple[str, Way]] = {
 }
 ASKED = {
     "rating",
+    "teaching",
     "inputs",
     "Ctrl+S and report of Parameters",
     "Ctrl+S of Blocks",

@@ -53,7 +53,7 @@ COMMAND_ACTIONS = (
         ("take_control", "t", "", TAKE),
         ("hand_back", "g", "", HAND_BACK),
         ("take_over", "T", "", TAKE_OVER),
-        ("inputs", "D", "", INPUTS),
+        ("inputs", "l", "", INPUTS),
     ),
 )
 TEACH_ACTIONS = (
