@@ -14,12 +14,12 @@ COAST = "Let the motor coast; asks, needs no arming. A coasting hoist falls."
 BRAKE = "Brake by direct current, where the drive has that; asks, needs no arming."
 TAKE = "Take the control from the terminals, where a drive has that; armed, locked only, asks."
 HAND_BACK = "Give the control back to the terminals; a run command waiting there counts then; asks."
-TEACH = "Teach the scale of a raw value: type what the drive's own display shows."
-GIVE_BY = "Give the reference by a preset whose scale was taught, or no more; asks."
+TEACH = "Teach the scale of a raw value by the drive's own display."
+GIVE_BY = "Give the reference by a taught preset, or no more; asks."
 TAKE_OVER = "Look after a motor that an earlier program started; sends nothing, armed only."
 
-RESET_HELP = "Reset a fault; armed, asks. A run command that stands elsewhere may start the motor."
-INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V. Never on a real line."
+RESET_HELP = "Reset a fault; armed, asks. A waiting run command then runs."
+INPUTS = "Set inputs of a simulated drive: LI1=1, AI1=5V."
 
 COMMAND_ACTIONS = (
     *on(
