@@ -18,7 +18,15 @@ from typing import Any
 
 import pytest
 
-from tests.programs import DRIVEPANEL, PATIENCE, Served, drivepanel, served, wait_until
+from tests.programs import (
+    DRIVEPANEL,
+    PATIENCE,
+    Served,
+    drivepanel,
+    served,
+    simulated,
+    wait_until,
+)
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.spec import FaultRates
 
@@ -492,3 +500,12 @@ def test_status_of_every_family(family: str) -> None:
         "Device", "State", "Direction", "Fault", "Alarms", "Commanded by", "Reference from",
         "From here", "Line watch",
     ]  # fmt: skip
+
+
+def test_a_simulated_line_begins_with_the_settings_of_its_first_drive(tmp_path: Path) -> None:
+    """Who simulates a drive and reads it, names no baud and no format for it."""
+    link = tmp_path / "line"
+    with simulated("powerdrive@1", "--pty", str(link)) as there:
+        assert f"serial:{link},19200,8N2." in there.ready
+        done = drivepanel("read", f"serial:{link}", "5.01", "-p", "powerdrive")
+    assert done.returncode == 0, done.stderr

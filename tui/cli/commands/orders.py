@@ -247,7 +247,10 @@ def reset(
     arm: bool,
     read_only: bool,
 ) -> None:
-    """Reset a drive's fault. Its cause must be gone; starts no motor."""
+    """Reset a drive's fault. Its cause must be gone.
+
+    It commands no run; a run command that waits at the terminals may start the motor.
+    """
     need_arming(arm, "reset writes the drive's command word and ends its fault")
 
     async def work(console: DriveConsole) -> str:

@@ -17,6 +17,8 @@ from ..shared.standard_input import stay_in_background, typed_lines
 if TYPE_CHECKING:
     from tui.simulator import DriveSpec, FaultRates, Simulation
 
+USUAL = (19200, "8E1")
+"""Baud and format of a LINE that names none."""
 FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", "foreign")
 
 
@@ -26,8 +28,15 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
 @click.option("--serial", "serial", metavar="PATH", help="A serial port.")
 @click.option("--tcp", metavar="HOST:PORT", help="Modbus TCP.")
 @click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="RTU over TCP.")
-@click.option("--baud", type=click.IntRange(min=300), default=19200, show_default=True)
-@click.option("--format", "form", default="8E1", show_default=True, metavar="8E1|8N2|...")
+@click.option(
+    "--baud", type=click.IntRange(min=300), help="Instead of what the first drive comes with."
+)
+@click.option(
+    "--format",
+    "form",
+    metavar="8E1|8N2|...",
+    help="Instead of what the first drive comes with.",
+)
 @click.option(
     "--any-settings",
     is_flag=True,
@@ -71,8 +80,8 @@ def simulate(
     serial: str | None,
     tcp: str | None,
     rtu_tcp: str | None,
-    baud: int,
-    form: str,
+    baud: int | None,
+    form: str | None,
     any_settings: bool,
     real_time: bool,
     sets: tuple[str, ...],
@@ -86,6 +95,7 @@ def simulate(
     Lines such as "2: LI1=1, AI1=5V" on standard input set the inputs of the drive at address 2;
     "2:" tells them.
     """
+    from tui.drive.profile.library import load
     from tui.simulator import LineTiming, Simulation, parse_drives
 
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
@@ -94,9 +104,10 @@ def simulate(
         replace(spec, run_hz=run_hz, wander=bool(run_hz))
         for spec in _configured(parse_drives(",".join(drives)), sets, protects)
     ]
+    own = load(specs[0].profile).data.link
     simulation = Simulation(
         specs,
-        timing=LineTiming(baud, form.upper(), real_time),
+        timing=LineTiming(baud or own.baud, (form or own.format).upper(), real_time),
         faults=_rates(faults),
         seed=seed,
         any_settings=any_settings,
@@ -135,7 +146,9 @@ def _serve(
     """Start serving; the place as a LINE."""
     if pty is not None:
         simulation.serve_pty(pty)
-        return f"serial:{pty}"
+        timing = simulation.timing
+        usual = (timing.baud, timing.format) == USUAL
+        return f"serial:{pty}" if usual else f"serial:{pty},{timing.baud},{timing.format}"
     if serial is not None:
         from tui.bus.transport.ports import open_serial
 
