@@ -122,7 +122,7 @@ def test_a_terminal_that_stands_still_does_not_stop_the_polling(
     ssh_host: SshHost, terminal_with: Callable[[list[str]], Terminal], tmp_path: Path
 ) -> None:
     with (
-        simulated("atv71@2", "--tcp", "127.0.0.1:0", "--run", "50") as simulation,
+        simulated("atv71@2", "--tcp", "127.0.0.1:0", "--run", "50", "--set", "SLL=0") as simulation,
         Counter(port_of(simulation.ready)).at_work() as counter,
     ):
         line = f"tcp:127.0.0.1:{counter.port}"
