@@ -52,6 +52,7 @@ class SlowDrive(OneDrive):
         *,
         priority: Priority = Priority.POLL,
         function: int = 3,
+        max_age: float = 0.0,
     ) -> Reply:
         if address <= STATUS < address + count and self._coming:
             self.registers[STATUS] = self._coming.pop(0)

@@ -75,6 +75,7 @@ class FaultyLine(OneDrive):
         *,
         priority: Priority = Priority.POLL,
         function: int = 3,
+        max_age: float = 0.0,
     ) -> Reply:
         fault = self.faults.pop(0) if self.faults else None
         self.addresses.append(address)

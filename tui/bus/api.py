@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from .limits import Limits
     from .link import Link
     from .schedule.pace import Pace
+    from .shared_facts import SharedFacts
 
 __all__ = [
     "DeviceState",
@@ -78,6 +79,10 @@ class ModbusLine(Protocol):
         """Shares the line's time out among regular polls."""
 
     @property
+    def facts(self) -> SharedFacts:
+        """What the programs on the line know of each other: who commands, who stopped."""
+
+    @property
     def state(self) -> LineState:
         """Whether the line can be used now, and if not, why and when it is tried again."""
 
@@ -109,8 +114,12 @@ class ModbusLine(Protocol):
         *,
         priority: Priority = Priority.POLL,
         function: int = 3,
+        max_age: float = 0.0,
     ) -> Reply:
-        """Read `count` registers by function 3, or input registers by 4."""
+        """Read `count` registers by function 3, or input registers by 4.
+
+        What was read for another program up to `max_age` seconds ago is taken in its place.
+        """
 
     async def write(
         self,

@@ -23,6 +23,10 @@ class PortBusy(LineError):
         super().__init__(f"{path} is {who}. Close that program, or choose another port.")
 
 
+class NotShared(LineError):
+    """A line is owned by another program, which does not share it with this one."""
+
+
 class PortMissing(LineError):
     """A serial port is not there; `ports` are those that are."""
 
@@ -60,6 +64,7 @@ class Superseded(LineError):
     """A write that was never sent, because a newer one of the same register took its place."""
 
     def __init__(self, device: int, register: int) -> None:
+        self.device, self.register = device, register
         super().__init__(
             f"A newer value for register {register} of device {device} took the place of this"
             " one, which was not sent."

@@ -47,6 +47,7 @@ from .requests import (
     write_request,
 )
 from .schedule.pace import Pace
+from .shared_facts import SharedFacts
 from .trace import Frame
 
 T = TypeVar("T")
@@ -71,6 +72,7 @@ class FakeLine:
         self.read_only = read_only
         self.timing = Timing()
         self.pace = Pace()
+        self.facts = SharedFacts()
         self.devices = {n: FakeDevice(n, words) for n, words in (registers or {}).items()}
         """Those that are there; may be added to, and replaced by some of another kind."""
         self.requests: list[Request] = []
@@ -161,8 +163,9 @@ class FakeLine:
         *,
         priority: Priority = Priority.POLL,
         function: int = 3,
+        max_age: float = 0.0,
     ) -> Reply:
-        """Read registers."""
+        """Read registers; nothing is shared here, so each is read anew."""
         held = self._device(device).held
         request = read_request(device, address, count, function)
         words = await self._exchange(request, "read", lambda: held(address, count))

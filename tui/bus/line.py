@@ -7,6 +7,7 @@ import logging
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 
 from .errors import RequestRefused, WrongReply
 from .limits import Limits, send_refusal
@@ -33,10 +34,12 @@ from .requests import (
     write_request,
 )
 from .schedule.engine import Engine
-from .schedule.pace import Pace
 from .schedule.patience import Devices
 from .schedule.queue import Job
 from .schedule.worker import ThreadWork, Worker
+from .share.place import SharePlace
+from .share.sharing import Sharing
+from .shared_facts import Program, SharedFacts
 from .trace import Frame
 
 __all__ = [
@@ -78,13 +81,18 @@ class Line:
         read_only: bool = False,
         timing: Timing | None = None,
         clock: Callable[[], float] = time.monotonic,
+        place: SharePlace | None = None,
+        program: Program | None = None,
     ) -> None:
         self.link = link
         self.read_only = read_only
         self.timing = timing or timing_of(link)
-        self.pace = Pace()
+        self.facts = SharedFacts(program)
+        """What the programs on the line know of each other."""
+        share = partial(Sharing, place) if place is not None else None
+        self._engine = Engine(link, self.timing, clock, self.facts, share)
+        self.pace = self._engine.pace
         """Shares the line's time out among regular polls."""
-        self._engine = Engine(link, self.timing, clock)
 
     def open(self, *, wait: float | None = None) -> None:
         """Start the line; it connects, and reconnects, by itself.
@@ -133,9 +141,14 @@ class Line:
         *,
         priority: Priority = Priority.POLL,
         function: int = 3,
+        max_age: float = 0.0,
     ) -> Reply:
-        """Read `count` registers by function 3, or input registers by 4."""
-        return await self._ask(read_request(device, address, count, function), priority)
+        """Read `count` registers by function 3, or input registers by 4.
+
+        What was read for another program up to `max_age` seconds ago is taken in its place.
+        """
+        request = read_request(device, address, count, function)
+        return await self._ask(request, priority, max_age=max_age)
 
     async def write(
         self,
@@ -238,6 +251,7 @@ class Line:
         *,
         replaceable: bool = False,
         forbidden: Callable[[], str] | None = None,
+        max_age: float = 0.0,
     ) -> Reply:
         """Check a request, queue it, await its reply."""
         limits = limits or self._devices[request.device].limits
@@ -245,6 +259,7 @@ class Line:
         if reason:
             raise RequestRefused(reason)
         job = Job(request, priority, limits, replaceable=replaceable, forbidden=forbidden)
+        job.max_age = max_age
         self._engine.submit(job)
         return await asyncio.wrap_future(job.answer)
 

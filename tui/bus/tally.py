@@ -31,6 +31,11 @@ class Tally:
         else:
             self.timeouts += 1
 
+    def copy(self, counters: LineCounters) -> None:
+        """Take over the counts of the program that owns the line."""
+        for name in LineCounters.__slots__:
+            setattr(self, name, getattr(counters, name))
+
     def frozen(self) -> LineCounters:
         """The counts of this moment."""
         return LineCounters(**{name: getattr(self, name) for name in LineCounters.__slots__})

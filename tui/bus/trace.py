@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from dataclasses import dataclass
+from time import monotonic
 from typing import Literal
 
 FrameDirection = Literal["out", "in"]
@@ -20,17 +22,34 @@ class Frame:
     """What the frame is: empty for a request or its reply, else why it is out of the ordinary."""
 
 
+LOOKED_LATELY = 5.0
+
+
 class Trace:
     """A bounded log of frames, written by the line's thread and read by any."""
 
     def __init__(self, length: int) -> None:
         self._frames: deque[Frame] = deque(maxlen=length)
+        self.count = 0
+        """Frames that were ever kept."""
+        self._looked = -math.inf
 
     def add(self, time: float, direction: FrameDirection, data: bytes, note: str = "") -> None:
         """Keep a frame; the oldest gives way."""
-        self._frames.append(Frame(time, direction, bytes(data), note))
+        self.append(Frame(time, direction, bytes(data), note))
+
+    def append(self, frame: Frame) -> None:
+        """Keep a frame that is made."""
+        self._frames.append(frame)
+        self.count += 1
 
     def frames(self) -> tuple[Frame, ...]:
         """The frames kept, oldest first."""
+        self._looked = monotonic()
         # copy() runs without giving up the interpreter, so no append comes in between
         return tuple(self._frames.copy())
+
+    @property
+    def looked_at(self) -> bool:
+        """Whether somebody looked at the frames in the last seconds."""
+        return monotonic() - self._looked < LOOKED_LATELY

@@ -21,18 +21,22 @@ from ..transport.serial_thread import ThreadedSerial
 from ..transport.tcp import TcpTransport
 from .backoff import pause
 from .dispatcher import Dispatcher
+from .inside import SharedLine
 
 log = logging.getLogger(__name__)
 
 
-def open_port(link: SerialLink) -> Transport:
-    """Open a serial port for Modbus. Raises PortBusy, PortMissing, PortRefused."""
-    port = open_serial(link.path, link.baud, link.format)
+def open_port(link: SerialLink, *, alone: bool = True) -> Transport:
+    """Open a serial port for Modbus; not `alone`: beside a program that holds it.
+
+    Raises PortBusy, PortMissing, PortRefused.
+    """
+    port = open_serial(link.path, link.baud, link.format, alone=alone)
     note = ""
     if is_pseudo_terminal(link.path):
         if port.parity != link.format[1]:
             note = f"A pseudo-terminal has no parity: opened with {port.parity}."
-    elif others := other_openers(link.path):
+    elif alone and (others := other_openers(link.path)):
         note = f"{others} has the port open too; requests of two programs disturb each other."
     return PosixSerial(port, note) if os.name == "posix" else ThreadedSerial(port, note)
 
@@ -52,6 +56,33 @@ async def connect_tcp(link: TcpLink | RtuTcpLink, timeout: float) -> Transport:
     raise LineLost(f"{label(link)} cannot be reached: {reason}")
 
 
+async def open_master(
+    link: Link,
+    around: LineContext,
+    wake: Callable[[], None],
+    *,
+    alone: bool = True,
+    opened: Callable[[str], None] = lambda _: None,
+) -> Master:
+    """Open a line for requests; `opened` is told of it, with what is to be said of the port.
+
+    Raises the line's errors.
+    """
+    wire_time = False
+    match link:
+        case SerialLink():
+            transport = open_port(link, alone=alone)
+            wire_time = not is_pseudo_terminal(link.path)
+        case TcpLink() | RtuTcpLink():
+            transport = await connect_tcp(link, around.timing.connect_timeout)
+    opened(transport.note)
+    if isinstance(link, TcpLink):
+        return TcpMaster(transport, around, wake)
+    if around.timing.wire_time is not None:
+        wire_time = around.timing.wire_time
+    return RtuMaster(transport, link, around, wake, wire_time=wire_time)
+
+
 class Connection:
     """The life of a line in its loop; `changed` hears of every new state."""
 
@@ -61,7 +92,9 @@ class Connection:
         around: LineContext,
         dispatcher: Dispatcher,
         changed: Callable[[LineState, LineError | None], None],
+        shared: SharedLine | None = None,
     ) -> None:
+        self._shared = shared
         self._link = link
         self._around = around
         self._dispatcher = dispatcher
@@ -93,7 +126,11 @@ class Connection:
 
     async def _once(self) -> None:
         """One connection from opening to loss; always raises."""
-        master = await self._open()
+        if self._shared is not None:
+            await self._shared.own(self._say_of_owner)
+        master = await open_master(
+            self._link, self._around, self._dispatcher.wake, opened=self._say_opened
+        )
         try:
             self.refusal = None
             self._failures = 0
@@ -101,21 +138,15 @@ class Connection:
         finally:
             master.close()
 
-    async def _open(self) -> Master:
-        link, wake, timing = self._link, self._dispatcher.wake, self._around.timing
-        wire_time = False
-        match link:
-            case SerialLink():
-                transport = open_port(link)
-                wire_time = not is_pseudo_terminal(link.path)
-            case TcpLink() | RtuTcpLink():
-                transport = await connect_tcp(link, timing.connect_timeout)
-        self._say(LineStatus.CONNECTED, transport.note)
-        if isinstance(link, TcpLink):
-            return TcpMaster(transport, self._around, wake)
-        if timing.wire_time is not None:
-            wire_time = timing.wire_time
-        return RtuMaster(transport, link, self._around, wake, wire_time=wire_time)
+    def _say_opened(self, note: str) -> None:
+        self._say(LineStatus.CONNECTED, note)
+
+    def _say_of_owner(self, status: LineStatus, text: str) -> None:
+        """What the program tells that owns the line; its requests are its own business."""
+        if status is LineStatus.CONNECTED:
+            self.refusal = None
+            self._failures = 0
+        self._say(status, text)
 
     def _say(
         self,

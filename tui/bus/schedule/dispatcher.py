@@ -20,9 +20,11 @@ from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import BROADCAST, Read
 from ..result import ExchangeResult, Piece, ResultKind
+from ..shared_facts import SharedFacts
 from ..tally import Tally
 from .patience import Devices
 from .queue import Job, JobQueue
+from .shared_values import SharedValues
 
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""
@@ -41,7 +43,10 @@ class Dispatcher:
         clock: MonotonicClock,
         *,
         gateway: bool,
+        facts: SharedFacts | None = None,
     ) -> None:
+        self.facts = facts or SharedFacts()
+        """What the programs that share the line must know of each other."""
         self._devices = devices
         self._tally = tally
         self._timing = timing
@@ -49,6 +54,9 @@ class Dispatcher:
         self._gateway = gateway
         self._queue = JobQueue(timing.queue_length)
         self._wake = asyncio.Event()
+        self._values = SharedValues()
+        self.in_flight = False
+        """Whether a request was sent whose end is not known yet."""
 
     def wake(self) -> None:
         """Something changed: a request came, a late reply came, or the line was lost."""
@@ -56,7 +64,7 @@ class Dispatcher:
 
     def submit(self, job: Job) -> None:
         """Queue a request, or fail it at once when its device is being left alone."""
-        if self._left_alone(job):
+        if self._left_alone(job) or self._is_answered(job):
             return
         try:
             self._queue.put(job)
@@ -68,6 +76,29 @@ class Dispatcher:
         """Fail everything that waits."""
         for job in self._queue.drain():
             job.fail(kind(_with_fate(job, reason) if job.begun else reason))
+
+    async def all_waiting(self) -> list[Job]:
+        """Take out all that waits, once something does."""
+        while not len(self._queue):
+            self._wake.clear()
+            await self._wake.wait()
+        return self.take_all()
+
+    def take_all(self) -> list[Job]:
+        """Take out all that waits."""
+        return self._queue.drain()
+
+    def put_back(self, job: Job) -> None:
+        """Queue a job that was taken out and came to nothing, at its old place."""
+        self._queue.put_back(job)
+        self._wake.set()
+
+    def void(self, device: int) -> None:
+        """A stop was given: what waits to change the device is refused at once."""
+        for job in self._queue.waiting():
+            if job.request.device == device and job.request.changes and (why := self.refusal(job)):
+                self._queue.remove(job)
+                job.fail(RequestRefused(why))
 
     def stray(self, piece: Piece, time: float) -> None:
         """A whole frame came that nobody waited for; it may be what others were held back for."""
@@ -117,16 +148,36 @@ class Dispatcher:
         job.fail(NoAnswer(device, job.request.function, job.request.register, text, retry_in=rest))
         return True
 
+    def _is_answered(self, job: Job) -> bool:
+        """Answer a read from what was read for another program, where that is young enough."""
+        if not job.max_age or job.begun:
+            return False
+        reply = self._values.find(job.request, self._clock() - job.max_age)
+        if reply is None or not job.answer.set_running_or_notify_cancel():
+            return False
+        job.begun = True
+        job.answer.set_result(reply)
+        return True
+
+    def refusal(self, job: Job) -> str:
+        """Why a write must not go out: a stop came after it, or another program commands."""
+        if job.priority is Priority.STOP or not job.request.changes or not job.program:
+            return ""
+        return self.facts.refusal(job.program, job.request.device, job.stamp)
+
     async def _run(self, master: Master, job: Job) -> None:
-        if self._left_alone(job):
+        if self._left_alone(job) or self._is_answered(job):
             return
         if not job.begun and not job.answer.set_running_or_notify_cancel():
             return
         job.begun = True
-        if job.forbidden is not None and (why := job.forbidden()):
+        if (why := self.refusal(job)) or (job.forbidden is not None and (why := job.forbidden())):
             job.fail(RequestRefused(why))
             return
+        if job.request.changes:
+            self._values.drop(job.request.device)
         begun = self._clock()
+        self.in_flight = True
         try:
             result = await master.exchange(self._sending(job))
             if result.kind is ResultKind.UNSURE:
@@ -136,6 +187,7 @@ class Dispatcher:
         except LineLost:
             # failed with the others, once the line's state says that it is lost
             self._queue.put_back(job)
+            self.in_flight = False
             if job.expectation is not None:
                 now = self._clock()
                 self._devices.may_come(job.request.device, job.expectation, begun, now)
@@ -146,6 +198,7 @@ class Dispatcher:
         except BaseException as error:
             job.fail(LineError(_with_fate(job, f"The request failed: {error!r}.")))
             raise
+        self.in_flight = False
         self._conclude(job, result)
 
     def _sending(self, job: Job) -> Sending:
@@ -215,12 +268,18 @@ class Dispatcher:
             result.kind = ResultKind.NOTHING
         match result.kind:
             case ResultKind.REPLY:
+                self._share(job, result)
                 job.finish(result.pdu, result.end)
             case ResultKind.EXCEPTION:
                 self._tally.exceptions += 1
                 job.fail(self._exception(job, result.exception))
             case _:
                 self._failed(job, result, now)
+
+    def _share(self, job: Job, result: ExchangeResult) -> None:
+        """Keep what was read, while there is another program that may want it."""
+        if len(self.facts.programs) > 1:
+            self._values.note(job.request, job.request.words(result.pdu), result.end)
 
     def _failed(self, job: Job, result: ExchangeResult, now: float) -> None:
         request, expectation = job.request, job.expectation

@@ -8,14 +8,17 @@ import threading
 from collections.abc import Callable
 from typing import TypeVar
 
-from ..errors import LineClosed, LineError, LineLost, PortBusy, PortMissing, PortRefused
+from ..errors import LineClosed, LineError, LineLost, NotShared, PortBusy, PortMissing, PortRefused
 from ..link import Link, TcpLink, label
 from ..master import LineContext, MonotonicClock
 from ..model import LineState, LineStatus, Timing
+from ..shared_facts import SharedFacts
 from ..tally import Tally
 from ..trace import Trace
 from .connection import Connection
 from .dispatcher import Dispatcher
+from .inside import LineInside, SharedLine
+from .pace import Pace
 from .patience import Devices
 from .queue import Job
 from .worker import ThreadWork, Worker
@@ -26,7 +29,7 @@ log = logging.getLogger(__name__)
 
 WORKERS_END = 2.0
 """Seconds that cancelled workers have to end when the line is closed."""
-HOPELESS = (PortBusy, PortMissing, PortRefused)
+HOPELESS = (PortBusy, PortMissing, PortRefused, NotShared)
 """Failures that waiting does not mend."""
 
 
@@ -37,12 +40,22 @@ class Engine:
     request that its own thread is handing over.
     """
 
-    def __init__(self, link: Link, timing: Timing, clock: MonotonicClock) -> None:
+    def __init__(
+        self,
+        link: Link,
+        timing: Timing,
+        clock: MonotonicClock,
+        facts: SharedFacts | None = None,
+        share: Callable[[LineInside], SharedLine] | None = None,
+    ) -> None:
+        self.facts = facts or SharedFacts()
+        self.pace = Pace()
         self.trace = Trace(timing.trace_length)
         self.tally = Tally()
         self.devices = Devices(timing, mistakable=not isinstance(link, TcpLink))
         self.state = LineState(LineStatus.CLOSED, "", clock())
         self._link = link
+        self._timing = timing
         self._clock = clock
         self._lock = threading.RLock()
         self._news = threading.Condition()
@@ -55,10 +68,19 @@ class Engine:
         self._main: asyncio.Task[None] | None = None
         self._workers: set[asyncio.Task[object]] = set()
         self._dispatcher = Dispatcher(
-            self.devices, self.tally, timing, clock, gateway=isinstance(link, TcpLink)
+            self.devices,
+            self.tally,
+            timing,
+            clock,
+            gateway=isinstance(link, TcpLink),
+            facts=self.facts,
         )
         around = LineContext(timing, self.trace, self.tally, clock, self._dispatcher.stray)
-        self._connection = Connection(link, around, self._dispatcher, self._changed)
+        inside = LineInside(
+            link, around, self._dispatcher, self.devices, self.pace, lambda: self.state, self._take
+        )
+        self._shared = share(inside) if share is not None else None
+        self._connection = Connection(link, around, self._dispatcher, self._changed, self._shared)
 
     def start(self, wait: float | None) -> None:
         """Start the thread; see Line.open."""
@@ -78,15 +100,19 @@ class Engine:
     def _await_connection(self, wait: float) -> None:
         with self._news:
             self._news.wait_for(self._is_decided, wait)
-            if self.state.status is LineStatus.CONNECTED:
+            if self.state.status is LineStatus.CONNECTED or self._is_stops_only():
                 return
             error = self._error
         self.close()
         raise error or LineLost(f"{label(self._link)} was not connected within {wait:g} s.")
 
     def _is_decided(self) -> bool:
-        connected = self.state.status is LineStatus.CONNECTED
+        connected = self.state.status is LineStatus.CONNECTED or self._is_stops_only()
         return connected or self._closed or isinstance(self._error, HOPELESS)
+
+    def _is_stops_only(self) -> bool:
+        """Whether stops go out although the line is not there: its owner is frozen."""
+        return self._shared is not None and self._shared.stops_only
 
     def close(self) -> None:
         """End the loop and its thread; see Line.close."""
@@ -107,6 +133,8 @@ class Engine:
 
     def submit(self, job: Job) -> None:
         """Hand a job to the loop. Raises LineClosed."""
+        job.program = self.facts.me.id
+        job.stamp = self.facts.stops.get(job.request.device, 0)
         self._enter(self._take, job)
 
     def _enter(self, action: Callable[[T], None], argument: T) -> None:
@@ -162,6 +190,8 @@ class Engine:
             self._error = error
             listeners = list(self._listeners)
             self._news.notify_all()
+        if self._shared is not None:
+            self._shared.tell_state()
         for listener in listeners:
             try:
                 listener(state)
@@ -190,7 +220,11 @@ class Engine:
         """Fail what waits, end the workers."""
         # what other threads handed over before the line was closed is taken first
         await asyncio.sleep(0)
+        quiet = self._quiet_after()
         self._dispatcher.fail_all("The line is closed.", LineClosed)
+        if self._shared is not None:
+            await asyncio.sleep(0)  # what was failed is told first
+            await self._shared.close(quiet)
         workers = set(self._workers)
         for task in workers:
             task.cancel()
@@ -202,3 +236,9 @@ class Engine:
         if rest:
             await asyncio.wait(rest, timeout=WORKERS_END)
         await asyncio.get_running_loop().shutdown_asyncgens()
+
+    def _quiet_after(self) -> float:
+        """Seconds for which a reply to what was sent from here may still come."""
+        now = self._clock()
+        late = now + self._timing.late_reply if self._dispatcher.in_flight else now
+        return max(late, self.devices.last_reply_by(now)) - now

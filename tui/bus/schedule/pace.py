@@ -18,12 +18,20 @@ class Pace:
     def __init__(self) -> None:
         self._wishes: dict[Hashable, float] = {}
         self._lock = threading.Lock()
+        self.others = 0.0
+        """Share of the line's time that other programs' polls take."""
+
+    @property
+    def own(self) -> float:
+        """Share of the line's time that this program's polls wish for."""
+        with self._lock:
+            return sum(self._wishes.values())
 
     def claim(self, who: Hashable, seconds: float, period: float) -> float:
         """Tell a wish: so many seconds of the line in each period; returns the period to keep."""
         with self._lock:
             self._wishes[who] = seconds / period
-            return period * max(1.0, sum(self._wishes.values()) / SHARE)
+            return period * max(1.0, (sum(self._wishes.values()) + self.others) / SHARE)
 
     @property
     def busy(self) -> bool:

@@ -71,6 +71,8 @@ class Device:
     )
     """The last requests that were answered, with their replies."""
     heard: float | None = None
+    told_usual: float | None = None
+    """The usual turnaround as the program told that owns the line."""
     last: Expectation | None = None
     last_time: float = 0.0
 
@@ -106,9 +108,27 @@ class Devices:
             record.silent_since,
             record.next_try,
             record.turnaround,
-            usual(record.recent),
+            usual(record.recent) or record.told_usual,
             record.heard,
         )
+
+    @property
+    def known(self) -> tuple[int, ...]:
+        """Devices that something is known of."""
+        return tuple(self._devices)
+
+    def copy(self, device: int, state: DeviceState) -> None:
+        """Take over what the program that owns the line has seen of a device."""
+        record = self[device]
+        record.answers, record.failures = state.answers, state.failures
+        record.silent_since, record.next_try = state.silent_since, state.next_try
+        record.turnaround, record.told_usual = state.turnaround, state.usual_turnaround
+        record.heard = state.heard
+
+    def last_reply_by(self, now: float) -> float:
+        """When the last reply that is still due may have come; now where none is."""
+        due = [one.expires for record in self._devices.values() for one in record.outstanding]
+        return max([now, *due])
 
     def time_out(self, device: int, function: int, priority: Priority) -> float:
         """Seconds to wait for a reply, from the end of the request to the reply's start."""

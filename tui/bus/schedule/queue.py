@@ -34,6 +34,12 @@ class Job:
     """Whether a newer write of the same register may take its place while it waits."""
     forbidden: Callable[[], str] | None = None
     """Asked just before it is sent: why it must not be any more, or empty."""
+    program: str = ""
+    """Id of the program that asks."""
+    stamp: int = 0
+    """The count of stops of the device that it knew of."""
+    max_age: float = 0.0
+    """A reply to the same question is taken, from whoever asked it, up to this age in seconds."""
 
     def __post_init__(self) -> None:
         # made now, in the thread of the one who asks: the line's own has a silence to keep
@@ -119,6 +125,14 @@ class JobQueue:
     @staticmethod
     def _withdrawn(job: Job) -> bool:
         return not job.begun and job.answer.cancelled()
+
+    def waiting(self) -> tuple[Job, ...]:
+        """All that wait, in the order in which they came."""
+        return tuple(self._jobs)
+
+    def remove(self, job: Job) -> None:
+        """Take out a job that waits."""
+        self._jobs.remove(job)
 
     def drain(self) -> list[Job]:
         """Take out everything that waits."""

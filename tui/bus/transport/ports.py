@@ -124,16 +124,16 @@ def other_openers(path: str) -> str:
     return ", ".join(f"{_name(pid)} (pid {pid})" for pid in pids)
 
 
-def open_serial(path: str, baud: int, format: str) -> serial.Serial:
-    """Open a port for this program alone, raw, with the format of the line.
+def open_serial(path: str, baud: int, format: str, *, alone: bool = True) -> serial.Serial:
+    """Open a port for this program `alone`, raw, with the format of the line.
 
     A pseudo-terminal has no parity and is opened without: the returned port says so in its
     `parity`. Raises PortBusy, PortMissing, PortRefused.
     """
     if is_pseudo_terminal(path):
         # the C library refuses parity here, or drops it without a word
-        return _open(path, baud, f"8N{format[2]}")
-    port = _open(path, baud, format)
+        return _open(path, baud, f"8N{format[2]}", alone=alone)
+    port = _open(path, baud, format, alone=alone)
     if not _has_parity(port):
         port.close()
         raise PortRefused(path, f"it does not take parity {format[1]}.")
@@ -149,7 +149,7 @@ def _has_parity(port: serial.Serial) -> bool:
     return bool(termios.tcgetattr(port.fileno())[2] & termios.PARENB)
 
 
-def _open(path: str, baud: int, format_: str) -> serial.Serial:
+def _open(path: str, baud: int, format_: str, *, alone: bool) -> serial.Serial:
     # an inter-byte time-out of 0 makes a read of nothing fail on POSIX instead of looking
     # like the end of the port
     posix = os.name == "posix"
@@ -162,7 +162,7 @@ def _open(path: str, baud: int, format_: str) -> serial.Serial:
             stopbits=int(format_[2]),
             timeout=0,
             inter_byte_timeout=0 if posix else None,
-            exclusive=True,
+            exclusive=alone or None,
         )
     except (OSError, ValueError) as error:
         raise _port_error(path, baud, format_, error) from error

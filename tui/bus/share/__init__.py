@@ -1,0 +1,1 @@
+"""A line that several programs share: who owns it, how the others attach, what all must know."""

@@ -1,0 +1,380 @@
+"""A client's side of a shared line: hands this program's requests to the owner's queue."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+from collections.abc import Callable
+from contextlib import suppress
+
+from ..errors import LineError, LineLost, NotShared, RequestRefused
+from ..link import label
+from ..model import LineState, LineStatus, Priority
+from ..requests import BROADCAST
+from ..schedule.inside import LineInside
+from ..schedule.queue import Job
+from ..shared_facts import Program
+from ..trace import Frame
+from .direct import DirectStops
+from .messages import (
+    VERSION,
+    Answer,
+    AnyMessage,
+    Ask,
+    Claim,
+    Denied,
+    Describe,
+    Facts,
+    Failed,
+    Goodbye,
+    Hello,
+    News,
+    NoMessage,
+    Question,
+    Reply,
+    StopGiven,
+    Told,
+    TurnedAway,
+    Welcome,
+    Wish,
+    Withdraw,
+    error_of,
+    next_message,
+    packed,
+    request_form,
+)
+from .place import Owner
+
+log = logging.getLogger(__name__)
+
+SILENT_OWNER = 1.0
+"""Seconds without a sign of life after which an owner counts as frozen."""
+LOOK_INTERVAL = 0.1
+WAITED_ENOUGH = 5.0
+"""Seconds that a request waits for a frozen owner before it is told so."""
+ENDED = "The program that owned the line ended"
+FATE = " Whether it was taken is not known; read the register back before trying again."
+
+Say = Callable[[LineStatus, str], None]
+
+
+class OwnerAway(Exception):
+    """Nobody answers on the owner's socket: it is just beginning, or has just ended."""
+
+
+class ShareClient:
+    """Attached to one owner until it ends; lives in the line's loop, and is its facts' voice."""
+
+    def __init__(self, inside: LineInside, owner: Owner, say: Say) -> None:
+        self._inside = inside
+        self._owner = owner
+        self._say = say
+        self._loop = asyncio.get_running_loop()
+        self._writer: asyncio.StreamWriter | None = None
+        self._numbers = itertools.count(1)
+        self._asked: dict[int, Job] = {}
+        self._described: dict[int, object] = {}
+        self._state: LineState | None = None
+        self._note = ""
+        self._wish = (0.0, False)
+        self._direct: DirectStops | None = None
+        self.heard = inside.clock()
+        """When the owner last gave a sign of life."""
+        self.quiet = inside.timing.late_reply
+        """Seconds from then for which a reply to the owner's last request may still come."""
+        self.frozen = False
+
+    async def serve(self) -> None:
+        """Serve this program's requests until the owner ends.
+
+        Raises OwnerAway where there is none, NotShared where it takes nobody in.
+        """
+        try:
+            reader, writer = await asyncio.open_unix_connection(self._owner.socket)
+        except (OSError, ValueError) as error:
+            raise OwnerAway from error
+        self._writer = writer
+        tasks: list[asyncio.Task[None]] = []
+        try:
+            self._greet()
+            watch = self._loop.create_task(self._watch())
+            tasks.append(watch)
+            await self._welcomed(reader)
+            tasks.append(self._loop.create_task(self._forward()))
+            await self._listen(reader)
+        finally:
+            self._inside.facts.voice = None
+            for task in tasks:
+                task.cancel()
+            if self._direct is not None:
+                await self._direct.close()
+            with suppress(OSError, RuntimeError):
+                writer.close()
+            self._give_up_asked()
+
+    def _greet(self) -> None:
+        facts = self._inside.facts
+        self._tell(Hello(VERSION, facts.me, label(self._inside.link), dict(facts.stops)))
+
+    async def _welcomed(self, reader: asyncio.StreamReader) -> None:
+        try:
+            message = await next_message(reader)
+        except (EOFError, OSError, NoMessage) as error:
+            raise OwnerAway from error
+        self._hear_life()
+        if isinstance(message, TurnedAway):
+            raise NotShared(message.why)
+        if not isinstance(message, Welcome):
+            raise NotShared(f"{self._owner.program.text} owns the line and does not share it.")
+        self._note = f"Shared with {message.owner.text}."
+        if not message.asked:
+            self._note += f" It is open as {message.label}."
+        facts = self._inside.facts
+        facts.voice = self
+        for device, holder in facts.commanders.items():
+            if holder == facts.me.id:
+                self._tell(Claim(device, True))
+
+    async def _listen(self, reader: asyncio.StreamReader) -> None:
+        while True:
+            try:
+                message = await next_message(reader)
+            except (EOFError, OSError):
+                return
+            except NoMessage as error:
+                log.error("%s says nothing sensible: %s", self._owner.program.text, error)
+                return
+            self._hear_life()
+            if isinstance(message, Goodbye):
+                self.quiet = message.quiet
+                return
+            self._hear(message)
+
+    # Requests
+
+    async def _forward(self) -> None:
+        """Hand on what this program asks, as soon as it asks."""
+        dispatcher = self._inside.dispatcher
+        while True:
+            for job in await dispatcher.all_waiting():
+                self._send(job)
+
+    def _send(self, job: Job) -> None:
+        if job.answer.cancelled():
+            return
+        request = job.request
+        why = self._inside.dispatcher.refusal(job) or (job.forbidden() if job.forbidden else "")
+        if why:
+            job.fail(RequestRefused(why))
+            return
+        if self.frozen and self._directly(job):
+            return
+        self._describe(request.device, job)
+        kind, fields = request_form(request)
+        number = next(self._numbers)
+        self._asked[number] = job
+        job.answer.add_done_callback(lambda answer: self._withdrawn(number, answer.cancelled()))
+        limits = job.limits if request.device == BROADCAST else None
+        self._tell(
+            Ask(
+                number, kind, fields, int(job.priority), job.replaceable, job.max_age,
+                job.stamp, limits,
+            )
+        )  # fmt: skip
+
+    def _describe(self, device: int, job: Job) -> None:
+        if device != BROADCAST and self._described.get(device) is not job.limits:
+            self._described[device] = job.limits
+            self._tell(Describe(device, job.limits))
+
+    def _withdrawn(self, number: int, cancelled: bool) -> None:
+        """Called in any thread: nobody waits for the answer any more."""
+        if cancelled:
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._withdraw, number)
+
+    def _withdraw(self, number: int) -> None:
+        if self._asked.pop(number, None) is not None:
+            self._tell(Withdraw(number))
+
+    def _answered(self, message: Answer | Failed) -> None:
+        job = self._asked.pop(message.number, None)
+        if job is None or not job.answer.set_running_or_notify_cancel():
+            return
+        job.begun = True
+        if isinstance(message, Answer):
+            self._inside.devices[job.request.device].heard = message.time
+            job.finish(message.pdu, message.time)
+        else:
+            self._failed(job, message)
+
+    def _failed(self, job: Job, message: Failed) -> None:
+        if message.error == "LineClosed":
+            # the owner's end is not this program's
+            self._give_up(job, sent=FATE in message.form.text)
+        else:
+            job.fail(error_of(message))
+
+    def _give_up_asked(self) -> None:
+        asked, self._asked = self._asked, {}
+        for job in asked.values():
+            self._give_up(job, sent=True)
+
+    def _give_up(self, job: Job, *, sent: bool) -> None:
+        """The owner ended before it answered: a read is asked anew, a write never is.
+
+        A stop is sent again: it may have got lost, and does no harm twice.
+        """
+        if not job.request.changes or job.priority is Priority.STOP:
+            job.begun = False
+            if not job.answer.cancelled():
+                self._inside.dispatcher.put_back(job)
+            return
+        text = f"{ENDED} during the request.{FATE}" if sent else f"{ENDED}; this was not sent."
+        if job.begun or job.answer.set_running_or_notify_cancel():
+            job.begun = True
+            job.fail(LineLost(text))
+
+    # An owner that is frozen
+
+    async def _watch(self) -> None:
+        """Notice an owner that does not answer any more, and one that does again."""
+        while True:
+            await asyncio.sleep(LOOK_INTERVAL)
+            inside = self._inside
+            share, trace = inside.pace.own, inside.around.trace.looked_at
+            if (share, trace) != self._wish:
+                self._wish = share, trace
+                self._tell(Wish(share, trace))
+            if not self.frozen and inside.clock() - self.heard > SILENT_OWNER:
+                self._freeze()
+            if self.frozen:
+                self._help_stops()
+
+    def _freeze(self) -> None:
+        self.frozen = True
+        who = self._owner.program.text
+        log.error("%s owns the line and does not answer", who)
+        self._say(
+            LineStatus.LOST,
+            f"{who} owns the line and does not answer. Stops go out past it; all else waits.",
+        )
+
+    def _hear_life(self) -> None:
+        self.heard = self._inside.clock()
+        if self.frozen:
+            self.frozen = False
+            if self._direct is not None:
+                self._direct.end()
+                self._direct = None
+            self._tell_state()
+
+    def _help_stops(self) -> None:
+        """Send stops past the frozen owner; tell others that they wait in vain."""
+        for number, job in list(self._asked.items()):
+            if self._directly(job):
+                self._asked.pop(number, None)
+        for job in self._inside.dispatcher.take_all():
+            self._send(job)
+        now = self._inside.clock()
+        for number, job in list(self._asked.items()):
+            if now - self.heard > SILENT_OWNER + WAITED_ENOUGH and not job.answer.done():
+                self._asked.pop(number, None)
+                fate = FATE if job.request.changes else ""
+                text = f"{self._owner.program.text} owns the line and does not answer.{fate}"
+                job.fail(LineLost(text))
+
+    def _directly(self, job: Job) -> bool:
+        """Send what belongs to a stop directly; False where the job does not."""
+        if self._direct is None:
+            if job.priority is not Priority.STOP:
+                return False
+            self._direct = DirectStops(self._inside)
+        return self._direct.take(job)
+
+    # What the owner says
+
+    def _hear(self, message: AnyMessage) -> None:
+        facts, inside = self._inside.facts, self._inside
+        match message:
+            case Answer() | Failed():
+                self._answered(message)
+            case News():
+                self._hear_news(message)
+            case Facts(programs=programs, commanders=commanders, stops=stops):
+                facts.learn(programs, commanders, stops)
+            case Told(device=device, text=text):
+                facts.hear_text(device, text)
+            case StopGiven(devices=devices, by=by, program=program):
+                facts.count_stop(devices, f"{by}, {program.text}")
+                for device in devices:
+                    inside.dispatcher.void(device)
+                facts.hear_stop(devices, by, program)
+            case Denied(device=device, holder=holder):
+                facts.note_commander(device, holder.id)
+                facts.hear_denied(device, f"Drive {device} is commanded by {holder.text}.")
+            case Question(device=device, program=program):
+                facts.hear_question(device, program)
+            case Reply(device=device, yes=yes, why=why):
+                facts.hear_reply(device, why, yes=yes)
+            case _:
+                log.error("the owner says %s", type(message).__name__)
+
+    def _hear_news(self, news: News) -> None:
+        inside = self._inside
+        for device, state in news.devices.items():
+            inside.devices.copy(device, state)
+        inside.around.tally.copy(news.counters)
+        inside.pace.others = news.share
+        for time, direction, data, note in news.frames:
+            inside.around.trace.append(
+                Frame(time, "out" if direction == "out" else "in", data, note)
+            )
+        if news.state != self._state:
+            self._state = news.state
+            self._tell_state()
+
+    def _tell_state(self) -> None:
+        if self._state is not None:
+            connected = self._state.status is LineStatus.CONNECTED
+            self._say(self._state.status, self._note if connected else self._state.reason)
+
+    # The voice of the facts, from any thread
+
+    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
+        """Devices are stopped by this program."""
+        self._soon(StopGiven(devices, by, self._inside.facts.me))
+
+    def claim(self, device: int, take: bool) -> None:
+        """This program commands a device now, or no longer."""
+        self._soon(Claim(device, take))
+
+    def ask(self, device: int) -> None:
+        """This program wants a device that another one commands."""
+        self._soon(Question(device, self._inside.facts.me))
+
+    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
+        """This program answers one that asked."""
+        self._soon(Reply(device, program, yes, why))
+
+    def told(self, device: int, text: str) -> None:
+        """This program has something for all to read."""
+        self._soon(Told(device, text))
+
+    def _soon(self, message: AnyMessage) -> None:
+        with suppress(RuntimeError):
+            self._loop.call_soon_threadsafe(self._tell, message)
+
+    def _tell(self, message: AnyMessage) -> None:
+        if self._writer is not None and not self._writer.transport.is_closing():
+            self._writer.write(packed(message))
+
+
+def owner_text(owner: Owner | None) -> str:
+    """Who owns a line, for a person."""
+    program: Program | None = owner.program if owner else None
+    return program.text if program else "another program"
+
+
+__all__ = ["LineError", "OwnerAway", "ShareClient", "owner_text"]

@@ -1,0 +1,160 @@
+"""Where programs that share a line meet: the lock that decides who owns it, and the socket.
+
+The lock lies where nobody takes it away (the state folder), and tells where the socket is.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import os
+import re
+import stat
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import IO
+
+import msgspec
+
+from ..shared_facts import Program
+
+log = logging.getLogger(__name__)
+
+PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
+LONGEST_LOCK = 4096
+"""Bytes of a lock file that are read; ours hold some hundred."""
+
+
+class Owner(msgspec.Struct, frozen=True):
+    """What a lock file tells of the program that holds it."""
+
+    version: int
+    program: Program
+    socket: str
+
+
+@dataclass(frozen=True, slots=True)
+class SharePlace:
+    """The meeting place of one line."""
+
+    key: str
+    """The line without its spelling."""
+    lock_folder: Path
+    socket_folders: tuple[Path, ...]
+    """Where the socket may lie, the best first."""
+    group: int | None = None
+    """The group of users that may attach; None for this user alone."""
+
+    @property
+    def name(self) -> str:
+        """A file name of the line: something to read, and a digest that tells it from others."""
+        readable = re.sub(r"[^A-Za-z0-9]+", "-", self.key).strip("-")[-24:]
+        return f"{readable}-{hashlib.sha256(self.key.encode()).hexdigest()[:12]}"
+
+    @property
+    def lock_path(self) -> Path:
+        """The file whose lock makes an owner."""
+        return self.lock_folder / f"{self.name}.lock"
+
+    def socket_path(self) -> Path:
+        """Where to listen, its folder made; what cannot be made is passed over. Raises OSError."""
+        trouble: OSError | None = None
+        for folder in self.socket_folders:
+            try:
+                make_private(folder, shared=self.group is not None)
+            except OSError as error:
+                trouble = error
+            else:
+                return folder / f"{self.name}.sock"
+        raise trouble or FileNotFoundError("no folder for the socket of the line")
+
+
+def make_private(folder: Path, *, shared: bool = False) -> None:
+    """Make a folder for this user alone. Raises OSError, PermissionError where it is another's."""
+    folder.mkdir(mode=PRIVATE_FOLDER, parents=True, exist_ok=True)
+    found = folder.stat()
+    if shared:
+        return
+    if found.st_uid != os.getuid():
+        raise PermissionError(f"{folder} belongs to another user")
+    if stat.S_IMODE(found.st_mode) & 0o077:
+        folder.chmod(PRIVATE_FOLDER)
+
+
+class OwnerLock:
+    """The lock of one line; whoever holds it owns the line. Given back by the system at exit."""
+
+    def __init__(self, place: SharePlace) -> None:
+        self._place = place
+        self._file: IO[bytes] | None = None
+
+    @property
+    def held(self) -> bool:
+        """Whether this program owns the line."""
+        return self._file is not None
+
+    def take(self) -> bool:
+        """Try to own the line; True where this program does. Raises OSError."""
+        import fcntl
+
+        if self._file is not None:
+            return True
+        path = self._place.lock_path
+        shared = self._place.group is not None
+        make_private(path.parent, shared=shared)
+        descriptor = os.open(
+            path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o660 if shared else 0o600
+        )
+        file = os.fdopen(descriptor, "r+b", buffering=0)
+        try:
+            if shared:
+                with suppress(PermissionError):
+                    os.fchown(descriptor, -1, self._place.group or -1)
+                    os.fchmod(descriptor, 0o660)
+            fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            # a file that was taken away meanwhile locks nobody out
+            if os.fstat(descriptor).st_ino != path.stat().st_ino:
+                raise BlockingIOError
+        except (BlockingIOError, FileNotFoundError):
+            file.close()
+            return False
+        except BaseException:
+            file.close()
+            raise
+        self._file = file
+        return True
+
+    def tell(self, owner: Owner) -> None:
+        """Write down who owns the line and where it listens."""
+        if self._file is not None:
+            data = msgspec.json.encode(owner)
+            os.pwrite(self._file.fileno(), data, 0)
+            os.ftruncate(self._file.fileno(), len(data))
+
+    @property
+    def stands(self) -> bool:
+        """Whether the lock file is still the one that others would try."""
+        if self._file is None:
+            return False
+        try:
+            return os.fstat(self._file.fileno()).st_ino == self._place.lock_path.stat().st_ino
+        except OSError:
+            return False
+
+    def give_back(self) -> None:
+        """Own the line no more."""
+        if self._file is not None:
+            with suppress(OSError):
+                os.ftruncate(self._file.fileno(), 0)
+            self._file.close()
+            self._file = None
+
+
+def owner_of(place: SharePlace) -> Owner | None:
+    """Who owns a line, as its lock file tells; None where it tells nothing that is understood."""
+    try:
+        with place.lock_path.open("rb") as file:
+            return msgspec.json.decode(file.read(LONGEST_LOCK), type=Owner)
+    except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
+        return None
