@@ -20,11 +20,18 @@ class NotArmed(OrderRefused):
         super().__init__(why or "Not armed: a arms this drive.")
 
 
+class CommandedElsewhere(OrderRefused):
+    """Another program on the line commands the drive."""
+
+
 class Arming:
     """Lets writes to one drive through for a while; whatever writes asks here."""
 
-    def __init__(self, line: ModbusLine, clock: Clock = REAL_CLOCK) -> None:
+    def __init__(
+        self, line: ModbusLine, clock: Clock = REAL_CLOCK, device: int | None = None
+    ) -> None:
         self._line = line
+        self._device = device
         self._clock = clock
         self._until: float | None = None
         self._span = ARMED_FOR
@@ -36,10 +43,13 @@ class Arming:
         """Let writes through from now on.
 
         `seconds` is how long without a key; math.inf for a command that ends by itself. Raises
-        OrderRefused on a read-only line.
+        OrderRefused on a read-only line, and CommandedElsewhere where another program commands the
+        drive.
         """
         if self._line.read_only:
             raise OrderRefused("The line is read-only: nothing is written.")
+        if self._device is not None and (why := self._line.facts.claim(self._device)):
+            raise CommandedElsewhere(why)
         self._span, self._why = seconds, ""
         self.times += 1
         self._until = self._clock.monotonic() + seconds
@@ -48,6 +58,8 @@ class Arming:
         """Let no write through any more."""
         self._until = None
         self._why = why
+        if self._device is not None:
+            self._line.facts.release(self._device)
 
     def touch(self) -> None:
         """A key was pressed, or work goes on: an armed drive stays armed."""

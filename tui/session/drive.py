@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import math
+import weakref
 
 from tui.bus.api import ModbusLine
 from tui.bus.link import label
+from tui.bus.shared_facts import Program
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile
 
@@ -44,7 +46,7 @@ class DriveSession:
         """What everything that is done with the drive counts by."""
         self.image = RegisterImage(profile, clock)
         """What is known of its registers."""
-        self.arming = Arming(line, clock)
+        self.arming = Arming(line, clock, device)
         """Whether it may be written to from here."""
         self.work = WorkQueue(line, device, self.arming, clock)
         """What is being done to it; a stop ends it."""
@@ -62,6 +64,31 @@ class DriveSession:
         self.stirs = 0
         """Counts the moments after which every value is worth a new look."""
         line.describe(device, limits_of(profile))
+        self._hear_others()
+
+    def _hear_others(self) -> None:
+        """Obey the stops of other programs on the line, and lose the drive to another commander.
+
+        A session that nobody holds any more hears nothing.
+        """
+        held = weakref.ref(self)
+
+        def stopped(devices: tuple[int, ...], by: str, program: Program) -> None:
+            session = held()
+            if session is not None and session.device in devices:
+                session.work.stop(f"{by}, {program.text}")
+                if session.starts is not None:
+                    session.starts.withdraw(session)
+                session.stir()
+
+        def denied(device: int, why: str) -> None:
+            session = held()
+            if session is not None and session.device == device:
+                session.arming.disarm(why)
+
+        facts = self.line.facts
+        for leave in (facts.on_stop(stopped), facts.on_denied(denied)):
+            weakref.finalize(self, leave)
 
     @property
     def known_identity(self) -> DriveIdentity:

@@ -5,13 +5,16 @@ Everything may be looked at from any thread: a mapping is replaced as a whole, n
 
 from __future__ import annotations
 
+import asyncio
 import threading
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from types import MappingProxyType
 
 from tui.bus.api import ModbusLine
+from tui.bus.errors import LineClosed
 from tui.drive.profile.schema import OrderId
 
 from .clock import REAL_CLOCK, Clock
@@ -24,8 +27,12 @@ from .events import EventLog
 from .journal import Entry, Journal, now_text
 from .monitor.alarms import LineAlarms, PresentFault
 from .monitor.line_watch import LineWatch
+from .sharing.handover import Handover
 from .starts.keeper import StartKeeper
 from .work import Outcome, OutcomeKind
+
+PROGRAM_ENDS_WITHIN = 0.3
+"""Seconds after which a program that has left the line is no process any more."""
 
 Stamp = Mapping[int, int]
 """The count of stops of each drive when something was typed."""
@@ -69,8 +76,12 @@ class Fleet:
         self.stopper = Stopper(line, journal, self.events)
         self.alarms = LineAlarms(self.events, self._record_fault, clock.wall)
         """The faults of all of them."""
+        self.handover = Handover(line, self.events, self._session_of, clock)
+        """Who commands a drive when two programs want to."""
+        line.facts.on_change(self._look_for_left)
         self.search: Search | None = None
         """The search for drives that goes on, or the last one."""
+        self._others = 0
         self._lock = threading.Lock()
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})
 
@@ -128,6 +139,23 @@ class Fleet:
         console.teacher.recall()
         if console.teacher.trouble:
             self.events.add("failed", console.teacher.trouble, console.device)
+
+    def _session_of(self, device: int) -> DriveSession | None:
+        console = self.console(device)
+        return console.session if console is not None else None
+
+    def _look_for_left(self) -> None:
+        """Somebody may have left the line: perhaps a motor that runs; reads files."""
+        before, self._others = self._others, len(self.line.facts.others)
+        if self.starts is None or before <= self._others:
+            return
+        with suppress(LineClosed):
+            self.line.spawn(partial(self._find_left, self.starts), "motors left running")
+
+    async def _find_left(self, starts: StartKeeper) -> None:
+        await self.clock.sleep(PROGRAM_ENDS_WITHIN)
+        for session in self.sessions:
+            await asyncio.to_thread(starts.look, session)
 
     def _note_outcome(self, device: int, outcome: Outcome) -> None:
         if outcome.kind is not OutcomeKind.WORKING:

@@ -62,6 +62,8 @@ class Stopper:
         keep every one of them from going out.
         """
         wanted = list(sessions)
+        # first: what other programs meant for them before is void from here on
+        self._line.facts.give_stop([session.device for session in wanted], by)
         ordered = wanted[0].clock.monotonic() if wanted else 0.0
         for session in wanted:
             session.work.stop(by)

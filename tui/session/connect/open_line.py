@@ -54,8 +54,11 @@ def open_line(
     read_only: bool = False,
     wait: float | None = None,
     usual: UsualSettings | None = None,
+    program: str = "",
 ) -> OpenLine:
     """The line that a person means, opened; `usual` are serial settings where none are named.
+
+    `program` is what others on the line call this one; a program without a name shares nothing.
 
     With `wait` it returns connected, or raises the line's error after so many seconds;
     without, it connects by itself. Raises LinkSyntaxError, UnknownProfile, ProfileError.
@@ -70,7 +73,12 @@ def open_line(
     from tui.bus.line import Line
     from tui.bus.link import parse_link
 
-    return _opened(OpenLine(text, Line(parse_link(text, usual), read_only=read_only)), wait)
+    from .share_place import share_place, this_program
+
+    link = parse_link(text, usual)
+    place, me = share_place(text), this_program(program)
+    line = Line(link, read_only=read_only, place=place if program else None, program=me)
+    return _opened(OpenLine(text, line), wait)
 
 
 def check_line(text: str) -> None:

@@ -42,6 +42,11 @@ RATE_OVER = 6
 Listener = Callable[[Snapshot], None]
 
 
+SHARED_AGE = 0.5
+"""Age up to which a value that was read for another program is taken, as a share of the cycle:
+two monitors of one period then read each value once, however they lie to each other."""
+
+
 class Monitor:
     """Polls the monitoring set of one drive in a worker of the line's loop."""
 
@@ -162,6 +167,7 @@ class Monitor:
                 cycle += 1
                 error = ""
                 period = self._period(rates)
+                self.reader.max_age = period * SHARED_AGE
                 if self._all_due or self._stirs != self.session.stirs:
                     self._stirs = self.session.stirs
                     self._all_due, self._learn_due = False, True

@@ -43,6 +43,8 @@ class Reader:
     session: DriveSession
     using: str = ""
     """Name of the block or scanner that the last poll read, if it read one."""
+    max_age: float = 0.0
+    """A poll takes what was read for another program up to so many seconds ago."""
     _met: set[str] = field(default_factory=set)
     """Unconfirmed words that this drive has answered."""
     _plans: dict[tuple[Hashable, ...], ReadPlan] = field(default_factory=dict)
@@ -252,6 +254,7 @@ class Reader:
                 request.count,
                 priority=priority,
                 function=request.function,
+                max_age=self.max_age if priority >= Priority.POLL else 0.0,
             )
         except DeviceException as refusal:
             if several:

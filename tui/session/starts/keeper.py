@@ -128,6 +128,12 @@ class StartKeeper:
             self._begun = {d: one for d, one in self._begun.items() if d != session.device}
             self._starts.note_stop(session.line_text, session.device)
 
+    def give_away(self, session: Startable) -> None:
+        """Another program looks after the motor from now on."""
+        if session.device in self._begun:
+            self._begun = {d: one for d, one in self._begun.items() if d != session.device}
+            self._starts.note_stop(session.line_text, session.device)
+
     # What an earlier program left
 
     def look(self, session: Startable) -> None:

@@ -1,0 +1,147 @@
+"""Stops the motors of a program that is gone; at work in whichever program owns the line.
+
+The records of starts tell which motors they are. A recorder goes on asking a drive, so its own
+time-out would never stop a motor whose commander died.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from functools import partial
+from typing import TYPE_CHECKING
+
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineClosed
+from tui.bus.link import label
+from tui.drive.errors import DriveError
+from tui.drive.profile import library
+
+from ..clock import REAL_CLOCK, Clock
+from ..command.stop import Stopper
+from ..command.stop_report import Phase
+from ..drive import DriveSession
+from ..journal import Journal
+from ..starts.record import StartRecord
+from ..starts.starts import Starts
+
+if TYPE_CHECKING:
+    from tui.bus.shared_facts import Program
+
+    from ..events import EventLog
+
+log = logging.getLogger(__name__)
+
+TAKEN_OVER_WITHIN = 2.0
+"""Seconds in which a person may take a motor over, where the drive's own time-out is not known."""
+LONGEST_GRACE = 10.0
+ENDS_WITHIN = 1.0
+"""Seconds that a program takes to be gone from the list of processes."""
+LOOK_INTERVAL = 0.05
+
+
+class Guardian:
+    """Looks after the motors that other programs on one line have started."""
+
+    def __init__(
+        self,
+        line: ModbusLine,
+        journal: Journal,
+        *,
+        timeout_of: Callable[[int], float | None] = lambda _: None,
+        clock: Clock = REAL_CLOCK,
+        session_of: Callable[[int], DriveSession | None] = lambda _: None,
+        person: bool = False,
+        events: EventLog | None = None,
+        starts: Starts | None = None,
+    ) -> None:
+        self._line = line
+        self._timeout_of = timeout_of
+        self._clock = clock
+        self._session_of = session_of
+        self._person = person
+        self._starts = starts or Starts()
+        self._stopper = Stopper(line, journal, events)
+        self._leave = line.facts.on_gone(self.gone)
+
+    def close(self) -> None:
+        """Look after nothing any more."""
+        self._leave()
+
+    def gone(self, program: Program) -> None:
+        """A program left the line; called in the line's thread."""
+        try:
+            self._line.spawn(partial(self._look_after, program), f"motors of {program.text}")
+        except LineClosed:
+            return
+
+    async def _look_after(self, program: Program) -> None:
+        """Stop each motor that it has started and that nobody takes over in time."""
+        records = await self._left_by(program)
+        if not records:
+            return
+        takers = self._person or any(one.name == "panel" for one in self._line.facts.others)
+        await asyncio.gather(*(self._stop_unless_taken(one, program, takers) for one in records))
+
+    async def _stop_unless_taken(self, record: StartRecord, program: Program, takers: bool) -> None:
+        """Stop a motor, unless an attached person takes it over within the drive's time-out."""
+        device = record.device
+        grace = min(self._timeout_of(device) or TAKEN_OVER_WITHIN, LONGEST_GRACE) if takers else 0.0
+        unless = f" in {grace:g} s, unless a and T take it over here" if takers else ""
+        self._tell(device, f"{program.text} is gone: its motor is stopped{unless}.")
+        end = self._clock.monotonic() + grace
+        while self._clock.monotonic() < end:
+            if not await self._is_left(device):
+                self._tell(device, f"The motor that {program.text} started was taken over.")
+                return
+            await self._clock.sleep(LOOK_INTERVAL)
+        session = self._session(record)
+        if session is not None and await self._is_left(device):
+            self._stopper.stop([session], by=f"{program.text} is gone")
+            await self._until_stopped(session)
+
+    async def _is_left(self, device: int) -> bool:
+        """Whether no living program has the motor's start on record."""
+        found = await asyncio.to_thread(self._found)
+        return any(one.device == device for one in found)
+
+    async def _left_by(self, program: Program) -> list[StartRecord]:
+        """The motors that it has started and not meant to leave running."""
+        end = self._clock.monotonic() + ENDS_WITHIN
+        while True:
+            found = await asyncio.to_thread(self._found)
+            mine = [one for one in found if one.pid == program.pid and not one.left_running]
+            if mine or self._clock.monotonic() > end:
+                return mine
+            await self._clock.sleep(LOOK_INTERVAL)
+
+    def _found(self) -> list[StartRecord]:
+        return self._starts.all_found(label(self._line.link))
+
+    async def _until_stopped(self, session: DriveSession) -> None:
+        """Take the record away once the motor stands; one that does not stop keeps it."""
+        device = session.device
+        while True:
+            await self._clock.sleep(LOOK_INTERVAL)
+            report = self._stopper.reports[device]
+            if report.phase is Phase.STOPPED:
+                self._starts.end(session.line_text, device)
+            if report.phase in (Phase.STOPPED, Phase.FAILED):
+                self._tell(device, f"{report.text[0].upper()}{report.text[1:].rstrip('.')}.")
+                return
+
+    def _tell(self, device: int, text: str) -> None:
+        """Have every person on the line read it."""
+        self._line.facts.tell_all(device, text)
+
+    def _session(self, record: StartRecord) -> DriveSession | None:
+        session = self._session_of(record.device)
+        if session is not None:
+            return session
+        try:
+            return DriveSession(self._line, record.device, library.load(record.profile))
+        except DriveError as error:
+            log.error("drive %s cannot be stopped: %s", record.device, error)
+            self._tell(record.device, f"Not stopped: {error} Stop it at the machine.")
+            return None

@@ -1,0 +1,185 @@
+"""Who commands a drive when two want to: a question to the one that does, and its answer."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine, Mapping
+from contextlib import suppress
+from dataclasses import dataclass
+from functools import partial
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, Literal
+
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineClosed
+from tui.drive.errors import DriveError
+
+from ..clock import REAL_CLOCK, Clock
+from ..events import EventLog
+
+if TYPE_CHECKING:
+    from tui.bus.shared_facts import Program
+
+    from ..drive import DriveSession
+    from ..starts.keeper import StartKeeper
+
+ANSWER_WITHIN = 15.0
+"""Seconds after which a question that nobody answers is a no, or a yes where the motor stands."""
+STATE_FRESH = 2.0
+STANDING = ("stopped", "ready", "blocked")
+"""States in which a motor surely stands; a tripped one may coast."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveRequest:
+    """A program wants a drive that is commanded from here; `until` is monotonic."""
+
+    device: int
+    program: Program
+    until: float
+
+
+class Handover:
+    """The questions about the drives of one line, asked here and asked elsewhere."""
+
+    def __init__(
+        self,
+        line: ModbusLine,
+        events: EventLog,
+        session_of: Callable[[int], DriveSession | None],
+        clock: Clock = REAL_CLOCK,
+    ) -> None:
+        self.person = False
+        """Whether somebody is here who can answer; a command without one decides at once."""
+        self.requests: Mapping[int, DriveRequest] = MappingProxyType({})
+        """What other programs want, by device."""
+        self._line = line
+        self._events = events
+        self._session_of = session_of
+        self._clock = clock
+        self._names: dict[str, str] = {}
+        self._commanders: Mapping[int, str] = MappingProxyType({})
+        facts = line.facts
+        self._leave = (
+            facts.on_question(self._asked),
+            facts.on_reply(self._replied),
+            facts.on_stop(self._stopped),
+            facts.on_text(self._told),
+            facts.on_change(self._changed),
+        )
+        self._changed()
+
+    def close(self) -> None:
+        """Hear nothing any more."""
+        for leave in self._leave:
+            leave()
+
+    # Asked here
+
+    def ask_for(self, device: int) -> None:
+        """Ask whoever commands a drive to leave it."""
+        other = self._line.facts.commander(device)
+        if other is None:
+            self._say(device, "Nobody else commands this drive: a arms it.")
+            return
+        self._line.facts.ask_for(device)
+        self._say(device, f"Asked {other.text} for this drive; the answer comes here.")
+
+    def _replied(self, device: int, yes: bool, why: str) -> None:
+        self._say(device, "This drive is free: a arms it." if yes else why)
+        session = self._session_of(device)
+        if yes and session is not None and session.starts is not None:
+            self._spawn(partial(self._adopt, session, session.starts), f"start of {device}")
+
+    async def _adopt(self, session: DriveSession, starts: StartKeeper) -> None:
+        """A motor that runs is this program's from now on: its end stops it."""
+        state = session.state(STATE_FRESH)
+        if state.motion in STANDING:
+            return
+        order: Literal["forward", "reverse"] = (
+            "reverse" if state.direction == "reverse" else "forward"
+        )
+        try:
+            await asyncio.to_thread(starts.begin, session, order)
+        except DriveError as error:
+            self._events.add("failed", str(error), session.device)
+            return
+        starts.sent(session)
+
+    def _spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> None:
+        with suppress(LineClosed):
+            self._line.spawn(work, name)
+
+    # Asked elsewhere
+
+    def _asked(self, device: int, program: Program) -> None:
+        """A program wants a drive; called in the line's thread."""
+        if not self.person:
+            self._decide(device, program)
+            return
+        request = DriveRequest(device, program, self._clock.monotonic() + ANSWER_WITHIN)
+        self.requests = MappingProxyType({**self.requests, device: request})
+        self._say(device, f"{program.text} asks for this drive. G answers; unanswered it stays"
+                  " here while its motor runs.")  # fmt: skip
+        self._spawn(partial(self._expire, request), f"question about {device}")
+
+    async def _expire(self, request: DriveRequest) -> None:
+        await asyncio.sleep(0)
+        await self._clock.sleep(ANSWER_WITHIN)
+        if self.requests.get(request.device) is request:
+            self._forget(request.device)
+            self._decide(request.device, request.program)
+
+    def answer(self, device: int, *, yes: bool) -> None:
+        """A person's answer to the question about a drive."""
+        request = self.requests.get(device)
+        if request is not None:
+            self._forget(device)
+            self._reply(device, request.program, yes=yes)
+
+    def _decide(self, device: int, program: Program) -> None:
+        """Without an answer: no while the motor runs, or may run."""
+        session = self._session_of(device)
+        stands = session is not None and session.state(STATE_FRESH).motion in STANDING
+        self._reply(device, program, yes=stands)
+
+    def _reply(self, device: int, program: Program, *, yes: bool) -> None:
+        session = self._session_of(device)
+        if yes and session is not None:
+            session.arming.disarm(f"Given to {program.text}: no longer armed here.")
+            if session.starts is not None:
+                session.starts.give_away(session)
+        self._line.facts.answer(device, program.id, yes=yes)
+        self._say(device, f"{'Given to' if yes else 'Not given to'} {program.text}.")
+
+    def _forget(self, device: int) -> None:
+        rest = {d: one for d, one in self.requests.items() if d != device}
+        self.requests = MappingProxyType(rest)
+
+    # What others do
+
+    def _stopped(self, devices: tuple[int, ...], by: str, program: Program) -> None:
+        for device in devices:
+            if self._session_of(device) is not None:
+                self._events.add("stop", f"Stop from {program.text} ({by}).", device)
+
+    def _told(self, device: int, text: str) -> None:
+        self._events.add("stop", text, device)
+
+    def _changed(self) -> None:
+        """Tell who came to the line, who left it, and who commands what."""
+        facts = self._line.facts
+        names = {one.id: one.text for one in facts.others}
+        for id, text in names.items():
+            if id not in self._names:
+                self._say(None, f"The line is shared with {text}.")
+        for id, text in self._names.items():
+            if id not in names:
+                self._say(None, f"{text[0].upper()}{text[1:]} has left the line.")
+        for device, id in facts.commanders.items():
+            if id in names and self._commanders.get(device) != id:
+                self._say(device, f"{names[id][0].upper()}{names[id][1:]} commands this drive now.")
+        self._names, self._commanders = names, facts.commanders
+
+    def _say(self, device: int | None, text: str) -> None:
+        self._events.add("told", text, device)
