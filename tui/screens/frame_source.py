@@ -68,6 +68,8 @@ class FrameSource:
             parts.append(f"{count} drive{'' if count == 1 else 's'}")
         if fleet is not None and fleet.search is not None and fleet.search.goes_on:
             parts.append(f"search {fleet.search.text}")
+        if fleet is not None and (others := fleet.line.facts.others):
+            parts.append(f"shared by {len(others) + 1}")
         return " · ".join(parts)
 
     def _measured(self, now: float) -> float | None:
@@ -159,7 +161,7 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
         current_unit=values["motor_current"][1] or "A",
         age=age,
         armed=armed if armed is None or math.isfinite(armed) else 99.0,
-        by=_commanded_by(state),
+        by=_commanding(fleet, session.device) or _commanded_by(state),
     )
 
 
@@ -221,6 +223,12 @@ def said_value(
         return "", ""
     value = reading.physical or reading.value
     return (value.text, value.unit) if value is not None else (reading.text, reading.unit)
+
+
+def _commanding(fleet: Fleet, device: int) -> str:
+    """The other program that commands a drive, where one does."""
+    other = fleet.line.facts.commander(device)
+    return f"{other.name} {other.where}".rstrip() if other is not None else ""
 
 
 def _commanded_by(state: DriveState | None) -> str:

@@ -140,6 +140,11 @@ class Hands(Panel):
         for device in devices:
             void_questions(self, device)
 
+    def stopped_elsewhere(self, devices: list[int]) -> None:
+        """Another program stopped drives: what was typed before it, and is asked, is void."""
+        self._stops += 1
+        self._void_questions(devices)
+
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
         """Stop one drive, in its own way."""
         self._stops += 1

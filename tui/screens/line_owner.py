@@ -10,11 +10,14 @@ from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineClosed
 from tui.session.paths import remember_line
+from tui.terminal.loop import soon_in_loop
 
 from .app_port import Panel
 
 if TYPE_CHECKING:
+    from tui.bus.shared_facts import Program
     from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
 
@@ -65,12 +68,42 @@ class LineOwner(Panel):
         # the motors of a simulated line end with it
         starts = StartKeeper("panel", clock=self.clock) if self.opened.simulation is None else None
         self.fleet = Fleet(self.opened.line, self.journal, starts, self.events, self.clock)
+        self._look_after(self.fleet)
         log.info("opened %s", self.opened.label)
         await asyncio.to_thread(remember_line, self.opened.text)
 
+    def _look_after(self, fleet: Fleet) -> None:
+        """Tell who shares the line, and stop the motors of programs on it that are gone."""
+        from tui.session.sharing.guardian import Guardian
+
+        def session_of(device: int) -> DriveSession | None:
+            console = fleet.console(device)
+            return console.session if console is not None else None
+
+        def timeout_of(device: int) -> float | None:
+            watch = fleet.line_watch.watch(device)
+            return watch.timeout if watch is not None else None
+
+        def stopped(devices: tuple[int, ...], _by: str, _program: Program) -> None:
+            soon_in_loop(self, self.stopped_elsewhere, list(devices))
+
+        fleet.line.facts.on_stop(stopped)
+        fleet.handover.person = True
+        Guardian(
+            fleet.line,
+            self.journal,
+            session_of=session_of,
+            timeout_of=timeout_of,
+            person=True,
+            events=self.events,
+            clock=self.clock,
+        )
+
     def _open_here(self, text: str) -> OpenLine:
         """Open a line in a thread; closed again where the panel was left meanwhile."""
-        opened = self._open(text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN)
+        opened = self._open(
+            text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN, program="panel"
+        )
         # here, where nobody waits for a key: what the loop asks for next
         import tui.screens.monitor.screen
         import tui.session.fleet  # noqa: F401
@@ -79,6 +112,9 @@ class LineOwner(Panel):
             opened.close()
             raise LineClosed
         return opened
+
+    def stopped_elsewhere(self, devices: list[int]) -> None:
+        """Another program stopped drives: what is being asked about them is void."""
 
     async def disconnect(self) -> None:
         """Close the open line, if there is one."""

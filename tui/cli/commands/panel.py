@@ -66,7 +66,9 @@ def run_panel(
         raise click.exceptions.Exit(app.return_code)  # the panel itself has said why
 
 
-def _open_with_demo(text: str, *, read_only: bool = False, wait: float | None = None) -> OpenLine:
+def _open_with_demo(
+    text: str, *, read_only: bool = False, wait: float | None = None, program: str = ""
+) -> OpenLine:
     """The demo's line, or any other that is chosen in the panel afterwards."""
     from tui.session.connect.open_line import demo_line, open_line
 
@@ -74,7 +76,7 @@ def _open_with_demo(text: str, *, read_only: bool = False, wait: float | None = 
         from tui.drive.profile.library import demo_drives
 
         return demo_line({id: hertz for id, (_, hertz) in demo_drives().items()})
-    return open_line(text, read_only=read_only, wait=wait)
+    return open_line(text, read_only=read_only, wait=wait, program=program)
 
 
 def _collect_garbage() -> None:

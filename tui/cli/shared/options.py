@@ -10,6 +10,9 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from .looking_after import look_after
+from .say import say
+
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
     from tui.session.connect.identify import DriveIdentity
@@ -117,7 +120,11 @@ def on_line(
 
     text = where if isinstance(where, str) else where.line_text
     usual = None if isinstance(where, str) else _usual_settings(where.profile_id)
-    opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual)
+    program = click.get_current_context().info_name or "drivepanel"
+    opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual, program=program)
+    if opened.line.facts.voice is not None and opened.line.facts.others:
+        say(f"drivepanel: {opened.line.state.reason}", err=True)
+    look_after(opened.line)
     try:
         return asyncio.run(work(opened))
     except NoAnswer as error:

@@ -14,6 +14,8 @@ from tui.session.work import Outcome
 from ..base import PanelScreen
 
 if TYPE_CHECKING:
+    from tui.bus.shared_facts import Program
+
     from ..dialogs.now import MotorsNow
 
 NOT_ARMED = "Not armed: a arms this drive."
@@ -43,11 +45,18 @@ class ArmingKeys(PanelScreen):
         return MotorsNow(self.app, [self.session])
 
     def _ask(
-        self, question: str, follows: str, yes: str, no: str, work: Callable[[int], object]
+        self,
+        question: str,
+        follows: str,
+        yes: str,
+        no: str,
+        work: Callable[[int], object],
+        refused: Callable[[], object] = lambda: None,
     ) -> None:
         """Ask with `y` before something is written or moved; refusals are told on this screen.
 
         `work` gets the drive's count of stops of the moment of asking: a stop since voids it.
+        `refused` is called for a no.
         """
         from ..dialogs.confirm import Confirm
 
@@ -57,8 +66,10 @@ class ArmingKeys(PanelScreen):
             try:
                 if sure:
                     work(stamp)
-            except OrderRefused as refused:
-                self._refuse(str(refused))
+                else:
+                    refused()
+            except OrderRefused as refusal:
+                self._refuse(str(refusal))
             self.look()
 
         now = self.motor_now()
@@ -75,12 +86,57 @@ class ArmingKeys(PanelScreen):
         return self._armed()
 
     def action_arm(self) -> None:
-        """Let commands and writes to this drive through for a minute, or for a minute more."""
+        """Let commands and writes to this drive through for a minute, or for a minute more.
+
+        Where another program commands it, a question goes there instead.
+        """
+        if (other := self.session.line.facts.commander(self.session.device)) is not None:
+            self._ask_for(other)
+            return
         try:
             self.commander.arm()
         except OrderRefused as refused:
             self._refuse(str(refused))
         self.look()
+
+    def _ask_for(self, other: Program) -> None:
+        """Ask the program that commands the drive to leave it."""
+        fleet, device = self.app.fleet, self.session.device
+        if fleet is None:
+            return
+
+        def ask(_stamp: int) -> None:
+            fleet.handover.ask_for(device)
+
+        self._ask(
+            f"Ask for drive {device}?",
+            f"It is commanded by {other.text}. The question is answered there; without an answer"
+            " it is a no while the motor runs.",
+            "asks",
+            "does not ask",
+            ask,
+        )
+
+    def action_answer_request(self) -> None:
+        """Answer a program that asks to command this drive."""
+        fleet, device = self.app.fleet, self.session.device
+        request = fleet.handover.requests.get(device) if fleet is not None else None
+        if fleet is None or request is None:
+            self._refuse("No program asks for this drive.")
+            return
+
+        def give(_stamp: int) -> None:
+            fleet.handover.answer(device, yes=True)
+
+        self._ask(
+            f"Give drive {device} away?",
+            f"{request.program.text} asks to command it. Its motor goes on as it is; from then on"
+            " it is commanded there.",
+            "gives it",
+            "keeps it",
+            give,
+            refused=lambda: fleet.handover.answer(device, yes=False),
+        )
 
     def action_disarm(self) -> None:
         """Let nothing through any more."""

@@ -36,6 +36,7 @@ STOP = "Stop the drive on its ramp, wherever a space is no text; without an open
 STOP_ANYWHERE = "The same, also while text is typed, from any screen or dialog."
 STOP_ALL = "Stop every drive of the line on its ramp, from any screen."
 ARM = "Arm this drive for a minute, or for a minute more."
+GIVE_DRIVE = "Answer a program that asks to command this drive; asks."
 ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
 OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
 NEVER_DROPPED = ("stop_by_space", "help")
@@ -74,6 +75,7 @@ ACTIONS: tuple[Action, ...] = (
     ),
     *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("arm", "a", "arm", ARM)),
     *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("disarm", "A", "", "End arming.")),
+    *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("answer_request", "G", "", GIVE_DRIVE)),
     *COMMAND_ACTIONS,
     Action("write_chosen", "enter", "write", WRITE_SOURCE, (SOURCES,), bound=False),
     *on(
