@@ -11,16 +11,16 @@ from tui.bus.schedule.pace import SHARE, Pace
 
 def test_a_line_with_time_to_spare_keeps_every_wish() -> None:
     pace = Pace()
-    assert pace.claim("a", 0.02, 0.1) == 0.1
-    assert pace.claim("b", 0.05, 0.1) == 0.1
+    assert pace.claim("a", 1, 0.02, 0.1) == 0.1
+    assert pace.claim("b", 1, 0.05, 0.1) == 0.1
 
 
 @given(st.lists(st.tuples(st.floats(0.001, 1.0), st.floats(0.05, 10.0)), min_size=1, max_size=31))
 def test_all_are_slowed_down_evenly_until_they_fit(wishes: list[tuple[float, float]]) -> None:
     pace = Pace()
     for who, (seconds, period) in enumerate(wishes):
-        pace.claim(who, seconds, period)
-    held = [pace.claim(who, *wish) for who, wish in enumerate(wishes)]
+        pace.claim(who, who, seconds, period)
+    held = [pace.claim(who, who, *wish) for who, wish in enumerate(wishes)]
     factors = [got / period for got, (_, period) in zip(held, wishes, strict=True)]
     assert factors == pytest.approx([factors[0]] * len(factors))
     load = sum(seconds / got for got, (seconds, _) in zip(held, wishes, strict=True))
@@ -30,8 +30,15 @@ def test_all_are_slowed_down_evenly_until_they_fit(wishes: list[tuple[float, flo
 
 def test_who_leaves_gives_time_back() -> None:
     pace = Pace()
-    pace.claim("a", 0.09, 0.1)
-    assert pace.claim("b", 0.09, 0.1) == pytest.approx(0.2)
+    pace.claim("a", 1, 0.09, 0.1)
+    assert pace.claim("b", 1, 0.09, 0.1) == pytest.approx(0.2)
     pace.release("a")
     pace.release("never there")
-    assert pace.claim("b", 0.09, 0.1) == pytest.approx(0.1)
+    assert pace.claim("b", 1, 0.09, 0.1) == pytest.approx(0.1)
+
+
+def test_what_another_program_reads_of_the_same_device_is_read_once_for_both() -> None:
+    pace = Pace()
+    pace.others = {1: 0.8}
+    assert pace.claim("a", 1, 0.08, 0.1) == pytest.approx(0.1)
+    assert pace.claim("b", 2, 0.08, 0.1) == pytest.approx(0.1 * 1.6 / SHARE)

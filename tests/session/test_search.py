@@ -91,7 +91,7 @@ async def test_who_polls_has_the_line_between_two_waits_in_vain() -> None:
     line = Replies({1})
     await searched(Search([1, 2], rest), line)
     assert not rests, "nobody polls: nothing to wait for"
-    line.pace.claim("a monitor", 0.1, 0.5)
+    line.pace.claim("a monitor", 1, 0.1, 0.5)
     await searched(Search([1, 2], rest), line)
     timing = line.timing
     # function 43 and the status word of the families without it, in both rounds

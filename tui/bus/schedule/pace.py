@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Hashable
+from collections.abc import Hashable, Mapping
 
 SHARE = 0.9
 """Share of the line's time that regular polls may take; the rest is the operator's."""
@@ -12,26 +12,31 @@ SHARE = 0.9
 class Pace:
     """Stretches all wished periods by one factor, so that together they fit the line.
 
+    Of wishes by several programs about one device the greatest counts: they share what is read.
     May be used from any thread.
     """
 
     def __init__(self) -> None:
-        self._wishes: dict[Hashable, float] = {}
+        self._wishes: dict[Hashable, tuple[int, float]] = {}
         self._lock = threading.Lock()
-        self.others = 0.0
-        """Share of the line's time that other programs' polls take."""
+        self.others: Mapping[int, float] = {}
+        """Share of the line's time that other programs' polls wish for, by device."""
 
     @property
-    def own(self) -> float:
-        """Share of the line's time that this program's polls wish for."""
+    def own(self) -> dict[int, float]:
+        """Share of the line's time that this program's polls wish for, by device."""
+        shares: dict[int, float] = {}
         with self._lock:
-            return sum(self._wishes.values())
+            for device, share in self._wishes.values():
+                shares[device] = shares.get(device, 0.0) + share
+        return shares
 
-    def claim(self, who: Hashable, seconds: float, period: float) -> float:
+    def claim(self, who: Hashable, device: int, seconds: float, period: float) -> float:
         """Tell a wish: so many seconds of the line in each period; returns the period to keep."""
         with self._lock:
-            self._wishes[who] = seconds / period
-            return period * max(1.0, (sum(self._wishes.values()) + self.others) / SHARE)
+            self._wishes[who] = device, seconds / period
+        wished = sum(greatest(self.own, self.others).values())
+        return period * max(1.0, wished / SHARE)
 
     @property
     def busy(self) -> bool:
@@ -42,3 +47,12 @@ class Pace:
         """Wish for nothing any more."""
         with self._lock:
             self._wishes.pop(who, None)
+
+
+def greatest(*wishes: Mapping[int, float]) -> dict[int, float]:
+    """The greatest wish about each device."""
+    found: dict[int, float] = {}
+    for one in wishes:
+        for device, share in one.items():
+            found[device] = max(share, found.get(device, 0.0))
+    return found

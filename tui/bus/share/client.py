@@ -77,7 +77,8 @@ class ShareClient:
         self._described: dict[int, object] = {}
         self._state: LineState | None = None
         self._note = ""
-        self._wish = (0.0, False)
+        self._wish: tuple[dict[int, float], bool] = ({}, False)
+        self._silent_looks = 0
         self._direct: DirectStops | None = None
         self.heard = inside.clock()
         """When the owner last gave a sign of life."""
@@ -243,11 +244,14 @@ class ShareClient:
         while True:
             await asyncio.sleep(LOOK_INTERVAL)
             inside = self._inside
-            share, trace = inside.pace.own, inside.around.trace.looked_at
-            if (share, trace) != self._wish:
-                self._wish = share, trace
-                self._tell(Wish(share, trace))
-            if not self.frozen and inside.clock() - self.heard > SILENT_OWNER:
+            wish = inside.pace.own, inside.around.trace.looked_at
+            if wish != self._wish:
+                self._wish = wish
+                self._tell(Wish(*wish))
+            # by looks, too: where this program got no time to look, the owner may be well
+            self._silent_looks += 1
+            silent = inside.clock() - self.heard > SILENT_OWNER
+            if not self.frozen and silent and self._silent_looks > SILENT_OWNER / LOOK_INTERVAL:
                 self._freeze()
             if self.frozen:
                 self._help_stops()
@@ -263,6 +267,7 @@ class ShareClient:
 
     def _hear_life(self) -> None:
         self.heard = self._inside.clock()
+        self._silent_looks = 0
         if self.frozen:
             self.frozen = False
             if self._direct is not None:
@@ -326,7 +331,7 @@ class ShareClient:
         for device, state in news.devices.items():
             inside.devices.copy(device, state)
         inside.around.tally.copy(news.counters)
-        inside.pace.others = news.share
+        inside.pace.others = news.shares
         for time, direction, data, note in news.frames:
             inside.around.trace.append(
                 Frame(time, "out" if direction == "out" else "in", data, note)

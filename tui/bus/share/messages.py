@@ -171,9 +171,12 @@ class Told(Message, frozen=True):
 
 
 class Wish(Message, frozen=True):
-    """The share of the line's time that a program's polls take; `trace` where it shows frames."""
+    """The share of the line's time that a program's polls take, by device.
 
-    share: float
+    `trace` where it shows frames.
+    """
+
+    shares: dict[int, float]
     trace: bool
 
 
@@ -193,8 +196,8 @@ class News(Message, frozen=True):
     counters: LineCounters
     devices: dict[int, DeviceState]
     """Those that have changed."""
-    share: float
-    """The share of the line's time that all other programs' polls take."""
+    shares: dict[int, float]
+    """The share of the line's time that all other programs' polls take, by device."""
     frames: tuple[tuple[float, str, bytes, str], ...] = ()
 
 

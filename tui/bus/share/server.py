@@ -18,6 +18,7 @@ from ..link import label
 from ..model import DeviceState
 from ..model import Reply as LineReply
 from ..schedule.inside import LineInside
+from ..schedule.pace import greatest
 from ..schedule.queue import Job
 from ..shared_facts import Program, commanded_by
 from .messages import (
@@ -67,7 +68,7 @@ class Client:
 
     program: Program
     writer: asyncio.StreamWriter
-    share: float = 0.0
+    shares: dict[int, float] = field(default_factory=dict)
     trace: bool = False
     frames: int = 0
     """How many frames of the line it was told of."""
@@ -280,9 +281,9 @@ class ShareServer:
             case Told(device=device, text=text):
                 self._inside.facts.hear_text(device, text)
                 self._tell_all(message, but=client.program.id)
-            case Wish(share=share, trace=trace):
-                client.share, client.trace = share, trace
-                self._inside.pace.others = sum(one.share for one in self._clients.values())
+            case Wish(shares=shares, trace=trace):
+                client.shares, client.trace = shares, trace
+                self._inside.pace.others = self._wishes()
             case _:
                 raise NoMessage(type(message).__name__)
 
@@ -396,6 +397,10 @@ class ShareServer:
         for client in list(self._clients.values()):
             client.say(self._news_for(client))
 
+    def _wishes(self, but: Client | None = None) -> dict[int, float]:
+        """What the clients' polls wish for, by device."""
+        return greatest(*(one.shares for one in self._clients.values() if one is not but))
+
     def _news_for(self, client: Client) -> News:
         inside = self._inside
         changed = {}
@@ -409,7 +414,5 @@ class ShareServer:
             last = inside.around.trace.frames()[-new:] if new else ()
             frames = tuple((one.time, one.direction, one.data, one.note) for one in last)
         client.frames = inside.around.trace.count
-        others = inside.pace.own + sum(
-            one.share for one in self._clients.values() if one is not client
-        )
+        others = greatest(inside.pace.own, self._wishes(but=client))
         return News(inside.state(), inside.around.tally.frozen(), changed, others, frames)

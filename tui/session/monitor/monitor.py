@@ -200,7 +200,7 @@ class Monitor:
         """The wished time of a cycle, longer where the line cannot keep it for all."""
         cost = self.reader.seconds(rates.fast)
         cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
-        return self.line.pace.claim(self, cost, max(self.period, SHORTEST_PERIOD))
+        return self.line.pace.claim(self, self.device, cost, max(self.period, SHORTEST_PERIOD))
 
     def _may_be_another(self, fault: Exception, failures: int) -> bool:
         """Whether after a failed cycle what was learned of the drive may be wrong."""
