@@ -21,10 +21,12 @@ import os
 import random
 import subprocess
 import sys
+import tempfile
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, field
+from pathlib import Path
 from statistics import median
 
 from rich.console import Console
@@ -36,6 +38,8 @@ from tui.bus.errors import LineError, NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line, Reply, Timing
 from tui.bus.link import SerialLink
+from tui.bus.share.place import SharePlace
+from tui.bus.shared_facts import Program
 
 TIME_OUT = 0.05
 FAST = Timing(
@@ -125,10 +129,23 @@ def right(device: int, address: int, words: int) -> list[int]:
 # Contestants
 
 
-async def ours(path: str, job: Job) -> Tally:
-    """Our line: an retrying for each drive, some requests given up on their way, some writes."""
+async def attached(path: str, job: Job) -> Tally:
+    """Our line as a program meets it that attached to the owner, itself idle."""
+    with tempfile.TemporaryDirectory() as folder:
+        place = SharePlace(path, Path(folder) / "lines", (Path(folder) / "run",))
+        owner = Line(SerialLink(path, 115200, "8N1"), timing=FAST, place=place)
+        owner.open(wait=5.0)
+        try:
+            return await ours(path, job, place)
+        finally:
+            owner.close()
+
+
+async def ours(path: str, job: Job, place: SharePlace | None = None) -> Tally:
+    """Our line: retries for each drive, some requests given up on their way, some writes."""
     link = SerialLink(path, 19200 if job.real else 115200, "8N1")
-    line = Line(link, timing=Timing(wire_time=True) if job.real else FAST)
+    timing = Timing(wire_time=True) if job.real else FAST
+    line = Line(link, timing=timing, place=place, program=Program("contestant", "contestant"))
     tally = Tally(job.contestant, time_out=line.timing.first_timeout)
     for device in DEVICES:
         line.describe(device, WIDE)
@@ -243,6 +260,7 @@ def _reads(job: Job) -> list[tuple[int, int, int]]:
 
 CONTESTANTS: dict[str, Callable[[str, Job], Tally]] = {
     "our line": lambda path, job: asyncio.run(ours(path, job)),
+    "our line, attached": lambda path, job: asyncio.run(attached(path, job)),
     "pymodbus, its own retries": lambda path, job: asyncio.run(pymodbus(path, job, 3)),
     "pymodbus, no retries": lambda path, job: asyncio.run(pymodbus(path, job, 0)),
     "minimalmodbus": lambda path, job: minimalmodbus(path, job, cleared=True),
@@ -344,9 +362,13 @@ def main() -> None:
     options = parser.parse_args()
     count, parts = (25_000, 8) if options.full else (2_500, 4)
     few = 2_000 if options.full else 600
-    others = [name for name in CONTESTANTS if name != "our line"]
+    others = [name for name in CONTESTANTS if not name.startswith("our line")]
     cases: list[tuple[str, list[Job]]] = [
         ("our line, mixed faults", [Job("our line", count, seed) for seed in range(parts)]),
+        (
+            "our line, attached",
+            [Job("our line, attached", count, seed) for seed in range(parts)],
+        ),
         ("our line, usual times at 19200", [Job("our line", few // 2, 99, real=True)]),
         *((f"{name}, mixed faults", [Job(name, few, 99)]) for name in others),
         ("our line, 15 % late", [Job("our line", few, 5, LATE)]),
