@@ -53,6 +53,9 @@ class Voice(Protocol):
     def reply(self, device: int, program: str, yes: bool, why: str) -> None:
         """The answer to a program that asked."""
 
+    def hushed(self, device: int, why: str) -> None:
+        """A device is left alone by this program, or with no reason no longer."""
+
     def told(self, device: int, text: str) -> None:
         """Something that everybody on the line is to read."""
 
@@ -78,6 +81,8 @@ class SharedFacts:
         """All on the line, the owner first."""
         self.commanders: Mapping[int, str] = MappingProxyType({})
         """Ids of the programs that command, by device."""
+        self.hushed: Mapping[int, tuple[str, str]] = MappingProxyType({})
+        """Devices that nobody asks now: by whose id, and why."""
         self.stops: Mapping[int, int] = MappingProxyType({})
         """How many stops each device was given, by all programs."""
         self.stopped_by: Mapping[int, str] = MappingProxyType({})
@@ -104,13 +109,20 @@ class SharedFacts:
         return next((one for one in self.programs if one.id == id), None)
 
     def learn(
-        self, programs: tuple[Program, ...], commanders: Mapping[int, str], stops: Mapping[int, int]
+        self,
+        programs: tuple[Program, ...],
+        commanders: Mapping[int, str],
+        stops: Mapping[int, int],
+        hushed: Mapping[int, tuple[str, str]],
     ) -> None:
         """Take over what the owner tells; what this program claims is its own until denied."""
         with self._lock:
             others = {d: one for d, one in commanders.items() if one != self.me.id}
             mine = {d: one for d, one in self.commanders.items() if one == self.me.id}
             self.programs = programs
+            told = {d: one for d, one in hushed.items() if one[0] != self.me.id}
+            own = {d: one for d, one in self.hushed.items() if one[0] == self.me.id}
+            self.hushed = MappingProxyType({**told, **own})
             self.commanders = MappingProxyType({**others, **mine})
             self.learn_stops(stops)
         self._changed()
@@ -144,6 +156,26 @@ class SharedFacts:
         """Something is to be read."""
         for listener in tuple(self._on_text):
             _told(listener, device, text)
+
+    # Left alone
+
+    def hush(self, device: int, why: str) -> None:
+        """Let nobody ask a device, but for what belongs to a stop."""
+        self.note_hush(device, self.me.id, why)
+        if self.voice is not None:
+            self.voice.hushed(device, why)
+
+    def unhush(self, device: int) -> None:
+        """Let a device be asked again."""
+        self.note_hush(device, self.me.id, "")
+        if self.voice is not None:
+            self.voice.hushed(device, "")
+
+    def note_hush(self, device: int, program: str, why: str) -> None:
+        """A program leaves a device alone, or with no reason no longer."""
+        with self._lock:
+            rest = {d: one for d, one in self.hushed.items() if d != device}
+            self.hushed = MappingProxyType({**rest, device: (program, why)} if why else rest)
 
     # Stops
 
@@ -269,6 +301,8 @@ class SharedFacts:
         with self._lock:
             held = {d: one for d, one in self.commanders.items() if one != program.id}
             self.commanders = MappingProxyType(held)
+            left = {d: one for d, one in self.hushed.items() if one[0] != program.id}
+            self.hushed = MappingProxyType(left)
             self.programs = tuple(one for one in self.programs if one.id != program.id)
         self._changed()
         for listener in tuple(self._on_gone):

@@ -161,7 +161,11 @@ class Dispatcher:
 
     def refusal(self, job: Job) -> str:
         """Why a write must not go out: a stop came after it, or another program commands."""
-        if job.priority is Priority.STOP or not job.request.changes or not job.program:
+        if job.priority is Priority.STOP or not job.program:
+            return ""
+        if hushed := self.facts.hushed.get(job.request.device):
+            return hushed[1]
+        if not job.request.changes:
             return ""
         return self.facts.refusal(job.program, job.request.device, job.stamp)
 

@@ -29,6 +29,7 @@ from .messages import (
     Failed,
     Goodbye,
     Hello,
+    Hush,
     News,
     NoMessage,
     Question,
@@ -307,8 +308,8 @@ class ShareClient:
                 self._answered(message)
             case News():
                 self._hear_news(message)
-            case Facts(programs=programs, commanders=commanders, stops=stops):
-                facts.learn(programs, commanders, stops)
+            case Facts():
+                facts.learn(message.programs, message.commanders, message.stops, message.hushed)
             case Told(device=device, text=text):
                 facts.hear_text(device, text)
             case StopGiven(devices=devices, by=by, program=program):
@@ -362,6 +363,10 @@ class ShareClient:
     def reply(self, device: int, program: str, yes: bool, why: str) -> None:
         """This program answers one that asked."""
         self._soon(Reply(device, program, yes, why))
+
+    def hushed(self, device: int, why: str) -> None:
+        """This program leaves a device alone, or no longer."""
+        self._soon(Hush(device, why))
 
     def told(self, device: int, text: str) -> None:
         """This program has something for all to read."""

@@ -163,6 +163,13 @@ class Reply(Message, frozen=True):
     why: str = ""
 
 
+class Hush(Message, frozen=True):
+    """A device is left alone, or with no reason no longer."""
+
+    device: int
+    why: str
+
+
 class Told(Message, frozen=True):
     """Something that every person on the line is to read."""
 
@@ -187,6 +194,8 @@ class Facts(Message, frozen=True):
     commanders: dict[int, str]
     """Ids of the programs that command, by device."""
     stops: dict[int, int]
+    hushed: dict[int, tuple[str, str]]
+    """Who leaves which device alone, and why."""
 
 
 class News(Message, frozen=True):
@@ -209,7 +218,7 @@ class Goodbye(Message, frozen=True):
 
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Ask | Withdraw | Answer | Failed | StopGiven | Claim
-    | Denied | Question | Reply | Told | Wish | Facts | News | Goodbye
+    | Denied | Question | Reply | Told | Hush | Wish | Facts | News | Goodbye
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

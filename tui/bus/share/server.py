@@ -32,6 +32,7 @@ from .messages import (
     Facts,
     Goodbye,
     Hello,
+    Hush,
     News,
     NoMessage,
     Question,
@@ -254,7 +255,9 @@ class ShareServer:
 
     def _tell_facts(self) -> None:
         facts = self._inside.facts
-        self._tell_all(Facts(facts.programs, dict(facts.commanders), dict(facts.stops)))
+        self._tell_all(
+            Facts(facts.programs, dict(facts.commanders), dict(facts.stops), dict(facts.hushed))
+        )
 
     # What clients say
 
@@ -270,6 +273,15 @@ class ShareServer:
                 client.limits[device] = limits
                 if self._inside.devices[device].limits is CAUTIOUS:
                     self._inside.devices.describe(device, limits)
+            case Wish(shares=shares, trace=trace):
+                client.shares, client.trace = shares, trace
+                self._inside.pace.others = self._wishes()
+            case _:
+                self._hear_fact(client, message)
+
+    def _hear_fact(self, client: Client, message: AnyMessage) -> None:
+        """What all programs must know."""
+        match message:
             case StopGiven(devices=devices, by=by):
                 self._stopped(devices, by, client.program)
             case Claim(device=device, take=take):
@@ -278,12 +290,12 @@ class ShareServer:
                 self._asked_for(client.program, device)
             case Reply():
                 self._replied(client.program, message)
+            case Hush(device=device, why=why):
+                self._inside.facts.note_hush(device, client.program.id, why)
+                self._tell_facts()
             case Told(device=device, text=text):
                 self._inside.facts.hear_text(device, text)
                 self._tell_all(message, but=client.program.id)
-            case Wish(shares=shares, trace=trace):
-                client.shares, client.trace = shares, trace
-                self._inside.pace.others = self._wishes()
             case _:
                 raise NoMessage(type(message).__name__)
 
@@ -326,6 +338,10 @@ class ShareServer:
     def reply(self, device: int, program: str, yes: bool, why: str) -> None:
         """This program answers one that asked."""
         self._soon(self._replied, self._inside.facts.me, Reply(device, program, yes, why))
+
+    def hushed(self, device: int, why: str) -> None:
+        """This program leaves a device alone, or no longer."""
+        self._soon(self._tell_facts)
 
     def told(self, device: int, text: str) -> None:
         """This program has something for all to read."""
