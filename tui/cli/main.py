@@ -20,6 +20,7 @@ COMMANDS = {
     "identify": ("identify", "Ask a drive who it is."),
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
+    "prove": ("prove", "Prove that a drive reacts to a silent line."),
     "read": ("read", "Read parameters of a drive."),
     "reference": ("orders", "Give a drive its reference."),
     "report": ("report", "Write a report on a drive to a file."),

@@ -30,6 +30,8 @@ class DriveConsole:
 
     session: DriveSession
     journal: Journal
+    proved: str = ""
+    """What the last proof of its communication loss came to, in a few words."""
 
     def __post_init__(self) -> None:
         self.monitor = Monitor(self.session)

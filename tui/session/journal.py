@@ -55,8 +55,9 @@ class Entry:
     read_back: int | None
     why: str
     """The command or edit that it belongs to."""
-    kind: Literal["write", "fault"] = "write"
-    """`fault` for a trip that was seen: `code` and `new` are the fault's, nothing was written."""
+    kind: Literal["write", "fault", "proof"] = "write"
+    """`fault` for a trip that was seen: `code` and `new` are the fault's, nothing was written;
+    `proof` for a proof of communication loss, whose words are in `new`."""
 
 
 class Journal:

@@ -57,7 +57,8 @@ def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]
     """The whole report; `entries` are those of the journal about this drive, oldest first."""
     written = [entry for entry in entries if entry.kind == "write"]
     trips = [entry for entry in entries if entry.kind == "fault"]
-    maker = _Report(profile, values, written, trips)
+    proofs = [entry for entry in entries if entry.kind == "proof"]
+    maker = _Report(profile, values, written, trips, proofs)
     parts = (
         maker.head(),
         maker.line(),
@@ -78,6 +79,7 @@ class _Report:
     values: ParameterSet
     entries: Sequence[Entry]
     trips: Sequence[Entry]
+    proofs: Sequence[Entry] = ()
 
     def head(self) -> list[str]:
         """What the drive is, and when and where it was read."""
@@ -176,7 +178,11 @@ class _Report:
             lines.append(f"- Reaction ({watch.reaction}): {self.text(watch.reaction)}{does}")
         elif watch.reactions:
             lines.append(f"- Reaction: {watch.reactions[0].does}")
-        return [*lines, f"- The watch begins: {watch.starts}"]
+        lines.append(f"- The watch begins: {watch.starts}")
+        if not self.proofs:
+            return [*lines, "- Not proved: `drivepanel prove`, or P on Control, does."]
+        last = self.proofs[-1]
+        return [*lines, f"- Proved {last.time[:16].replace('T', ' ')}: {last.new}"]
 
     def faults(self) -> list[str]:
         """The present or last fault, and the history that the drive keeps."""

@@ -11,9 +11,11 @@ from textual.widgets import OptionList
 
 from tui.bus.errors import LineError
 from tui.drive.channel import channel_codes, switch_texts
+from tui.drive.chart import ENABLED_KINDS
 from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
 from tui.session.console import DriveConsole
+from tui.session.monitor.timeout import TimeoutWatch
 from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, PLAIN, STRONG
@@ -21,6 +23,7 @@ from tui.widgets.plain import entry
 
 from ..command.command_keys import OrderKeys
 from ..keys.table import SOURCES, bindings
+from .proving import ask_to_prove, begin_proof, silence_line, warning_lines
 from .view import change_lines, diagram, note_lines, now_lines
 
 
@@ -102,6 +105,8 @@ class ControlSourceScreen(OrderKeys):
         if self._raws:
             lines += change_lines(self.session.profile, found, width)
         lines += [Text(""), *note_lines(self._chosen, found, width)]
+        if warnings := warning_lines(self.session, width):
+            lines += [Text(""), rule("When the line falls silent", width), *warnings]
         self.put("detail", lines)
         self.put("now", self._now(width))
         outcome = self.commander.outcome
@@ -112,7 +117,14 @@ class ControlSourceScreen(OrderKeys):
     def _now(self, width: int) -> list[Text]:
         profile, latest = self.session.profile, self.console.latest
         switches = switch_texts(profile, self._raws)
-        return now_lines(profile, self._today(), latest, self._trouble, switches, width)
+        lines = now_lines(profile, self._today(), latest, self._trouble, switches, width)
+        silence = silence_line(self.session, self._watch(), self.console.proved, width)
+        return [lines[1], silence, *lines[2:]]
+
+    def _watch(self) -> TimeoutWatch | None:
+        """The drive's watch over the line, once it was read."""
+        fleet = self.app.fleet
+        return fleet.line_watch.watch(self.session.device) if fleet is not None else None
 
     def _today(self) -> ControlSource | None:
         """The configuration in force, as far as it was read."""
@@ -121,6 +133,21 @@ class ControlSourceScreen(OrderKeys):
     def on_option_list_option_selected(self) -> None:
         """Enter in the list."""
         self.action_write_chosen()
+
+    def action_prove(self) -> None:
+        """Ask, then prove the communication time-out of the drive."""
+        latest = self.console.latest
+        if not self._armed_or_told() or latest is None:
+            return
+        turning = latest.state.motion in ENABLED_KINDS
+        ask_to_prove(self._ask, self.session, self._watch(), turning=turning, work=self._prove)
+
+    def _prove(self, stamp: int, *, turning: bool) -> None:
+        """Prove it behind the work before; on record, and told when it has ended."""
+        fleet = self.app.fleet
+        if fleet is not None:
+            begin_proof(fleet, self.console, stamp, turning=turning)
+        self.look()
 
     def action_write_chosen(self) -> None:
         """Say what follows, and write it."""

@@ -36,6 +36,7 @@ STOP = "Stop the drive on its ramp, wherever a space is no text; without an open
 STOP_ANYWHERE = "The same, also while text is typed, from any screen or dialog."
 STOP_ALL = "Stop every drive of the line on its ramp, from any screen."
 ARM = "Arm this drive for a minute, or for a minute more."
+PROVE = "Prove that the drive reacts to a silent line as it is set to; armed, asks."
 GIVE_DRIVE = "Answer a program that asks to command this drive; asks."
 ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
 OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
@@ -77,6 +78,7 @@ ACTIONS: tuple[Action, ...] = (
     *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("disarm", "A", "", "End arming.")),
     *on((MONITOR, SOURCES, PARAMETERS, BLOCKS, FAULTS), ("answer_request", "G", "", GIVE_DRIVE)),
     *COMMAND_ACTIONS,
+    *on((SOURCES,), ("prove", "P", "prove", PROVE)),
     Action("write_chosen", "enter", "write", WRITE_SOURCE, (SOURCES,), bound=False),
     *on(
         (FAULTS,),

@@ -98,6 +98,8 @@ class CommunicationFault(Table, frozen=True, kw_only=True):
     """When the watch begins, in words."""
     needs_write: bool = False
     """True where it begins only after a command or reference was written."""
+    begins_with: RawWord | None = None
+    """A command word that begins the watch and moves nothing, where a first command begins it."""
     fault: int | None = None
     warnings: list[str] = []
     note: str = ""

@@ -1,0 +1,226 @@
+"""A drive is left alone for longer and longer until it reacts, and what that tells."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import pytest
+
+from tui.bus.api import Priority
+from tui.bus.errors import RequestRefused
+from tui.bus.line import Reply
+from tui.drive.orders import OrderRefused
+from tui.drive.profile import library
+from tui.session.clock import Clock
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+from tui.session.proof.prover import NothingToProve, Prover
+from tui.session.proof.silences import Bracket, silences
+from tui.session.work import Stopped
+
+from .fakes import OneDrive
+from .slow_drive import until
+
+PROFILE = library.load("atv312")
+STATUS, LAST_FAULT, TIMEOUT, REACTION, HERTZ, COMMAND = (
+    PROFILE[code].address for code in ("ETA", "LFt", "ttO", "SLL", "rFr", "CMD")
+)
+AT_REST, RUNNING, TRIPPED, SLF = 0x0221, 0x0627, 0x0228, 5
+EXCHANGE = 0.01
+
+
+class OwnTime(Clock):
+    """Time that goes by only where somebody sleeps."""
+
+    now = 1000.0
+
+    def monotonic(self) -> float:
+        """Seconds that only go forward."""
+        return self.now
+
+    async def sleep(self, seconds: float) -> None:
+        """Let others have a turn, and the time go by."""
+        await asyncio.sleep(0)
+        self.now += seconds
+
+    def of_line(self, told: float) -> float:
+        """The line has no other time."""
+        return self.now
+
+
+class WatchingDrive(OneDrive):
+    """An Altivar 312 that trips when nobody has asked it for `timeout` seconds."""
+
+    def __init__(self, clock: OwnTime, timeout: float, *, held: float | None = None) -> None:
+        super().__init__(dict.fromkeys(range(0x10000), 0))
+        self.clock = clock
+        self.timeout = timeout
+        self.registers[TIMEOUT] = round(10 * (timeout if held is None else held))
+        self.registers[REACTION] = 1
+        self.registers[STATUS] = AT_REST
+        self.fault = SLF
+        self.asked_by: list[Priority] = []
+        self._heard = math.inf
+
+    async def read(
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
+        max_age: float = 0.0,
+    ) -> Reply:
+        hushed = self.facts.hushed.get(device)
+        if hushed and priority is not Priority.STOP:
+            raise RequestRefused(hushed[1])
+        now = self.clock.monotonic()
+        if now - self._heard > self.timeout:
+            self.registers[STATUS] = TRIPPED
+            self.registers[LAST_FAULT] = self.fault
+            self.registers[HERTZ] = 0
+        self._heard = now
+        self.asked_by.append(priority)
+        self.clock.now += EXCHANGE
+        return await super().read(device, address, count, priority=priority, function=function)
+
+    async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
+        self._heard = self.clock.monotonic()
+        return await super().write(device, address, values, **how)
+
+
+def bench(clock: OwnTime, drive: WatchingDrive, *, turning: bool = False) -> Prover:
+    session = DriveSession(drive, 1, PROFILE, clock=clock)
+    session.arming.arm(seconds=math.inf)
+    return Prover(session, Journal(), session.work.permit(), turning)
+
+
+def test_silences_around_the_time_out_are_at_most_300_ms_apart_at_2_s() -> None:
+    around = [one for one in silences(2.0) if 1.5 <= one <= 2.7]
+    steps = [b - a for a, b in pairwise(around)]
+    assert max(steps) < 0.3
+    assert list(silences(2.0)) == sorted(silences(2.0))
+    assert max(silences(100.0)) <= 90.0
+
+
+@pytest.mark.parametrize("timeout", [0.5, 2.0, 10.0])
+async def test_a_drive_that_reacts_as_set_is_bracketed(timeout: float) -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, timeout)
+    result = await bench(clock, drive).prove()
+    assert result.as_set
+    assert result.fault.startswith("SLF")
+    bracket = result.bracket
+    assert bracket.not_after is not None
+    assert bracket.not_before <= timeout <= bracket.not_after
+    assert bracket.not_after - bracket.not_before <= 0.15 * timeout + 0.1
+
+
+@pytest.mark.parametrize(("timeout", "held"), [(1.0, 2.0), (4.0, 2.0)])
+async def test_a_time_out_that_is_not_the_one_set_is_told(timeout: float, held: float) -> None:
+    clock = OwnTime()
+    result = await bench(clock, WatchingDrive(clock, timeout, held=held)).prove()
+    assert not result.as_set
+    assert "NOT AS SET: 2 s are set." in result.text
+    assert result.bracket.not_after is not None
+    assert result.bracket.not_before <= timeout <= result.bracket.not_after
+
+
+async def test_a_drive_that_never_reacts_is_told_in_capitals() -> None:
+    clock = OwnTime()
+    result = await bench(clock, WatchingDrive(clock, math.inf, held=1.0)).prove()
+    assert not result.as_set
+    assert result.bracket.not_after is None
+    assert result.json()["measured_ms"] is None
+    assert result.text.startswith("DID NOT REACT to 3.0 s")
+
+
+async def test_another_fault_than_that_of_the_line_is_not_as_set() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 1.0)
+    drive.fault = 9
+    result = await bench(clock, drive).prove()
+    assert not result.as_set
+    assert "the fault should be SLF" in result.text
+
+
+async def test_nobody_else_asks_the_drive_meanwhile_and_all_may_again_afterwards() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 1.0)
+    prover = bench(clock, drive)
+    task = asyncio.ensure_future(prover.prove())
+    refused = 0
+    while not task.done():
+        await asyncio.sleep(0)
+        if drive.facts.hushed:
+            with pytest.raises(RequestRefused, match="being proved"):
+                await drive.read(1, STATUS)
+            refused += 1
+    assert refused
+    assert set(drive.asked_by) == {Priority.STOP}
+    await drive.read(1, STATUS)
+
+
+async def test_a_stop_ends_the_proof_and_lets_the_drive_be_asked() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 5.0)
+    prover = bench(clock, drive)
+    task = asyncio.ensure_future(prover.prove())
+    await until(lambda: len(drive.asked_by) >= 12)
+    prover.session.work.stop("the stop key")
+    await asyncio.wait([task])
+    assert isinstance(task.exception(), Stopped)
+    assert not drive.facts.hushed
+
+
+async def test_a_motor_that_turns_is_proved_only_where_that_was_said() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 1.0)
+    drive.registers[STATUS] = RUNNING
+    with pytest.raises(OrderRefused, match="hoist falls"):
+        await bench(clock, drive).prove()
+    result = await bench(clock, drive, turning=True).prove()
+    assert result.seen == "trips"
+    drive.registers[STATUS] = AT_REST
+    with pytest.raises(OrderRefused, match="at rest"):
+        await bench(clock, drive, turning=True).prove()
+
+
+async def test_what_shows_nothing_at_rest_and_a_fault_before_are_refused() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 1.0)
+    drive.registers[REACTION] = 0
+    with pytest.raises(OrderRefused, match="nothing shows at rest"):
+        await bench(clock, drive).prove()
+    drive.registers[REACTION], drive.registers[STATUS] = 1, TRIPPED
+    with pytest.raises(OrderRefused, match="reset it first"):
+        await bench(clock, drive).prove()
+
+
+async def test_a_watch_that_is_off_is_nothing_to_prove() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 1.0)
+    drive.registers[TIMEOUT] = 0
+    with pytest.raises(NothingToProve, match="does not notice"):
+        await bench(clock, drive).prove()
+    assert not drive.facts.hushed
+
+
+async def test_a_reaction_that_was_changed_behind_the_panels_back_is_told() -> None:
+    clock = OwnTime()
+    drive = WatchingDrive(clock, 1.0)
+    prover = bench(clock, drive)
+    prover.session.image.confirm("ttO", 100, clock.monotonic())
+    result = await prover.prove()
+    assert result.changed.startswith("ttO is 1.0 s, and was")
+
+
+def test_the_bracket_never_closes_on_the_wrong_side() -> None:
+    bracket = Bracket().alive(1.9).reacted(1.8)
+    assert bracket.not_after == 1.9
+    assert not Bracket().alive(3.0).holds(1.0)

@@ -1,0 +1,107 @@
+"""`drivepanel prove`: does a drive react to a silent line as it is set to?"""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..shared.errors import DIFFERENT, DRIVE_REFUSED, Failure, told
+from ..shared.options import (
+    Target,
+    drive_options,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+)
+from ..shared.say import say
+from .orders import arm_drive, arm_option, carried_out, complain, need_arming, watched
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.console import DriveConsole
+    from tui.session.fleet import Fleet
+    from tui.session.proof.result import ProofResult
+
+STOPPED_WITHIN = 60.0
+"""Seconds that a motor may take to its standstill after a proof on the run."""
+
+
+@click.command()
+@line_argument
+@drive_options
+@arm_option
+@click.option(
+    "--turning",
+    is_flag=True,
+    help="Prove it with the motor turning: it may coast, and a hoist falls. It is stopped after.",
+)
+@click.option(
+    "--reset", is_flag=True, help="Reset the fault in which the proof has left the drive."
+)
+@read_only_option
+@json_option
+@told
+def prove(
+    target: Target, arm: bool, turning: bool, reset: bool, read_only: bool, as_json: bool
+) -> None:
+    """Prove that a drive reacts to a silent line, by leaving it alone for longer and longer.
+
+    Ends with 0 where it reacted as it is set to, with 1 otherwise. Nobody else on the line asks the
+    drive meanwhile. The motor is at rest, unless --turning.
+    """
+    need_arming(arm, "prove lets the drive trip on its communication time-out")
+
+    async def work(opened: OpenLine) -> ProofResult:
+        async with watched(opened, target) as (fleet, console):
+            arm_drive(console)
+            result = await _proved(fleet, console, turning, quiet=as_json)
+            if reset and result.fault:
+                await carried_out(console.commander, lambda: console.commander.order("reset"))
+            return result
+
+    result = on_line(target, work, read_only=read_only)
+    _tell(target, result, reset, as_json)
+    if not result.as_set:
+        raise click.exceptions.Exit(DIFFERENT)
+
+
+async def _proved(
+    fleet: Fleet, console: DriveConsole, turning: bool, *, quiet: bool
+) -> ProofResult:
+    """The proof, on record; a motor that turned is stopped, whatever the end."""
+    from tui.session.proof.prover import NothingToProve, Prover
+    from tui.session.proof.record import proof_entry
+
+    session = console.session
+    prover = Prover(session, console.journal, session.work.permit(), turning)
+    if not quiet:
+        prover.tell = complain
+    try:
+        result = await prover.prove()
+    except NothingToProve as error:
+        raise Failure(str(error), DIFFERENT) from error
+    finally:
+        if turning:
+            fleet.stop([session], by="the end of the proof")
+            summary = await asyncio.to_thread(fleet.stopper.wait, [session], STOPPED_WITHIN)
+            if summary.failed:
+                raise Failure(f"Device {session.device}: NOT STOPPED.", DRIVE_REFUSED)
+    console.journal.add(proof_entry(session, result))
+    return result
+
+
+def _tell(target: Target, result: ProofResult, reset: bool, as_json: bool) -> None:
+    if as_json:
+        from ..shared.output import print_json
+
+        told: dict[str, Any] = {"line": target.line_text, "device": result.device}
+        print_json({**told, **result.json(), "reset": reset and bool(result.fault)})
+        return
+    say(f"Device {result.device}: {result.text}")
+    if result.changed:
+        say(result.changed)
+    if result.fault and not reset:
+        say(f"It is in the fault {result.fault} now; `drivepanel reset` with --arm ends that.")

@@ -1,0 +1,120 @@
+"""The proof of communication loss from Control: what is set, the question, the work."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from functools import partial
+from typing import TYPE_CHECKING
+
+from rich.text import Text
+
+from tui.bus.errors import LineClosed
+from tui.bus.link import SerialLink
+from tui.session.drive import DriveSession
+from tui.session.monitor.timeout import TimeoutWatch
+from tui.session.proof.prover import Prover
+from tui.session.proof.record import proof_entry
+from tui.session.work import Permit, Task
+from tui.widgets.drawing import wrapped
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+
+if TYPE_CHECKING:
+    from tui.session.console import DriveConsole
+    from tui.session.fleet import Fleet
+
+HOW_IT_IS_PROVED = (
+    "Nobody asks the drive for longer and longer, around its time-out, until it reacts: then it is"
+    " in a fault, which x on Monitor resets. It takes about {seconds:.0f} s."
+)
+PROOF_ON_THE_RUN = (
+    "THE MOTOR TURNS: it does what is set, and may coast; a hoist falls. A stop goes out when the"
+    " proof ends, and at any stop key. "
+)
+TIMEOUTS_A_PROOF_TAKES = 4.6
+"""Time-outs that a proof takes where the drive reacts as set."""
+
+
+def silence_line(
+    session: DriveSession, watch: TimeoutWatch | None, proved: str, width: int
+) -> Text:
+    """What the drive does on a silent line, whether that was proved, how the drive is reached."""
+    rules, link = session.profile.data.communication_fault, session.line.link
+    told = Text("  On silence    ", FAINT, no_wrap=True)
+    if rules is None:
+        told.append("no communication time-out is known", PLAIN)
+    elif watch is None:
+        told.append(f"{rules.timeout or 'time-out'} off, or not read yet", ALARM)
+    else:
+        does = watch.reaction.name if watch.reaction else "its own reaction"
+        told.append(f"{rules.timeout} {watch.timeout:g} s, ", STRONG)
+        told.append(does, STRONG if watch.trips else ALARM)
+        told.append(f" · {proved or 'not proved'}", PLAIN if proved else FAINT)
+    told.append(f" · address {session.device}", FAINT)
+    if isinstance(link, SerialLink):
+        told.append(f" · {link.baud} {link.format}", FAINT)
+    told.truncate(width, overflow="ellipsis")
+    return told
+
+
+def warning_lines(session: DriveSession, width: int) -> list[Text]:
+    """What the family warns of when the line falls silent."""
+    rules = session.profile.data.communication_fault
+    lines = []
+    for warning in rules.warnings if rules else ():
+        for at, line in enumerate(wrapped(warning, width - 7, 3)):
+            text = Text(no_wrap=True)
+            text.append("     " if at else "   ! ", ALARM)
+            lines.append(text.append(line, FAINT))
+    return lines
+
+
+def ask_to_prove(
+    ask: Callable[[str, str, str, str, Callable[[int], object]], None],
+    session: DriveSession,
+    watch: TimeoutWatch | None,
+    *,
+    turning: bool,
+    work: Callable[..., None],
+) -> None:
+    """Ask whether it is proved now; a motor that turns is named."""
+    seconds = TIMEOUTS_A_PROOF_TAKES * watch.timeout if watch is not None else 0.0
+    how = (
+        HOW_IT_IS_PROVED.format(seconds=seconds)
+        if watch is not None
+        else HOW_IT_IS_PROVED.partition(" It takes")[0]
+    )
+    ask(
+        f"Prove the communication loss of drive {session.device}?",
+        (PROOF_ON_THE_RUN if turning else "") + how,
+        "proves it",
+        "leaves it",
+        partial(work, turning=turning),
+    )
+
+
+def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: bool) -> None:
+    """Hand the proof to the drive's queue of work. Raises OrderRefused."""
+    session = console.session
+
+    async def carry_out(permit: Permit) -> str:
+        def tell(text: str) -> None:
+            fleet.events.add("told", text, session.device)
+
+        prover = Prover(session, console.journal, permit, turning, tell)
+        try:
+            result = await prover.prove()
+            console.journal.add(proof_entry(session, result))
+            console.proved = result.short
+            text = f"Proof: {result.text} {result.changed}".rstrip()
+            if turning:
+                # before the stop, which ends this work
+                fleet.events.add("done" if result.as_set else "failed", text, session.device)
+        finally:
+            if turning and permit.stamp == session.work.stops:
+                with suppress(LineClosed):
+                    fleet.stop([session], by="the end of the proof")
+        return "" if turning else text
+
+    working = "Proof of communication loss: nobody asks the drive."
+    session.work.put(Task(carry_out, owner=console, working=working), stamp)

@@ -1,0 +1,222 @@
+"""Lets a drive alone for longer and longer, and sees after which silence it has reacted.
+
+To ask a drive feeds it, so one silence cannot be timed: each ends with one read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+from tui.bus.api import Priority
+from tui.drive.chart import ENABLED_KINDS, fault_code
+from tui.drive.errors import DriveError
+from tui.drive.orders import OrderRefused, deciding_codes
+from tui.drive.profile.schema import CommunicationFault, Reaction
+
+from ..drive import DriveSession
+from ..drive_state import DriveState, drive_state
+from ..journal import Journal
+from ..monitor.timeout import timeout_seconds
+from ..read.reader import Reader
+from ..reading import Reading
+from ..settings.write import Writer
+from ..work import Permit
+from .result import ProofResult
+from .silences import Bracket, silences
+
+LEFT_ALONE_FOR_PROOF = "Its communication time-out is being proved: nobody asks it meanwhile."
+LOOK_FOR_STOP = 0.05
+"""Seconds between two looks, in a silence, whether a stop was given."""
+REACTION_SHOWS_AFTER = 0.3
+"""Seconds that a drive has for its reaction to show, before it is read with all words."""
+SLOWER = 0.8
+"""Share of the frequency before below which a motor that turned is slowing down."""
+
+
+class NothingToProve(DriveError):
+    """The drive has no communication time-out in force."""
+
+
+@dataclass(slots=True)
+class Prover:
+    """One proof of one drive; `tell` is told how far it is."""
+
+    session: DriveSession
+    journal: Journal
+    permit: Permit
+    turning: bool = False
+    tell: Callable[[str], None] = lambda _: None
+    _reader: Reader = field(init=False)
+
+    def __post_init__(self) -> None:
+        self._reader = Reader(self.session)
+
+    async def prove(self) -> ProofResult:
+        """Prove the communication time-out of the drive.
+
+        Raises NothingToProve, OrderRefused where the drive is not fit for it, Stopped where a stop
+        came, and the line's errors. Whatever happens others may ask the drive again afterwards.
+        """
+        session, facts = self.session, self.session.line.facts
+        rules = session.profile.data.communication_fault
+        if rules is None or not rules.timeout:
+            raise NothingToProve(f"{session.profile.name} has no communication time-out.")
+        before = {code: session.image.get(code) for code in (rules.timeout, rules.reaction) if code}
+        facts.hush(session.device, LEFT_ALONE_FOR_PROOF)
+        try:
+            readings = await self._read(self._codes(rules))
+            timeout = timeout_seconds(readings[rules.timeout], rules.off)
+            if timeout is None:
+                raise NothingToProve(
+                    f"{rules.timeout} is {readings[rules.timeout].text}: the drive does not notice"
+                    " a dead line, and a motor that runs goes on."
+                )
+            reaction = self._reaction(rules, readings)
+            self._check_fit(drive_state(session.profile, readings), reaction)
+            await self._begin_watch(rules)
+            changed = self._changed(before, readings)
+            return await self._grow(rules, timeout, reaction, changed)
+        finally:
+            facts.unhush(session.device)
+            session.stir()
+
+    def _codes(self, rules: CommunicationFault) -> list[str]:
+        profile = self.session.profile
+        codes = [rules.timeout, rules.reaction, *self._state_codes()]
+        return [*dict.fromkeys(code for code in codes if code), *deciding_codes(profile)]
+
+    def _state_codes(self) -> list[str]:
+        profile = self.session.profile
+        codes = [chart.status for chart in profile.data.charts]
+        codes += [chart.when.parameter for chart in profile.data.charts if chart.when]
+        codes += [profile.data.faults.parameter, fault_code(profile) or ""]
+        frequency = profile.quantity("output_frequency")
+        codes.append(frequency.code if frequency else "")
+        return list(dict.fromkeys(code for code in codes if code))
+
+    async def _read(self, codes: list[str]) -> dict[str, Reading]:
+        # as a part of a stop: those alone pass where a drive is left alone
+        return await self._reader.read(codes, priority=Priority.STOP)
+
+    @staticmethod
+    def _reaction(rules: CommunicationFault, readings: dict[str, Reading]) -> Reaction | None:
+        raw = readings[rules.reaction].raw if rules.reaction else None
+        return next((one for one in rules.reactions if one.raw == raw), None)
+
+    def _check_fit(self, state: DriveState, reaction: Reaction | None) -> None:
+        """Raise OrderRefused where nothing could be proved, or more than was asked for."""
+        if state.kind == "fault":
+            raise OrderRefused("The drive is in a fault already: reset it first.")
+        if state.kind == "unknown":
+            raise OrderRefused("The state of the drive is not known; nothing is proved.")
+        turns = state.motion in ENABLED_KINDS
+        if turns and not self.turning:
+            raise OrderRefused(
+                "The motor is not at rest. Stop it first; --turning proves it on the run: the motor"
+                " may coast, and a hoist falls."
+            )
+        if self.turning and not turns:
+            raise OrderRefused("The motor is at rest: run it first, or prove it without turning.")
+        if reaction is not None and not reaction.trips and not self.turning:
+            raise OrderRefused(
+                f"{reaction.name}: no fault follows, so that nothing shows at rest. Prove it with"
+                " the motor turning."
+            )
+
+    async def _begin_watch(self, rules: CommunicationFault) -> None:
+        """Where the watch begins with the first command, give one that moves nothing."""
+        word = rules.begins_with
+        chart = self.session.profile.chart(self.session.image.raws)
+        if word is None or chart is None or self.turning:
+            return
+        self.permit.check()
+        # no permit: the reads that go with one would be held, as everybody else's are
+        writer = Writer(self.session, self.journal, None)
+        await writer.write_parameter(
+            self.session.profile[chart.command],
+            word,
+            why="begins the watch over the line, moves nothing",
+            read_back=False,
+            priority=Priority.STOP,
+        )
+
+    def _changed(self, before: dict[str, Reading | None], readings: dict[str, Reading]) -> str:
+        changed = [
+            f"{code} is {readings[code].text} {readings[code].unit}".rstrip()
+            + f", and was {held.text or held.raw} when it was read before."
+            for code, held in before.items()
+            if held is not None and held.raw is not None and held.raw != readings[code].raw
+        ]
+        return " ".join(changed)
+
+    async def _grow(
+        self, rules: CommunicationFault, timeout: float, reaction: Reaction | None, changed: str
+    ) -> ProofResult:
+        clock, bracket = self.session.clock, Bracket()
+        readings = await self._read(self._state_codes())
+        speed, begun, ended = self._hertz(readings), clock.monotonic(), clock.monotonic()
+        for seconds in silences(timeout):
+            self.tell(f"Silent for {seconds:.1f} s; set are {timeout:g} s.")
+            await self._silence(ended + seconds)
+            asked = clock.monotonic()
+            readings = await self._read(self._state_codes())
+            heard = clock.monotonic()
+            state = drive_state(self.session.profile, readings)
+            seen = self._seen(state, speed, self._hertz(readings))
+            if seen:
+                # at most from the start of the request before to the end of this one's reply
+                bracket = bracket.reacted(heard - begun)
+                return await self._result(rules, timeout, reaction, bracket, seen, changed)
+            bracket = bracket.alive(asked - ended)
+            begun, ended = asked, heard
+        return await self._result(rules, timeout, reaction, bracket, "", changed)
+
+    async def _silence(self, until: float) -> None:
+        clock = self.session.clock
+        while (left := until - clock.monotonic()) > 0:
+            self.permit.check()
+            await clock.sleep(min(left, LOOK_FOR_STOP))
+        self.permit.check()
+
+    def _hertz(self, readings: dict[str, Reading]) -> float | None:
+        frequency = self.session.profile.quantity("output_frequency")
+        number = readings[frequency.code].number if frequency else None
+        return None if number is None else abs(number)
+
+    def _seen(self, state: DriveState, before: float | None, now: float | None) -> str:
+        """What the drive has done since it was asked before; empty for nothing."""
+        if state.kind == "fault":
+            return "trips"
+        if not self.turning:
+            return ""
+        if state.motion not in ENABLED_KINDS:
+            return "stops"
+        if state.motion == "stopping" or (before and now is not None and now < SLOWER * before):
+            return "slows down"
+        return ""
+
+    async def _result(
+        self,
+        rules: CommunicationFault,
+        timeout: float,
+        reaction: Reaction | None,
+        bracket: Bracket,
+        seen: str,
+        changed: str,
+    ) -> ProofResult:
+        profile = self.session.profile
+        state = None
+        if seen:
+            await self.session.clock.sleep(REACTION_SHOWS_AFTER)
+            state = drive_state(profile, await self._read(self._state_codes()))
+        codes = {one.raw: f"{one.code}, {one.name}" for one in profile.data.faults.codes}
+        trips = reaction is None or reaction.trips
+        expected = codes.get(rules.fault, "") if trips and rules.fault is not None else ""
+        fault = ""
+        if state is not None and state.kind == "fault":
+            fault = f"{state.fault.code}, {state.fault.name}" if state.fault else "a fault"
+        return ProofResult(
+            self.session.device, timeout, reaction, bracket, self.turning, seen, fault,
+            expected, changed,
+        )  # fmt: skip

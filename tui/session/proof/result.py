@@ -1,0 +1,90 @@
+"""What a proof of communication loss has come to, in words and figures. Pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from tui.drive.profile.schema import Reaction
+
+from .silences import Bracket
+
+
+@dataclass(frozen=True, slots=True)
+class ProofResult:
+    """One proof of one drive."""
+
+    device: int
+    configured: float
+    """The communication time-out that is set, in seconds."""
+    reaction: Reaction | None
+    """The reaction that is set; None where the family has none to set, or it is not known."""
+    bracket: Bracket
+    turning: bool
+    """Whether the motor turned."""
+    seen: str = ""
+    """What the drive was seen to do; empty where it did nothing."""
+    fault: str = ""
+    """The fault that it is in now, as `SLF1, Modbus communication`."""
+    expected_fault: str = ""
+    """The fault that it should be in."""
+    changed: str = ""
+    """What was set otherwise when it was read before, as a sentence."""
+
+    @property
+    def as_set(self) -> bool:
+        """Whether it did what it is set to, when it is set to."""
+        right = not self.expected_fault or self.fault == self.expected_fault
+        return bool(self.seen) and right and self.bracket.holds(self.configured)
+
+    @property
+    def short(self) -> str:
+        """The proof in a few words."""
+        middle = self.bracket.measured
+        if middle is None:
+            return "PROVED: NO REACTION"
+        return f"proved {middle:.1f} s" if self.as_set else f"proved {middle:.1f} s, NOT AS SET"
+
+    @property
+    def text(self) -> str:
+        """The proof in a sentence or two, for a person and the report."""
+        middle = self.bracket.measured
+        if middle is None:
+            return (
+                f"DID NOT REACT to {self.bracket.not_before:.1f} s of silence; set are"
+                f" {self.configured:g} s{self._reaction()}. A motor that runs is not stopped when"
+                " the line dies."
+            )
+        does = f", set to: {self.reaction.name.lower()}" if self.reaction else ""
+        what = f"{self.seen} {middle:.1f} s after the last request{does}"
+        fault = f", {self.fault.partition(',')[0]}" if self.fault else ""
+        verdict = "" if self.as_set else f" NOT AS SET: {self._why_not()}"
+        return f"{what[0].upper()}{what[1:]}{fault}.{verdict}"
+
+    def _reaction(self) -> str:
+        return f", {self.reaction.name.lower()}" if self.reaction else ""
+
+    def _why_not(self) -> str:
+        if not self.bracket.holds(self.configured):
+            return f"{self.configured:g} s are set."
+        return f"the fault should be {self.expected_fault or 'none'}."
+
+    def json(self) -> dict[str, Any]:
+        """The figures, in whole ms; null where there is none."""
+        bracket = self.bracket
+        return {
+            "configured_ms": _ms(self.configured),
+            "not_before_ms": _ms(bracket.not_before),
+            "not_after_ms": _ms(bracket.not_after),
+            "measured_ms": _ms(bracket.measured),
+            "reaction": self.reaction.name if self.reaction else None,
+            "seen": self.seen or None,
+            "fault": self.fault or None,
+            "turning": self.turning,
+            "as_set": self.as_set,
+            "text": self.text,
+        }
+
+
+def _ms(seconds: float | None) -> int | None:
+    return None if seconds is None else round(1000 * seconds)
