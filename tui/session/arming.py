@@ -36,10 +36,12 @@ class Arming:
         """Let writes through from now on.
 
         `seconds` is how long without a key; math.inf for a command that ends by itself. Raises
-        OrderRefused on a read-only line.
+        OrderRefused on a line that is read-only, or held until a person says otherwise.
         """
         if self._line.read_only:
             raise OrderRefused("The line is read-only: nothing is written.")
+        if self._line.held:
+            raise OrderRefused(self._line.held)
         self._span, self._why = seconds, ""
         self.times += 1
         self._until = self._clock.monotonic() + seconds
