@@ -18,6 +18,7 @@ COMMANDS = {
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
     "demo": ("panel", "Open the panel on five simulated, running drives."),
     "identify": ("identify", "Ask a drive who it is."),
+    "lines": ("lines", "List the lines that have a name, and what is known of them."),
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "read": ("read", "Read parameters of a drive."),
@@ -36,7 +37,8 @@ COMMANDS = {
 
 LINE_HELP = """
 LINE is serial:PATH[,BAUD[,FORMAT]] or a device path, tcp:HOST[:PORT], rtu-tcp:HOST:PORT, or
-sim:PROFILE[@ADDRESS][,...] for simulated drives. Formats are written 8E1, 8N2.
+sim:PROFILE[@ADDRESS][,...] for simulated drives. Formats are written 8E1, 8N2. A name out of the
+settings file stands for a LINE too; DRIVEPANEL_LINE is the LINE where none is written.
 
 Exit status: 0 done, 2 usage, 3 no answer or line trouble, 4 the drive refused, 5 refused here.
 """

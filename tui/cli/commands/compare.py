@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.errors import DIFFERENT, USAGE, Failure, told
+from ..shared.line_argument import LINE_VARIABLE, named_line_of
 from ..shared.options import Target, devices_option
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
@@ -21,7 +22,7 @@ FACTORY = "factory"
 
 @click.command()
 @click.argument("a")
-@click.argument("b")
+@click.argument("b", envvar=LINE_VARIABLE)
 @click.option("--all", "all_rows", is_flag=True, help="Show equal and measured ones too.")
 @click.option(
     "--format",
@@ -54,9 +55,9 @@ def compare(
 
     if len(devices) > 2:
         raise click.UsageError("-d is given once, or once for A and once for B.")
-    places = devices or (1,)
+    places = devices or (None,)
     sets = [
-        None if text == FACTORY else _set_of(text, Target(text, device, profile_id))
+        None if text == FACTORY else _set_of(text, _target(text, device, profile_id))
         for text, device in ((a, places[0]), (b, places[-1]))
     ]
     ids = {found.head.profile for found in sets if found is not None}
@@ -87,3 +88,13 @@ def _set_of(text: str, target: Target) -> ParameterSet:
     if Path(text).suffix == ".toml":
         raise Failure(f"{text} is not there.", USAGE)
     return set_of_drive(target)[1]
+
+
+def _target(text: str, device: int | None, profile_id: str | None) -> Target:
+    """The drive of a LINE, or of the name of one; what was typed goes before what the name says."""
+    named = named_line_of(text)
+    if named is None:
+        return Target(text, device or 1, profile_id)
+    if device in (None, named.device):
+        profile_id = profile_id or named.profile
+    return Target(named.line, device or named.device or 1, profile_id)

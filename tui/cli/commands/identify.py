@@ -11,6 +11,7 @@ import click
 from tui.drive.plain import plain
 
 from ..shared.errors import told
+from ..shared.line_argument import mind_the_drive
 from ..shared.options import device_option, json_option, line_argument, on_line, read_only_option
 from ..shared.say import say
 
@@ -33,6 +34,7 @@ def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> Non
 
     async def work(opened: OpenLine) -> tuple[DriveIdentity, Mapping[str, int]]:
         identity = await ask(opened.line, device)
+        mind_the_drive(opened, device, identity)
         return identity, await _model_words(opened, identity)
 
     found, words = on_line(line_text, work, read_only=read_only)

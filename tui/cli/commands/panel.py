@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.errors import USAGE, Failure, told
+from ..shared.line_argument import LineArgument
 from ..shared.options import SLAVE_ADDRESS, read_only_option
 from ..shared.signals import ending_by_signal
 
@@ -139,7 +140,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
 
 
 @click.command(hidden=True)
-@click.argument("line_text", required=False, metavar="[LINE]")
+@click.argument("line_text", required=False, metavar="[LINE]", cls=LineArgument)
 @click.option(
     "-d",
     "--device",

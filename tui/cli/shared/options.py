@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from .line_argument import mind_the_drive, mind_the_line, takes_line
+
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
     from tui.session.connect.identify import DriveIdentity
@@ -23,7 +25,7 @@ Option = Callable[[CommandFunction], CommandFunction]
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
 
-line_argument = click.argument("line_text", metavar="LINE")
+line_argument = takes_line
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
 read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
@@ -119,6 +121,7 @@ def on_line(
     usual = None if isinstance(where, str) else _usual_settings(where.profile_id)
     opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual)
     try:
+        mind_the_line(opened)
         return asyncio.run(work(opened))
     except NoAnswer as error:
         if not (hint := _about_silence(opened, text, usual is not None)):
@@ -177,6 +180,7 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
         if profile_id is None:
             raise unidentified(identity)
     session = DriveSession(opened.line, target.device, library.load(profile_id), identity)
+    mind_the_drive(opened, target.device, session.identity, profile_id)
     await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session
