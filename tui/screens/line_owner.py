@@ -23,6 +23,8 @@ log = logging.getLogger(__name__)
 CHOSEN_CONNECTS_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""
 
+WAY_TO_ACCEPT = "If that is right, take the line as it is now: Ctrl+P, accept."
+
 Opener = Callable[..., "OpenLine"]
 
 
@@ -66,11 +68,15 @@ class LineOwner(Panel):
         starts = StartKeeper("panel", clock=self.clock) if self.opened.simulation is None else None
         self.fleet = Fleet(self.opened.line, self.journal, starts, self.events, self.clock)
         log.info("opened %s", self.opened.label)
-        await asyncio.to_thread(remember_line, self.opened.text)
+        await asyncio.to_thread(_remember, self.opened.text)
 
     def _open_here(self, text: str) -> OpenLine:
         """Open a line in a thread; closed again where the panel was left meanwhile."""
         opened = self._open(text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN)
+        if opened.simulation is None:
+            from tui.session.connect.known_line import KnownLine
+
+            opened.known = KnownLine(opened.line, way=WAY_TO_ACCEPT)
         # here, where nobody waits for a key: what the loop asks for next
         import tui.screens.monitor.screen
         import tui.session.fleet  # noqa: F401
@@ -89,6 +95,13 @@ class LineOwner(Panel):
             if fleet is not None and fleet.starts is not None:
                 await asyncio.to_thread(fleet.starts.close)
             log.info("closed %s", opened.label)
+
+
+def _remember(text: str) -> None:
+    """Put the line among those used lately, by its adapter's lasting name."""
+    from tui.session.connect.known_lines import remembered_text
+
+    remember_line(remembered_text(text))
 
 
 def _close_unwanted(opening: asyncio.Future[OpenLine]) -> None:
