@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.errors import USAGE, Failure, told
+from ..shared.lines import is_line
 from ..shared.options import SLAVE_ADDRESS, read_only_option
 from ..shared.signals import ending_by_signal
 
@@ -167,6 +168,10 @@ def panel(
     """Open the panel."""
     if device is not None and line_text is None:
         raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
+    if line_text is not None and not is_line(line_text):
+        from ..main import no_such_command
+
+        raise click.UsageError(no_such_command(line_text))
     run_panel(
         line_text,
         device,
