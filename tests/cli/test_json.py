@@ -64,9 +64,12 @@ def test_watch_prints_one_object_a_cycle() -> None:
     cycles = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(cycles) == 3
     for cycle in cycles:
-        assert set(cycle) == {*HEAD, "time", "line", "device", "profile", "values"}
+        keys = {"time", "line", "device", "profile", "values", "state", "direction", "error"}
+        assert set(cycle) == HEAD | keys
         assert list(cycle["values"]) == ["RFR", "ETA"]
-        assert all(set(value) == VALUE_KEYS for value in cycle["values"].values())
+        assert all(
+            set(value) == VALUE_KEYS | {"time", "error"} for value in cycle["values"].values()
+        )
     times = [datetime.fromisoformat(cycle["time"]) for cycle in cycles]
     assert all(time.tzinfo is not None for time in times)
     assert times == sorted(times)
@@ -82,7 +85,7 @@ def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
 
 def test_identify() -> None:
     who = told("identify", *LINE)
-    keys = {"device", "vendor", "reference", "version", "name", "profile", "model"}
+    keys = {"line", "device", "vendor", "reference", "version", "name", "profile", "model"}
     assert set(who) == HEAD | keys
     assert (who["device"], who["profile"]) == (2, "atv71")
     assert who["reference"].startswith("ATV71")

@@ -11,7 +11,7 @@ import click
 
 from ..shared.errors import USAGE, Failure, told
 from ..shared.lines import is_line
-from ..shared.options import SLAVE_ADDRESS, read_only_option
+from ..shared.options import SLAVE_ADDRESS, one_device, read_only_option
 from ..shared.signals import ending_by_signal
 
 if TYPE_CHECKING:
@@ -145,6 +145,8 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
     "-d",
     "--device",
     type=SLAVE_ADDRESS,
+    multiple=True,
+    callback=one_device,
     metavar="ADDRESS",
     help="Watch the drive at this slave address at once; without it, look for drives.",
 )

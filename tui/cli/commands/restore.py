@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import DONE, DRIVE_REFUSED, Failure, status_of, told
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, DRIVE_REFUSED, told
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -89,52 +90,35 @@ def restore(
     """
     from tui.drive.settings.restore_plan import Options
 
-    from ..shared.output import drive_json, print_json
+    from ..shared.output import drive_json
 
     _either(dry_run=dry_run, arm=arm)
     values = set_in(file)
-    documents: list[dict[str, Any]] = []
     telling = ResultTelling(Messages(as_json=as_json))
 
-    async def one(opened: OpenLine, device: int) -> int:
+    async def one(opened: OpenLine, target: Target) -> tuple[dict[str, Any], int]:
         nonlocal telling
         telling = ResultTelling(Messages(as_json=as_json))
-        session = await connect_drive(opened, Target(line_text, device, profile_id))
+        session = await connect_drive(opened, target)
         options = Options(line_settings, rating, codes_of(session, confirmed), rounded)
         if dry_run:
             found, status = await _tell(session, values, options, telling.messages)
         else:
             found, status = await _restore(session, values, options, telling, save=save)
         head = {**drive_json(line_text, session), "dry_run": dry_run}
-        documents.append({**head, **found, "messages": telling.messages.texts})
-        return status
+        return {**head, **found, "messages": telling.messages.texts}, status
 
-    async def work(opened: OpenLine) -> int:
-        if len(devices) == 1:
-            return await one(opened, devices[0])
-        statuses = []
-        for device in devices:
-            messages = Messages(as_json=as_json)
-            messages.tell(f"Device {device}:")
-            try:
-                statuses.append(await one(opened, device))
-            except Exception as error:
-                failure = _known(error)
-                messages.complain(f"device {device}: {failure.message}")
-                head = {"line": line_text, "device": device, "profile": None}
-                documents.append({**head, "error": failure.message, "status": failure.status})
-                statuses.append(failure.status)
-        return max(statuses)
-
-    where = Target(line_text, devices[0], profile_id)
+    where = Target(line_text, devices[0], profile_id, others=devices[1:])
     try:
-        status = on_line(where, work, read_only=read_only or dry_run)
+        status = on_line(
+            where,
+            lambda opened: each_drive(where, lambda drive: one(opened, drive), as_json=as_json),
+            read_only=read_only or dry_run,
+        )
     except KeyboardInterrupt:
         if dry_run:
             raise
         raise telling.interrupted() from None
-    if as_json:
-        print_json(documents if len(devices) > 1 else documents[0])
     if status != DONE:
         raise click.exceptions.Exit(status)
 
@@ -144,16 +128,6 @@ def _either(*, dry_run: bool, arm: bool) -> None:
         need_arming(arm, "restoring writes settings of the drive")
     elif arm:
         raise click.UsageError("Give either --dry-run or --arm.")
-
-
-def _known(error: Exception) -> Failure:
-    """What is wrong with one of several drives; raises what nobody foresaw."""
-    if isinstance(error, click.ClickException):
-        return Failure(error.format_message(), error.exit_code)
-    status = status_of(error)
-    if status is None:
-        raise error
-    return Failure(str(error), status)
 
 
 async def _tell(

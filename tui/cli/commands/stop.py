@@ -14,7 +14,7 @@ from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, 
 from ..shared.options import (
     Target,
     connect_drive,
-    drive_options,
+    drives_options,
     line_argument,
     on_line,
     read_only_option,
@@ -37,7 +37,7 @@ STOP_POLL_INTERVAL = 0.05
 
 @click.command()
 @line_argument
-@drive_options
+@drives_options
 @click.option("--all", "every", is_flag=True, help="Stop every drive found on the line.")
 @click.option(
     "--addresses",
@@ -71,15 +71,15 @@ def stop(
         raise click.UsageError("Either --quick or --freewheel.")
     if addresses and not every:
         raise click.UsageError("--addresses goes with --all.")
-    if give_back and every:
-        raise click.UsageError("--give-back is for one drive, not for --all.")
+    if give_back and (every or target.others):
+        raise click.UsageError("--give-back is for one drive, not for several.")
     if read_only:
         raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
     devices = _devices(addresses) if every else None
 
     async def work(opened: OpenLine) -> int:
-        if not every:
+        if not (every or target.others):
             found = await _wanted(opened, target)
             status = await _stop_one(opened, found, order)
             if give_back and not status:
@@ -88,7 +88,9 @@ def stop(
                 await give_control_back(found.session, arm=arm)
             return status
         wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
-        return await _stop_all(opened, wanted, order, target.profile_id)
+        if not every:
+            wanted = tuple(one.device for one in target.each())
+        return await _stop_all(opened, wanted, order, target.profile_id, named=not every)
 
     if worst := on_line(target, work):
         raise click.exceptions.Exit(worst)
@@ -189,9 +191,16 @@ async def _why(session: DriveSession) -> int:
 
 
 async def _stop_all(
-    opened: OpenLine, devices: Iterable[int], order: OrderId, profile_id: str | None
+    opened: OpenLine,
+    devices: Iterable[int],
+    order: OrderId,
+    profile_id: str | None,
+    *,
+    named: bool,
 ) -> int:
     """Stop each drive as soon as it is found; what one does holds up no other.
+
+    Of `named` addresses every one has to answer.
 
     Every address is asked once in haste before any is asked with patience: a silent one takes
     seconds to rule out, and meanwhile motors turn.
@@ -226,6 +235,7 @@ async def _stop_all(
         close_journal(journal)
     if left:
         complain(f"No answer at {', '.join(map(str, left))}.")
+        worst = max(worst, LINE_TROUBLE if named else 0)
     return worst or (0 if stops else LINE_TROUBLE)
 
 

@@ -84,6 +84,16 @@ def status_of(error: Exception) -> int | None:
     return next((status for kind, status in table if isinstance(error, kind)), None)
 
 
+def failure_of(error: Exception) -> Failure:
+    """A known error with its exit status; raises one that nobody foresaw."""
+    if isinstance(error, click.ClickException):
+        return Failure(error.format_message(), error.exit_code)
+    status = status_of(error)
+    if status is None:
+        raise error
+    return Failure(str(error), status)
+
+
 def told(command: Callable[P, R]) -> Callable[P, R]:
     """Turn what a command raises into a message and an exit status; never a traceback."""
 

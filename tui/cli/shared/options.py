@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -29,14 +29,35 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON a
 read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
 
 SLAVE_ADDRESS = click.IntRange(1, 247)
+
+
+def one_device(_: click.Context, option: click.Parameter, given: tuple[int, ...]) -> int | None:
+    """The one address of an option -d that may be given once; the last would win otherwise."""
+    if len(given) > 1:
+        raise click.BadParameter("once only: this command is for one drive.", param=option)
+    return given[0] if given else None
+
+
 device_option = click.option(
     "-d",
     "--device",
     type=SLAVE_ADDRESS,
-    default=1,
+    multiple=True,
+    callback=one_device,
+    default=(1,),
     show_default=True,
     metavar="ADDRESS",
     help="Slave address of the drive.",
+)
+several_devices_option = click.option(
+    "-d",
+    "--device",
+    type=SLAVE_ADDRESS,
+    multiple=True,
+    default=(1,),
+    show_default=True,
+    metavar="ADDRESS",
+    help="Slave address of the drive; several times for several drives.",
 )
 profile_option = click.option(
     "-p", "--profile", "profile_id", metavar="ID", help="Profile of the drive."
@@ -72,6 +93,13 @@ class Target:
     device: int
     profile_id: str | None
     rated_current: float | None = None
+    others: tuple[int, ...] = ()
+    """Further addresses on the same line, where a command takes several."""
+
+    def each(self) -> list[Target]:
+        """A target for each drive, in the order in which they were named."""
+        devices = dict.fromkeys((self.device, *self.others))
+        return [replace(self, device=device, others=()) for device in devices]
 
 
 def _target_of(*options: Option) -> Option:
@@ -81,12 +109,14 @@ def _target_of(*options: Option) -> Option:
         @functools.wraps(command)
         def handed_over(
             line_text: str,
-            device: int,
+            device: int | tuple[int, ...],
             profile_id: str | None,
             rated_current: float | None = None,
             **others: Any,
         ) -> Any:
-            return command(target=Target(line_text, device, profile_id, rated_current), **others)
+            first, *more = device if isinstance(device, tuple) else (device,)
+            target = Target(line_text, first, profile_id, rated_current, others=tuple(more))
+            return command(target=target, **others)
 
         decorated: CommandFunction = handed_over
         for option in reversed(options):
@@ -98,6 +128,8 @@ def _target_of(*options: Option) -> Option:
 
 drive_options = _target_of(device_option, profile_option, rated_current_option)
 """Which drive on the line, and by which profile, for commands that show values."""
+drives_options = _target_of(several_devices_option, profile_option, rated_current_option)
+"""The same for commands that take several drives."""
 settings_options = _target_of(profile_option, device_option)
 """The same for commands about settings, where a current is a word like any other."""
 
