@@ -11,6 +11,7 @@ from ..shared.options import (
     Target,
     connect_drive,
     drive_options,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 @line_argument
 @click.argument("codes", nargs=-1, required=True, metavar="CODE...")
 @drive_options
+@force_profile_option
 @read_only_option
 @json_option
 @told

@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from ..shared.errors import told
-from ..shared.options import Target, line_argument, settings_options
+from ..shared.options import Target, line_argument, never_forced, settings_options
 from ..shared.say import say
 from ..shared.sets import (
     file_argument,
@@ -23,6 +23,7 @@ from ..shared.sets import (
 @file_argument
 @force_option
 @settings_options
+@never_forced
 @told
 def report(target: Target, file: Path, force: bool) -> None:
     """Write a report on a drive to FILE, as Markdown.

@@ -14,6 +14,7 @@ from ..shared.options import (
     connect_drive,
     devices_option,
     line_argument,
+    never_forced,
     on_line,
     profile_option,
     read_only_option,
@@ -53,6 +54,7 @@ CODES_NAMED = 12
 @confirm_option
 @save_option
 @read_only_option
+@never_forced
 @profile_option
 @devices_option(
     "Slave address of the drive; several times for several drives.",

@@ -17,6 +17,7 @@ from ..shared.options import (
     Target,
     connect_drive,
     drive_options,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -252,6 +253,7 @@ def _watch_text(status: Status) -> str:
 @click.command()
 @line_argument
 @drive_options
+@force_profile_option
 @read_only_option
 @json_option
 @told

@@ -17,6 +17,7 @@ from ..shared.options import (
     Target,
     connect_drive,
     drive_options,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -53,6 +54,7 @@ SNAPSHOTS_WAITING = 64
     metavar="FILE",
     help="Also write the engineering values to a CSV file.",
 )
+@force_profile_option
 @read_only_option
 @json_option
 @told

@@ -10,6 +10,7 @@ from ..shared.errors import DONE, REFUSED_HERE, told
 from ..shared.options import (
     Target,
     connect_drive,
+    force_profile_option,
     line_argument,
     on_line,
     read_only_option,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
 @arm_option
 @confirm_option
 @save_option
+@force_profile_option
 @read_only_option
 @settings_options
 @told
