@@ -79,7 +79,7 @@ def test_3_nothing_was_ever_watched(extra: tuple[str, ...]) -> None:
     watch = ("watch", SIM, "ETA", "-d", "9", "-p", "atv71", "--count", "2", "--every", "0.1")
     done = drivepanel(*watch, *extra)
     assert done.returncode == 3, done.stdout
-    assert done.stderr.startswith("drivepanel: Device 9 did not answer")
+    assert done.stderr.startswith("drivepanel: Device 9 does not answer")
 
 
 def test_3_nothing_listens() -> None:

@@ -8,7 +8,7 @@ import click
 
 from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure, told
 from ..shared.messages import Messages
-from ..shared.options import Target, json_option, line_argument, settings_options
+from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.say import say
 from ..shared.sets import (
     file_argument,
@@ -30,6 +30,7 @@ STANDARD_OUTPUT = Path("-")
 )
 @json_option
 @settings_options
+@never_forced
 @told
 def backup(target: Target, file: Path, force: bool, everything: bool, as_json: bool) -> None:
     """Write the settings of a drive to FILE, one line a parameter; `-` is standard output.

@@ -15,6 +15,7 @@ from ..shared.options import (
     connect_drive,
     json_option,
     line_argument,
+    never_forced,
     on_line,
     read_only_option,
     settings_options,
@@ -51,6 +52,7 @@ class Wanted:
 @arm_option
 @json_option
 @read_only_option
+@never_forced
 @settings_options
 @told
 def block(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..shared.errors import DIFFERENT, USAGE, Failure, told
-from ..shared.options import Target, devices_option, json_option
+from ..shared.options import Target, devices_option, json_option, never_forced
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
 
@@ -34,6 +34,7 @@ FACTORY = "factory"
 @json_option
 @click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drives.")
 @devices_option("Slave address of the drive; twice where A and B are two drives.")
+@never_forced
 @told
 def compare(
     a: str,

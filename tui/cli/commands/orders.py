@@ -19,6 +19,7 @@ from ..shared.options import (
     connect_drive,
     drive_options,
     line_argument,
+    never_forced,
     on_line,
     read_only_option,
 )
@@ -219,6 +220,7 @@ def _ordered(
 @drive_options
 @arm_option
 @read_only_option
+@never_forced
 @told
 def reference(
     target: Target,
@@ -241,6 +243,7 @@ def reference(
 @drive_options
 @arm_option
 @read_only_option
+@never_forced
 @told
 def reset(
     target: Target,

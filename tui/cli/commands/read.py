@@ -12,6 +12,7 @@ from ..shared.options import (
     Target,
     connect_drive,
     drives_options,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 @line_argument
 @click.argument("codes", nargs=-1, required=True, metavar="CODE...")
 @drives_options
+@force_profile_option
 @read_only_option
 @json_option
 @told

@@ -8,7 +8,7 @@ import click
 
 from ..shared.errors import INTERRUPTED, Failure, told
 from ..shared.messages import Messages
-from ..shared.options import Target, json_option, line_argument, settings_options
+from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.sets import (
     file_argument,
     force_option,
@@ -24,6 +24,7 @@ from ..shared.sets import (
 @force_option
 @json_option
 @settings_options
+@never_forced
 @told
 def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     """Write a report on a drive to FILE, as Markdown.

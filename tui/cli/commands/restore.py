@@ -16,6 +16,7 @@ from ..shared.options import (
     devices_option,
     json_option,
     line_argument,
+    never_forced,
     on_line,
     profile_option,
     read_only_option,
@@ -58,6 +59,7 @@ CODES_NAMED = 12
 @save_option
 @read_only_option
 @json_option
+@never_forced
 @profile_option
 @devices_option(
     "Slave address of the drive; several times for several drives.",

@@ -18,6 +18,7 @@ from ..shared.options import (
     Target,
     connect_drive,
     drives_options,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -253,6 +254,7 @@ def _watch_text(status: Status) -> str:
 @click.command()
 @line_argument
 @drives_options
+@force_profile_option
 @read_only_option
 @json_option
 @told

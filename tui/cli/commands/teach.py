@@ -13,6 +13,7 @@ from ..shared.options import (
     drive_options,
     json_option,
     line_argument,
+    never_forced,
     on_line,
 )
 from ..shared.say import say
@@ -39,6 +40,7 @@ if TYPE_CHECKING:
     "--no-reference", is_flag=True, help="Give the reference by no taught parameter any more."
 )
 @json_option
+@never_forced
 @told
 def teach(
     target: Target,

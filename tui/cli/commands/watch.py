@@ -18,6 +18,7 @@ from ..shared.options import (
     Target,
     connect_drive,
     drives_options,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -98,6 +99,7 @@ class CsvWish:
     help="Put the CSV file aside, with the time in its name, once it has this size (10MB), or when"
     " the day ends.",
 )
+@force_profile_option
 @read_only_option
 @json_option
 @told

@@ -11,6 +11,7 @@ from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     connect_drive,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
 @confirm_option
 @round_option
 @save_option
+@force_profile_option
 @read_only_option
 @json_option
 @settings_options
