@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.devices import devices_option
 from ..shared.errors import DIFFERENT, USAGE, Failure, told
-from ..shared.options import Target, devices_option, json_option, never_forced
+from ..shared.options import Target, json_option, never_forced
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
 

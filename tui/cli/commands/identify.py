@@ -10,6 +10,7 @@ import click
 
 from tui.drive.plain import plain
 
+from ..shared.devices import several_devices_option
 from ..shared.drives import each_drive
 from ..shared.errors import DONE, told
 from ..shared.options import (
@@ -18,7 +19,6 @@ from ..shared.options import (
     line_argument,
     on_line,
     read_only_option,
-    several_devices_option,
 )
 from ..shared.say import say
 

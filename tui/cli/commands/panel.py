@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.devices import SLAVE_ADDRESS, one_device
 from ..shared.errors import USAGE, Failure, told
 from ..shared.lines import is_line
-from ..shared.options import SLAVE_ADDRESS, one_device, read_only_option
+from ..shared.options import read_only_option
 from ..shared.signals import ending_by_signal
 
 if TYPE_CHECKING:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.devices import devices_option
 from ..shared.drives import each_drive
 from ..shared.errors import DONE, DRIVE_REFUSED, told
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     connect_drive,
-    devices_option,
     json_option,
     line_argument,
     never_forced,

@@ -69,16 +69,18 @@ def teach(
         found = teacher.family.find(code).code if code is not None else ""
         if value is not None:
             return await _look(teacher, found, value, unit or "", as_json=as_json)
-        if forget:
-            known = teacher.forget(found)
-            say(f"{found}: {'shown raw again' if known else 'was not taught'}.")
-        elif reference:
-            _confirm(teacher, found)
-        elif no_reference:
-            teacher.drop_reference()
-            say("No taught parameter takes the reference.")
-        else:
+        if not (forget or reference or no_reference):
             _tell_all(teacher, found, as_json=as_json)
+        else:
+            if forget:
+                known = teacher.forget(found)
+                text = f"{found}: {'shown raw again' if known else 'was not taught'}."
+            elif reference:
+                text = _confirm(teacher, found)
+            else:
+                teacher.drop_reference()
+                text = "No taught parameter takes the reference."
+            _tell_change(teacher, text, as_json=as_json)
         _tell_trouble(teacher)
         return 0
 
@@ -110,11 +112,20 @@ async def _look(teacher: Teacher, code: str, value: str, unit: str, *, as_json: 
     return DIFFERENT if lesson.went_wrong else 0
 
 
-def _confirm(teacher: Teacher, code: str) -> None:
+def _confirm(teacher: Teacher, code: str) -> str:
     from tui.session.teaching.teacher import reference_asks
 
     said = teacher.confirm_reference(code)
-    say(f"{said} {reference_asks(teacher.family, code)}")
+    return f"{said} {reference_asks(teacher.family, code)}"
+
+
+def _tell_change(teacher: Teacher, text: str, *, as_json: bool) -> None:
+    from ..shared.output import print_json
+
+    if as_json:
+        print_json({**_of_drive(teacher), "text": text, "reference": teacher.reference or None})
+    else:
+        say(text)
 
 
 def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:

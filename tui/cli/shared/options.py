@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from .devices import CommandFunction, Option, device_option, several_devices_option
+
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
     from tui.session.connect.identify import DriveIdentity
@@ -17,8 +19,6 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 T = TypeVar("T")
-CommandFunction = Callable[..., Any]
-Option = Callable[[CommandFunction], CommandFunction]
 
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
@@ -28,37 +28,6 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON a
 
 read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
 
-SLAVE_ADDRESS = click.IntRange(1, 247)
-
-
-def one_device(_: click.Context, option: click.Parameter, given: tuple[int, ...]) -> int | None:
-    """The one address of an option -d that may be given once; the last would win otherwise."""
-    if len(given) > 1:
-        raise click.BadParameter("once only: this command is for one drive.", param=option)
-    return given[0] if given else None
-
-
-device_option = click.option(
-    "-d",
-    "--device",
-    type=SLAVE_ADDRESS,
-    multiple=True,
-    callback=one_device,
-    default=(1,),
-    show_default=True,
-    metavar="ADDRESS",
-    help="Slave address of the drive.",
-)
-several_devices_option = click.option(
-    "-d",
-    "--device",
-    type=SLAVE_ADDRESS,
-    multiple=True,
-    default=(1,),
-    show_default=True,
-    metavar="ADDRESS",
-    help="Slave address of the drive; several times for several drives.",
-)
 profile_option = click.option(
     "-p",
     "--profile",
@@ -73,20 +42,6 @@ rated_current_option = click.option(
     metavar="A",
     help="Rated current of the drive in A, for families that give currents in %.",
 )
-
-
-def devices_option(help_text: str, **more: Any) -> Option:
-    """The option -d of a command that takes several drives; `more` goes to click."""
-    return click.option(
-        "-d",
-        "--device",
-        "devices",
-        type=SLAVE_ADDRESS,
-        multiple=True,
-        metavar="ADDRESS",
-        help=help_text,
-        **more,
-    )
 
 
 @dataclass(frozen=True, slots=True)
