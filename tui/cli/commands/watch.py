@@ -123,7 +123,7 @@ def watch(
     """
     wish = CsvWish(csv_path, append, force, rotate)
     wish.check()
-    seen = Seen()
+    seen = CyclesSeen()
 
     async def work(opened: OpenLine) -> None:
         from tui.session.monitor.rates import monitoring_codes
@@ -158,7 +158,7 @@ def watch(
 
 
 @dataclass(slots=True)
-class Seen:
+class CyclesSeen:
     """What was told so far."""
 
     cycles: int = 0
@@ -177,7 +177,7 @@ async def _follow(
     every: float,
     count: int | None,
     outputs: Sequence[Output],
-    seen: Seen,
+    seen: CyclesSeen,
 ) -> None:
     """Hand every cycle of a drive to the outputs; `shown` are all codes that they are to hold."""
     from tui.session.monitor.monitor import Monitor
