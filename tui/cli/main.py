@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
+import os
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +13,9 @@ import tui
 from .shared.errors import plain_errors
 from .shared.lines import is_line
 from .shared.logs import start_logging
+
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
 
 COMMANDS = {
     "backup": ("backup", "Write every parameter of a drive to a file."),
@@ -54,11 +58,21 @@ Exit status:
 """
 AS_JSON = "drivepanel.json"
 """Where the context keeps whether JSON was asked for."""
+COMPLETE = "_DRIVEPANEL_COMPLETE"
+"""The environment variable by which a shell asks what may be typed."""
 VERBOSE = frozenset({"-v", "-vv", "-vvv", "--verbose"})
 
 
 class Commands(click.Group):
     """Subcommands by name; a LINE in place of one opens the panel on it."""
+
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run the command line, or answer a shell that completes."""
+        if os.environ.get(COMPLETE):
+            from .shared.shells import prepare_completion
+
+            prepare_completion()
+        return super().main(*args, **extra)
 
     def make_context(
         self,
@@ -104,18 +118,38 @@ class Commands(click.Group):
         if args[0] in COMMANDS:
             return super().resolve_command(ctx, args)
         if args[0] != "panel" and not is_line(args[0]):
+            if ctx.resilient_parsing:
+                return None, None, []
             raise click.UsageError(no_such_command(args[0]))
         rest = args[1:] if args[0] == "panel" else args
         return "panel", self.get_command(ctx, "panel"), rest
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Send the panel's own options, given without a LINE, to the panel."""
+        if ctx.resilient_parsing and VERBOSE.issuperset(args):
+            return super().parse_args(ctx, args)
         own = {"-h", "--help", "--version", *VERBOSE}
         first = next((a for a in args if a not in own or a in ("-h", "--help", "--version")), None)
         if first is None or (first.startswith("-") and first not in own):
             split = args.index(first) if first is not None else len(args)
             args = [*args[:split], "panel", *args[split:]]
         return super().parse_args(ctx, args)
+
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
+        """Commands, kinds of LINE, and options of the panel, without importing the commands."""
+        from click.shell_completion import CompletionItem
+
+        panel = self.get_command(ctx, "panel")
+        assert panel is not None
+        if incomplete.startswith("-"):
+            own = click.Command.shell_complete(self, ctx, incomplete)
+            more = panel.shell_complete(click.Context(panel, parent=ctx), incomplete)
+            return list({item.value: item for item in (*own, *more)}.values())
+        from .shared.completion import complete_line
+
+        names = [CompletionItem(name, help=told) for name, (_, told) in sorted(COMMANDS.items())]
+        lines = complete_line(ctx, panel.params[0], incomplete)
+        return [*(item for item in names if item.value.startswith(incomplete)), *lines]
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the subcommands without importing them."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.completion import complete_profile, complete_side
 from ..shared.devices import devices_option
 from ..shared.errors import DIFFERENT, USAGE, Failure, told
 from ..shared.options import Target, json_option, never_forced
@@ -21,8 +22,8 @@ FACTORY = "factory"
 
 
 @click.command()
-@click.argument("a")
-@click.argument("b")
+@click.argument("a", shell_complete=complete_side)
+@click.argument("b", shell_complete=complete_side)
 @click.option("--all", "all_rows", is_flag=True, help="Show equal and measured ones too.")
 @click.option(
     "--format",
@@ -33,7 +34,14 @@ FACTORY = "factory"
     help="Form of the table.",
 )
 @json_option
-@click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drives.")
+@click.option(
+    "-p",
+    "--profile",
+    "profile_id",
+    metavar="ID",
+    shell_complete=complete_profile,
+    help="Profile of the drives.",
+)
 @devices_option("Slave address of the drive; twice where A and B are two drives.")
 @never_forced
 @told

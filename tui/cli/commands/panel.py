@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.completion import complete_line
 from ..shared.devices import SLAVE_ADDRESS, one_device
 from ..shared.errors import USAGE, Failure, told
 from ..shared.lines import is_line
@@ -141,7 +142,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
 
 
 @click.command(hidden=True)
-@click.argument("line_text", required=False, metavar="[LINE]")
+@click.argument("line_text", required=False, metavar="[LINE]", shell_complete=complete_line)
 @click.option(
     "-d",
     "--device",

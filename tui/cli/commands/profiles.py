@@ -9,6 +9,7 @@ import click
 
 from tui.drive.plain import plain
 
+from ..shared.completion import complete_profile
 from ..shared.errors import told
 from ..shared.options import json_option
 from ..shared.say import say
@@ -19,7 +20,12 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("profile_id", required=False, metavar="[ID|new NEW-ID|path]")
+@click.argument(
+    "profile_id",
+    required=False,
+    metavar="[ID|new NEW-ID|path]",
+    shell_complete=complete_profile,
+)
 @click.argument("more", nargs=-1, metavar="")
 @click.option(
     "--check",

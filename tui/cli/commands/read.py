@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.completion import complete_code
 from ..shared.drives import each_drive
 from ..shared.errors import DONE, DRIVE_REFUSED, told
 from ..shared.options import (
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @line_argument
-@click.argument("codes", nargs=-1, required=True, metavar="CODE...")
+@click.argument("codes", nargs=-1, required=True, metavar="CODE...", shell_complete=complete_code)
 @drives_options
 @force_profile_option
 @read_only_option

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.completion import complete_profile
 from ..shared.errors import told
 from ..shared.options import json_option
 from ..shared.output import print_json
@@ -25,7 +26,13 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
 
 
 @click.command()
-@click.argument("drives", nargs=-1, required=True, metavar="PROFILE[@ADDRESS]...")
+@click.argument(
+    "drives",
+    nargs=-1,
+    required=True,
+    metavar="PROFILE[@ADDRESS]...",
+    shell_complete=complete_profile,
+)
 @click.option("--pty", "pty", metavar="PATH", help="A pseudo-terminal, with a link at PATH.")
 @click.option("--serial", "serial", metavar="PATH", help="A serial port.")
 @click.option("--tcp", metavar="HOST:PORT", help="Modbus TCP.")

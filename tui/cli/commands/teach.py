@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.completion import complete_code
 from ..shared.errors import DIFFERENT, told
 from ..shared.options import (
     Target,
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
 
 @click.command(context_settings={"ignore_unknown_options": True})  # -12.5 is a VALUE
 @line_argument
-@click.argument("code", required=False)
+@click.argument("code", required=False, shell_complete=complete_code)
 @click.argument("value", required=False)
 @click.argument("unit", required=False)
 @drive_options

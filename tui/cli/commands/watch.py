@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.completion import complete_code
 from ..shared.csv_files import CsvFile, refuse_unasked, rotation
 from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, told
 from ..shared.options import (
@@ -72,7 +73,7 @@ class CsvWish:
 
 @click.command()
 @line_argument
-@click.argument("codes", nargs=-1, metavar="[CODE...]")
+@click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_code)
 @drives_options
 @click.option(
     "--every",

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.completion import complete_setting
 from ..shared.errors import DONE, REFUSED_HERE, told
 from ..shared.messages import Messages
 from ..shared.options import (
@@ -40,7 +41,13 @@ if TYPE_CHECKING:
 
 @click.command()
 @line_argument
-@click.argument("wanted", nargs=-1, required=True, metavar="CODE=VALUE...")
+@click.argument(
+    "wanted",
+    nargs=-1,
+    required=True,
+    metavar="CODE=VALUE...",
+    shell_complete=complete_setting,
+)
 @dry_run_option
 @arm_option
 @confirm_option

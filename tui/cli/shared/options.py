@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
+from .completion import complete_line, complete_profile
 from .devices import CommandFunction, Option, device_option, several_devices_option
 
 if TYPE_CHECKING:
@@ -23,7 +24,7 @@ T = TypeVar("T")
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
 
-line_argument = click.argument("line_text", metavar="LINE")
+line_argument = click.argument("line_text", metavar="LINE", shell_complete=complete_line)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
 read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
@@ -33,6 +34,7 @@ profile_option = click.option(
     "--profile",
     "profile_id",
     metavar="ID",
+    shell_complete=complete_profile,
     help="Profile of the drive; it has to fit what the drive says of itself.",
 )
 rated_current_option = click.option(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .completion import complete_code
 from .errors import (
     DONE,
     DRIVE_REFUSED,
@@ -43,6 +44,7 @@ confirm_option = click.option(
     "confirmed",
     multiple=True,
     metavar="CODE",
+    shell_complete=complete_code,
     help="Write this unverified parameter too, after comparing it with the keypad.",
 )
 save_option = click.option(
