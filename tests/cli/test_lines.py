@@ -7,9 +7,12 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from click.shell_completion import ShellComplete
 
 from tests.adapters import Adapters, adapters
 from tests.programs import drivepanel
+from tui.cli.main import main
+from tui.cli.shared.lines import is_line
 from tui.session.connect.known_lines import load_memory
 from tui.session.connect.named_lines import settings_file
 
@@ -261,3 +264,31 @@ def test_a_stop_asks_no_file_at_all(line: str, monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr("tui.session.connect.known_lines.read_small_text", hangs)
     monkeypatch.setattr("tui.session.connect.named_lines.read_small_text", hangs)
     assert "stopped" in run(0, "stop", line)
+
+
+def completed(typed: str) -> list[str]:
+    """What a shell offers for a line whose last word has begun."""
+    *words, incomplete = typed.split(" ")
+    found = ShellComplete(main, {}, "drivepanel", "_X").get_completions(words, incomplete)
+    return [item.value for item in found]
+
+
+def test_names_are_completed_and_codes_of_their_drive() -> None:
+    assert "pump" not in completed("read p")
+    named("tcp:gateway")
+    assert completed("read pu") == ["pump"]
+    assert "pump" in completed("pu")
+    assert "5.01" in completed("read fan 5.0")
+    settings("[broken")
+    assert completed("read pu") == []
+
+
+def test_a_name_opens_the_panel_and_a_word_that_is_none_does_not() -> None:
+    assert not is_line("pump")
+    named("tcp:gateway")
+    assert is_line("pump")
+    assert not is_line("pumb")
+    assert "no such command" in refused(2, "pumb")
+    settings("[broken")
+    assert is_line("pump")
+    assert "settings.toml:1" in refused(2, "pump")

@@ -72,7 +72,7 @@ DEFECTS = (
     Defect(
         "name-drops-the-address",
         "tui/cli/shared/line_argument.py",
-        'usual |= {"device": named.device, "devices": (named.device,)}',
+        'usual |= {"device": (named.device,), "devices": (named.device,)}',
         'usual |= {"devices": (named.device,)}',
         "A command by a drive's name goes to the drive at address 1.",
         (f"{COMMANDS}::test_a_name_stands_where_a_line_is_typed",),

@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from .completion import complete_line
+from .lines import is_known_name
 from .say import say
 
 if TYPE_CHECKING:
@@ -44,7 +46,7 @@ class LineArgument(click.Argument):
     def process_value(self, ctx: click.Context, value: Any) -> Any:
         """The LINE that is meant, written out."""
         text = super().process_value(ctx, value)
-        if ctx.resilient_parsing or not isinstance(text, str):
+        if not isinstance(text, str) or (ctx.resilient_parsing and not is_known_name(text)):
             return text
         return _resolved(ctx, text)
 
@@ -59,7 +61,7 @@ class LineArgument(click.Argument):
         if not isinstance(text, str) or self.resolve_envvar_value(ctx) is None:
             return False
         others = self._others(ctx)
-        if not others or _WRITTEN_OUT.match(text) or _is_known(text):
+        if not others or _WRITTEN_OUT.match(text) or is_known_name(text):
             return False
         if any(one.required and not _given(opts.get(one.name or "")) for one in others):
             return True
@@ -89,12 +91,6 @@ def _given(value: object) -> bool:
     return isinstance(value, str) or (isinstance(value, tuple) and bool(value))
 
 
-def _is_known(text: str) -> bool:
-    from tui.session.connect.named_lines import named_lines
-
-    return text.casefold() in named_lines()
-
-
 def _resolved(ctx: click.Context, text: str) -> str:
     """The LINE of a name, whose drive becomes the usual one; any other text as it is."""
     named = named_line_of(text, stops=ctx.command.name == _STOP)
@@ -102,7 +98,7 @@ def _resolved(ctx: click.Context, text: str) -> str:
         return text
     usual = dict(ctx.default_map or {})
     if named.device is not None:
-        usual |= {"device": named.device, "devices": (named.device,)}
+        usual |= {"device": (named.device,), "devices": (named.device,)}
     if named.profile is not None:
         usual["profile_id"] = lambda: _profile_here(ctx, named)
     ctx.default_map = {key: one for key, one in usual.items() if key in _names(ctx)}
@@ -140,8 +136,9 @@ def _profile_here(ctx: click.Context, named: NamedLine) -> str | None:
     """The profile of a name, for the drive that it names and no other."""
     if ctx.params.get("every"):
         return None
-    given = ctx.params.get("devices") or (ctx.params.get("device"),)
-    if named.device is not None and any(one not in (None, named.device) for one in given):
+    given = ctx.params.get("devices") or ctx.params.get("device") or ()
+    devices = given if isinstance(given, tuple) else (given,)
+    if named.device is not None and any(one != named.device for one in devices):
         return None
     return _usable(named) if ctx.command.name == _STOP else named.profile
 
@@ -175,7 +172,9 @@ _accept_option = click.option(
 
 def takes_line(command: Callable[..., Any]) -> Callable[..., Any]:
     """LINE, and the option that accepts one that is not as it was."""
-    argument = click.argument("line_text", metavar="LINE", cls=LineArgument)
+    argument = click.argument(
+        "line_text", metavar="LINE", cls=LineArgument, shell_complete=complete_line
+    )
     return argument(_accept_option(command))
 
 

@@ -12,6 +12,7 @@ from textual import work
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
+from .found import WATCHED_ONLY
 from .state import ALARM_KIND, LineView
 
 if TYPE_CHECKING:
@@ -122,13 +123,21 @@ class Scanning(LineView):
             return
         try:
             profile = await asyncio.to_thread(library.load, wanted)
+            if identity.profile is not None:
+                # at hand for a stop, which goes by what the drive says of itself
+                await asyncio.to_thread(library.load, identity.profile)
         except DriveError as error:
             fleet.note(identity)
             self.fail(error)
             return
         session = DriveSession(fleet.line, identity.device, profile, identity, fleet.clock)
+        before = fleet.console(session.device)
         guessed = not (typed or identity.profile or named)
-        fleet.take(session, guessed=guessed)
+        console = fleet.take(session, guessed=guessed)
+        if console is not before and session.contradiction:
+            self.app.events.add(
+                ALARM_KIND, f"{session.contradiction} {WATCHED_ONLY}", session.device
+            )
         known = self.app.opened.known if self.app.opened else None
         if known is not None:
             told = (identity, identity.device, "" if guessed else profile.id)
