@@ -96,7 +96,7 @@ DEFECTS = (
     Defect(
         "address-lost-in-a-broken-file",
         "tui/session/connect/named_lines.py",
-        'return replace(found, device=int(parts["device"]))',
+        'return found._replace(device=int(parts["device"]))',
         "return found",
         "A stop by name stops the drive at address 1 while the other runs on.",
         (f"{NAMED}::test_a_stop_finds_its_drive_in_a_broken_file",),

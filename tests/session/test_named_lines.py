@@ -50,7 +50,7 @@ def test_a_name_stands_for_a_line_and_its_drive() -> None:
     assert line_named("FAN") == line_named("fan")
     assert [*named_lines()] == ["pump", "fan", "mixer"]
     assert line_settings().faults == ()
-    assert named_lines()["fan"].at == f"{path}:5: lines.Fan"
+    assert line_settings().places["fan"] == f"{path}:5: lines.Fan"
 
 
 @pytest.mark.parametrize("text", ["other", "tcp:192.168.0.10", "/dev/ttyUSB0", "COM3", "factory"])

@@ -32,7 +32,9 @@ def lines(as_json: bool) -> None:
 
     settings, memory = line_settings(), load_memory()
     named = list(settings.lines.values())
-    faults = [*settings.faults, *(fault for one in named for fault in _faults(one))]
+    places = settings.places.items()
+    found = (f"{at}: {fault}" for name, at in places for fault in _faults(settings.lines[name]))
+    faults = [*settings.faults, *found]
     if as_json:
         print_json(
             {
@@ -69,16 +71,16 @@ def _faults(one: NamedLine) -> Iterator[str]:
     from ..main import COMMANDS
 
     if one.name.casefold() in COMMANDS:
-        yield f"{one.at}: a command has this name: the panel cannot be opened by it."
+        yield "a command has this name: the panel cannot be opened by it."
     try:
         check_line(one.line)
     except LinkSyntaxError as error:
-        yield f"{one.at}: {error}"
+        yield str(error)
     try:
         if one.profile is not None:
             library.load(one.profile)
     except DriveError as error:
-        yield f"{one.at}: {error}"
+        yield str(error)
 
 
 def _named_json(one: NamedLine) -> dict[str, Any]:

@@ -17,10 +17,10 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from tui.bus.errors import LinkSyntaxError
 from tui.drive.profile.library import user_folder
@@ -38,35 +38,35 @@ _TAKEN = frozenset({"factory"})
 """Words that mean something else where a LINE may stand."""
 _KEYS = ("line", "device", "profile")
 _DEVICES = range(1, 248)
+NO_LINES: Mapping[str, NamedLine] = MappingProxyType({})
+NO_PLACES: Mapping[str, str] = MappingProxyType({})
 
 
 class SettingsError(LinkSyntaxError):
     """What is wrong with the settings file, by file, line and key."""
 
 
-@dataclass(frozen=True, slots=True)
-class NamedLine:
+class NamedLine(NamedTuple):
     """A line with its name; `device` and `profile` of the drive that is meant, if told."""
 
     name: str
     line: str
     device: int | None = None
     profile: str | None = None
-    at: str = field(default="", compare=False)
-    """File, line and key that say so."""
 
 
-@dataclass(frozen=True, slots=True)
-class LineSettings:
+class LineSettings(NamedTuple):
     """What the settings file says of lines, and what is wrong with it."""
 
     path: Path
-    lines: Mapping[str, NamedLine] = field(default_factory=dict)
+    lines: Mapping[str, NamedLine] = NO_LINES
     """By name in small letters, in the order of the file."""
     faults: tuple[str, ...] = ()
     """File, line, key and fault; the lines that they are about are not among the others."""
     text: str = ""
     """The file as it stands; empty where it cannot be read."""
+    places: Mapping[str, str] = NO_PLACES
+    """File, line and key by name."""
 
 
 def settings_file() -> Path:
@@ -153,6 +153,7 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
 
     places = toml_lines(text)
     found: dict[str, NamedLine] = {}
+    at: dict[str, str] = {}
     faults: list[tuple[TomlPath, str]] = []
     for key, value in tables.items():
         if key != LINES_TABLE or not isinstance(value, dict):
@@ -162,12 +163,12 @@ def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
             if fault := next(_faults(name, told, found), None):
                 faults.append(fault)
             else:
-                at = f"{path}:{places.get((key, name), 1)}: {key}.{name}"
-                found[name.casefold()] = _named(name, told, at)
+                found[name.casefold()] = _named(name, told)
+                at[name.casefold()] = f"{path}:{places.get((key, name), 1)}: {key}.{name}"
     told_faults = (
         f"{path}:{places.get(key, 1)}: {'.'.join(map(str, key))}: {fault}." for key, fault in faults
     )
-    return LineSettings(path, found, tuple(told_faults), text)
+    return LineSettings(path, found, tuple(told_faults), text, at)
 
 
 def _faults(
@@ -200,7 +201,7 @@ def _faults(
         yield (*here, "profile"), "the id of a profile in quotes is wanted"
 
 
-def _named(name: str, told: Any, at: str) -> NamedLine:
+def _named(name: str, told: Any) -> NamedLine:
     told = {"line": told} if isinstance(told, str) else told
     profile = told.get("profile")
     return NamedLine(
@@ -208,7 +209,6 @@ def _named(name: str, told: Any, at: str) -> NamedLine:
         told["line"].strip(),
         told.get("device"),
         profile.strip().lower() if profile else None,
-        at,
     )
 
 
@@ -246,4 +246,4 @@ def _salvaged(text: str, name: str) -> NamedLine | None:
             f"{settings_file()} is broken, and the address of {name} cannot be made out. Write:"
             f" drivepanel stop {found.line} -d ADDRESS"
         )
-    return replace(found, device=int(parts["device"]))
+    return found._replace(device=int(parts["device"]))
