@@ -70,6 +70,22 @@ DEFECTS = (
         (f"{KNOWN}::test_a_held_line_arms_nothing",),
     ),
     Defect(
+        "armed-though-the-line-changed",
+        "tui/session/arming.py",
+        "        if self._line.held:\n            self.disarm(",
+        "        if not self._line.link:\n            self.disarm(",
+        "A drive that was armed stays so though another adapter has come under its line's name.",
+        (f"{KNOWN}::test_a_held_line_arms_nothing",),
+    ),
+    Defect(
+        "start-recorded-by-number",
+        "tui/session/starts/starts.py",
+        "line=remembered_text(task.record.line)",
+        "line=task.record.line",
+        "A motor left running is looked for on the adapter that has its number now.",
+        (f"{KNOWN}::test_a_start_is_found_where_its_adapter_is_plugged_in_now",),
+    ),
+    Defect(
         "name-drops-the-address",
         "tui/cli/shared/line_argument.py",
         'usual |= {"device": (named.device,), "devices": (named.device,)}',

@@ -33,6 +33,8 @@ from tui.session.connect.known_lines import (
     remembered_text,
 )
 from tui.session.connect.line_key import line_key
+from tui.session.starts.processes import Processes
+from tui.session.starts.starts import Starts
 
 __all__ = ["adapters"]
 
@@ -209,7 +211,14 @@ def test_a_held_line_arms_nothing() -> None:
     with pytest.raises(OrderRefused, match="Not yet"):
         Arming(line).arm()
     line.held = ""
-    Arming(line).arm()
+    arming = Arming(line)
+    arming.arm()
+    assert arming.armed
+    line.held = "Not the same any more."
+    assert not arming.armed
+    assert arming.refusal() == "Not the same any more."
+    line.held = ""
+    assert not arming.armed
 
 
 @pytest.mark.parametrize(("priority", "reaches"), [(Priority.STOP, True), (Priority.POLL, False)])
@@ -245,6 +254,30 @@ def test_a_number_of_a_pseudo_terminal_is_nobody_but_a_link_to_it_is(tmp_path: P
     finally:
         os.close(master)
         os.close(slave)
+
+
+def test_a_start_is_found_where_its_adapter_is_plugged_in_now(adapters: Adapters) -> None:
+    class Ended(Processes):
+        """Every program has ended."""
+
+        def lives(self, *_: object) -> bool:
+            """None does."""
+            return False
+
+    port = f"serial:{adapters.plug('ttyUSB0', '1.1', serial='A5')},19200,8E1"
+    starts = Starts(processes=Ended())
+    starts.begin(starts.record(port, PUMP, "atv71", "forward", program="run"))
+    adapters.unplug("ttyUSB0")
+    adapters.plug("ttyUSB0", "1.2", serial="B7")
+    moved = adapters.plug("ttyUSB1", "1.1", serial="A5")
+    assert Starts(processes=Ended()).found(port, 2) is None
+    found = Starts(processes=Ended()).found(moved, 2)
+    assert found is not None
+    starts = Starts(processes=Ended())
+    starts.sent(moved, 2)
+    starts.end(moved, 2)
+    assert starts.close(60)
+    assert Starts(processes=Ended()).found(moved, 2) is None
 
 
 def test_a_line_is_remembered_by_its_adapter(adapters: Adapters) -> None:

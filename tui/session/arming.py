@@ -73,6 +73,9 @@ class Arming:
         if self._line.state.status is not LineStatus.CONNECTED:
             self.disarm("The line was lost: no longer armed.")
             return None
+        if self._line.held:
+            self.disarm(self._line.held)
+            return None
         return math.inf if until == math.inf else until - self._clock.monotonic()
 
     @property
