@@ -3,9 +3,13 @@
 from __future__ import annotations
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given
+from hypothesis import settings as how
+from hypothesis import strategies as st
 
 from tui.session.connect.named_lines import (
     LONGEST_SETTINGS,
@@ -208,3 +212,21 @@ def test_names(text: str) -> None:
 @pytest.mark.parametrize("text", ["", "2pump", "pump.toml", "a b", "com12", "x" * 33, "tcp:x", "é"])
 def test_no_names(text: str) -> None:
     assert not is_name(text)
+
+
+SIGNS = [*"[]{}=\".'\n,\\#5x\0é", "", "lines"]
+
+
+@how(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=300)
+@given(st.lists(st.tuples(st.integers(0, len(GOOD)), st.sampled_from(SIGNS)), max_size=12))
+def test_a_file_of_any_content_ends_in_a_sentence(changes: list[tuple[int, str]]) -> None:
+    text = GOOD
+    for at, sign in changes:
+        text = text[:at] + sign + text[at + 1 :]
+    settings(text)
+    found = line_settings()
+    assert all("\n" not in fault for fault in found.faults)
+    for name in ("pump", "fan", "mixer"):
+        with suppress(SettingsError):
+            told = line_to_stop(name)
+            assert told is None or (told.line and told.device in (None, *range(1, 248)))
