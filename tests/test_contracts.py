@@ -61,7 +61,7 @@ def test_every_contract_of_the_design_is_in_the_configuration() -> None:
     [
         (["--help"], {"textual", "pymodbus", "serial", "rich", "msgspec", "tomli", "asyncio"}),
         (["--version"], {"textual", "pymodbus", "serial", "rich", "msgspec", "tomli", "asyncio"}),
-        (["read", "--help"], {"textual", "pymodbus", "serial", "rich", "msgspec"}),
+        (["read", "--help"], {"textual", "pymodbus", "serial", "rich", "msgspec", "tomli"}),
         (["profiles"], {"textual", "pymodbus", "serial"}),
         (["ports"], {"textual", "pymodbus"}),
         (["read", "sim:atv71", "ETA", "--json"], {"textual", "rich"}),
@@ -115,7 +115,10 @@ def test_the_wheel_holds_tui_alone_and_all_profiles(tmp_path: Path) -> None:
     with zipfile.ZipFile(wheel) as packed:
         names = packed.namelist()
     tops = {name.partition("/")[0] for name in names}
-    assert {top for top in tops if not top.endswith(".dist-info")} == {"tui"}
+    assert {top for top in tops if not top.endswith((".dist-info", ".data"))} == {"tui"}
+    assert {n.partition("/")[2] for n in names if ".data/" in n} == {
+        "data/share/man/man1/drivepanel.1"
+    }
     profiles = {path.name for path in (ROOT / "profiles").glob("*.toml")}
     assert {Path(n).name for n in names if n.startswith("tui/_profiles/")} >= profiles
     styles = {path.relative_to(ROOT).as_posix() for path in (ROOT / "tui").rglob("*.tcss")}

@@ -24,6 +24,7 @@ from tui.widgets.palette import THEME
 
 from .screens.hands import Hands
 from .screens.leaving import Leaving
+from .screens.line_check import LineCheck
 from .screens.line_owner import LineOwner, Opener
 from .screens.lookout import FRAME_LOOK, Lookout
 from .screens.places import Places
@@ -31,7 +32,7 @@ from .screens.places import Places
 log = logging.getLogger(__name__)
 
 
-class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, Places, Leaving):
+class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Leaving):
     """The panel on one line at a time.
 
     `start` is a LINE to open at once, `device` a drive on it to watch at once. With
@@ -82,6 +83,12 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, Places, Leaving):
     def get_driver_class(self) -> type[Driver]:
         """The driver of this platform, with the stop keys before everything else."""
         return with_own_keys(super().get_driver_class())
+
+    def look_around(self) -> None:
+        """What must be seen on every screen, and whether the line is still the same."""
+        super().look_around()
+        if self.is_running:
+            self.mind_line()
 
     def say_first(self, happened: str, next_step: str, kind: str = "") -> None:
         """Say something on Line, where a person begins."""

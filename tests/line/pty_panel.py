@@ -14,7 +14,7 @@ import sys
 import termios
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field
 
@@ -245,11 +245,15 @@ def panel_on_a_pty(
     drives: int = 1,
     size: tuple[int, int] = (COLUMNS, ROWS),
     environment: Mapping[str, str] | None = None,
+    named: Callable[[str], Sequence[str]] = lambda line: (line, "-d", "1"),
 ) -> Iterator[PtyPanel]:
-    """The panel on simulated drives over TCP, the first on Monitor."""
+    """The panel on simulated drives over TCP, the first on Monitor.
+
+    `named` gives the words by which a LINE and its first drive are called on the command line.
+    """
     specs = [DriveSpec("atv71", address) for address in range(1, drives + 1)]
     with Simulation(specs) as simulation, WriteLog(simulation.serve_tcp()).at_work() as log:
-        line = [f"tcp:127.0.0.1:{log.port}", "-d", "1"]
+        line = named(f"tcp:127.0.0.1:{log.port}")
         started = _started([*line, *options], size, environment or {})
         panel = PtyPanel(*started, simulation, log)
         try:

@@ -250,7 +250,8 @@ def console_of(
     armed: float | None = None,
 ) -> DriveConsole:
     """A drive whose monitor has brought this snapshot, with a trend of a start and a run."""
-    session = DriveSession(StillLine(line), device, library.load(family), ATV71)
+    identity = ATV71 if family == "atv71" else None
+    session = DriveSession(StillLine(line), device, library.load(family), identity)
     session.arming = session.work.arming = StillArming(session.line, armed)
     way = -1.0 if snapshot and snapshot.state.direction == "reverse" else 1.0
     trend = tuple(

@@ -12,10 +12,15 @@ from textual.pilot import Pilot
 from tui.bus.api import LineState
 from tui.bus.errors import PortBusy
 from tui.session.connect.identify import DriveIdentity
+from tui.session.connect.known_line import KnownLine
+from tui.session.connect.known_lines import DriveMark, LineMark, LinesMemory, keep_memory
+from tui.session.connect.line_key import line_key
+from tui.session.connect.named_lines import settings_file
 from tui.session.connect.search import Search
 from tui.session.events import EventLog
 from tui.session.fleet import FoundDrive
 from tui.session.monitor.line_watch import Look
+from tui.session.paths import remember_line
 
 from . import fakes
 
@@ -24,6 +29,13 @@ PORTS = [("/dev/ttyUSB0", "USB-RS485 adapter"), ("/dev/ttyS0", "")]
 MODELS = ("ATV312HU09M3", "ATV21H075M3X", "ATV71HU15M3")
 LONG_AGO = 1_600_000_031.0
 """When all was said, time.time(): a message that warns stands on several lines while it is new."""
+ADAPTER = "serial:/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0,19200,8E1"
+SETTINGS = f"""
+[lines]
+pump = "{ADAPTER.replace("A50285BI", "AB0LQ2KX")}"
+fan = {{ line = "tcp:192.168.0.10", device = 5, profile = "powerdrive" }}
+old = 3
+"""
 OVERBRAKING, OVERLOAD = 18, 20
 """Raw fault codes of the Altivar 71: ObF, OLF."""
 
@@ -81,6 +93,28 @@ async def show(app: Any, pilot: Pilot[None], fleet: Any, line: LineState) -> Non
 
 
 async def no_line(app: Any, pilot: Pilot[None]) -> None:
+    await pilot.pause()
+
+
+async def named(app: Any, pilot: Pilot[None]) -> None:
+    path = settings_file()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(SETTINGS, "utf-8")
+    remember_line(ADAPTER)
+    app.connection.action_refresh_lines()
+    await pilot.pause()
+
+
+async def another_drive(app: Any, pilot: Pilot[None]) -> None:
+    fleet = wall(5)
+    await show(app, pilot, fleet, fakes.CONNECTED)
+    line = fleet.line
+    drives = {2: DriveMark("Schneider Electric", "ATV31H037M2", "0104", "MIXER", "atv31")}
+    keep_memory(LinesMemory({line_key("/dev/ttyUSB0"): LineMark("", drives)}))
+    app.opened.known = KnownLine(line)
+    app.opened.known.note(fleet.found[2].identity, 2, "atv21")
+    app.look_around()
+    app.draw_frame()
     await pilot.pause()
 
 
@@ -169,6 +203,8 @@ async def dialog(_: Any, pilot: Pilot[None]) -> None:
 
 STATES: dict[str, Callable[[Any, Pilot[None]], Awaitable[None]]] = {
     "no-line": no_line,
+    "named": named,
+    "another-drive": another_drive,
     "read-only": read_only,
     "opening": opening,
     "busy": busy,

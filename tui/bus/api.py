@@ -62,6 +62,10 @@ class ModbusLine(Protocol):
     ChecksumFault, WrongReply or DeviceException. A read may be repeated, a write never is.
     """
 
+    held: str
+    """Why nothing but a stop is written until a person says otherwise, as a sentence; empty
+    where that is not so."""
+
     @property
     def link(self) -> Link:
         """What the line is reached by."""

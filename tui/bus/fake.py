@@ -70,6 +70,7 @@ class FakeLine:
     ) -> None:
         self.link: Link = link or SerialLink("/dev/null")
         self.read_only = read_only
+        self.held = ""
         self.timing = Timing()
         self.pace = Pace()
         self.facts = SharedFacts()
@@ -186,7 +187,7 @@ class FakeLine:
         take = self._device(device).take
         functions = self.limits.get(device, CAUTIOUS).functions
         request = write_request(device, address, values, multiple, functions)
-        await self._exchange(request, "write", lambda: take(address, values), forbidden)
+        await self._exchange(request, "write", lambda: take(address, values), forbidden, priority)
         return self._clock()
 
     async def read_write(
@@ -239,7 +240,7 @@ class FakeLine:
     ) -> float:
         """Write registers of all devices that have them."""
         request = write_request(BROADCAST, address, values, None, limits.broadcast_functions)
-        self._check(request, limits)
+        self._check(request, limits, priority)
         self.requests.append(request)
         for device in self.devices.values():
             if not device.silent and address in device.words:
@@ -268,9 +269,10 @@ class FakeLine:
             self.devices[device].silent = True
         return self.devices[device]
 
-    def _check(self, request: Request, limits: Limits) -> None:
+    def _check(self, request: Request, limits: Limits, priority: Priority) -> None:
         """Refuse what a real line would not send."""
-        if reason := send_refusal(request, limits, read_only=self.read_only):
+        held = "" if priority is Priority.STOP else self.held
+        if reason := send_refusal(request, limits, read_only=self.read_only, held=held):
             raise RequestRefused(reason)
         if self.state.status is LineStatus.CLOSED:
             raise LineClosed
@@ -283,9 +285,10 @@ class FakeLine:
         kind: str,
         carry_out: Callable[[], T],
         forbidden: Callable[[], str] | None = None,
+        priority: Priority = Priority.POLL,
     ) -> T:
         """Check a request, log it, let the device do it, wait as long as its answer takes."""
-        self._check(request, self.limits.get(request.device, CAUTIOUS))
+        self._check(request, self.limits.get(request.device, CAUTIOUS), priority)
         if forbidden is not None and (why := forbidden()):
             raise RequestRefused(why)
         device = self._device(request.device)

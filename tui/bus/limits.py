@@ -81,12 +81,19 @@ MAX_READ, MAX_WRITE, MAX_READ_23, MAX_WRITE_23 = 125, 123, 125, 121
 """The longest that Modbus itself allows, in words."""
 
 
-def send_refusal(request: Request, limits: Limits, *, read_only: bool = False) -> str:
-    """Why a request must not be sent, as a sentence; empty when it may."""
+def send_refusal(
+    request: Request, limits: Limits, *, read_only: bool = False, held: str = ""
+) -> str:
+    """Why a request must not be sent, as a sentence; empty when it may.
+
+    `held` is why nothing is to be written to the line now.
+    """
     if not 0 <= request.device <= 255:
         return f"Device {request.device} does not exist; devices are 1 to 255."
     if read_only and request.changes:
         return "The line is read-only: nothing is written."
+    if held and request.changes:
+        return held
     text = _out_of_range(request)
     if text:
         return text

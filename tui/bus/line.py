@@ -86,6 +86,7 @@ class Line:
     ) -> None:
         self.link = link
         self.read_only = read_only
+        self.held = ""
         self.timing = timing or timing_of(link)
         self.facts = SharedFacts(program)
         """What the programs on the line know of each other."""
@@ -255,7 +256,8 @@ class Line:
     ) -> Reply:
         """Check a request, queue it, await its reply."""
         limits = limits or self._devices[request.device].limits
-        reason = send_refusal(request, limits, read_only=self.read_only)
+        held = "" if priority is Priority.STOP else self.held
+        reason = send_refusal(request, limits, read_only=self.read_only, held=held)
         if reason:
             raise RequestRefused(reason)
         job = Job(request, priority, limits, replaceable=replaceable, forbidden=forbidden)

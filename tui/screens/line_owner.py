@@ -26,6 +26,8 @@ log = logging.getLogger(__name__)
 CHOSEN_CONNECTS_WITHIN = 4.0
 """Seconds in which a line chosen by a person must connect."""
 
+WAY_TO_ACCEPT = "If that is right, take the line as it is now: Ctrl+P, accept."
+
 Opener = Callable[..., "OpenLine"]
 
 
@@ -70,7 +72,7 @@ class LineOwner(Panel):
         self.fleet = Fleet(self.opened.line, self.journal, starts, self.events, self.clock)
         self._look_after(self.fleet)
         log.info("opened %s", self.opened.label)
-        await asyncio.to_thread(remember_line, self.opened.text)
+        await asyncio.to_thread(_remember, self.opened.text)
 
     def _look_after(self, fleet: Fleet) -> None:
         """Tell who shares the line, and stop the motors of programs on it that are gone."""
@@ -104,6 +106,10 @@ class LineOwner(Panel):
         opened = self._open(
             text, read_only=self.read_only, wait=CHOSEN_CONNECTS_WITHIN, program="panel"
         )
+        if opened.simulation is None:
+            from tui.session.connect.known_line import KnownLine
+
+            opened.known = KnownLine(opened.line, way=WAY_TO_ACCEPT)
         # here, where nobody waits for a key: what the loop asks for next
         import tui.screens.monitor.screen
         import tui.session.fleet  # noqa: F401
@@ -125,6 +131,13 @@ class LineOwner(Panel):
             if fleet is not None and fleet.starts is not None:
                 await asyncio.to_thread(fleet.starts.close)
             log.info("closed %s", opened.label)
+
+
+def _remember(text: str) -> None:
+    """Put the line among those used lately, by its adapter's lasting name."""
+    from tui.session.connect.known_lines import remembered_text
+
+    remember_line(remembered_text(text))
 
 
 def _close_unwanted(opening: asyncio.Future[OpenLine]) -> None:

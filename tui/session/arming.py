@@ -38,16 +38,22 @@ class Arming:
         self._why = ""
         self.times = 0
         """How often it was armed."""
+        self.barred = ""
+        """Why the drive is not to be armed at all, for a person; empty where it may be."""
 
     def arm(self, *, seconds: float = ARMED_FOR) -> None:
         """Let writes through from now on.
 
         `seconds` is how long without a key; math.inf for a command that ends by itself. Raises
-        OrderRefused on a read-only line, and CommandedElsewhere where another program commands the
-        drive.
+        OrderRefused on a line that is read-only, or held until a person says otherwise, and where
+        it is barred; CommandedElsewhere where another program commands the drive.
         """
         if self._line.read_only:
             raise OrderRefused("The line is read-only: nothing is written.")
+        if self._line.held:
+            raise OrderRefused(self._line.held)
+        if self.barred:
+            raise OrderRefused(self.barred)
         if self._device is not None and (why := self._line.facts.claim(self._device)):
             raise CommandedElsewhere(why)
         self._span, self._why = seconds, ""
@@ -77,6 +83,9 @@ class Arming:
             return None
         if self._line.state.status is not LineStatus.CONNECTED:
             self.disarm("The line was lost: no longer armed.")
+            return None
+        if self._line.held:
+            self.disarm(self._line.held)
             return None
         return math.inf if until == math.inf else until - self._clock.monotonic()
 

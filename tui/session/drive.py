@@ -13,12 +13,15 @@ from tui.drive.profile.profile import Profile
 
 from .arming import Arming
 from .clock import REAL_CLOCK, Clock
+from .connect.contradiction import contradiction
 from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
 from .image import RegisterImage
 from .reading import Rating
 from .starts.keeper import StartKeeper
 from .work import WorkQueue
+
+OWN_PROFILE = "Nothing is written by a profile that is not the drive's own."
 
 
 class DriveSession:
@@ -48,6 +51,10 @@ class DriveSession:
         """What is known of its registers."""
         self.arming = Arming(line, clock, device)
         """Whether it may be written to from here."""
+        self.contradiction = contradiction(identity, profile)
+        """How the drive contradicts its profile by what it says of itself; empty if it does not."""
+        if self.contradiction:
+            self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
         self.work = WorkQueue(line, device, self.arming, clock)
         """What is being done to it; a stop ends it."""
         self.work.on_change = self.stir

@@ -10,8 +10,17 @@ import click
 
 from tui.drive.plain import plain
 
-from ..shared.errors import told
-from ..shared.options import device_option, json_option, line_argument, on_line, read_only_option
+from ..shared.devices import several_devices_option
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, told
+from ..shared.line_argument import mind_the_drive
+from ..shared.options import (
+    Target,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+)
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -21,25 +30,34 @@ if TYPE_CHECKING:
 
 @click.command()
 @line_argument
-@device_option
+@several_devices_option
 @read_only_option
 @json_option
 @told
-def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> None:
+def identify(line_text: str, device: tuple[int, ...], read_only: bool, as_json: bool) -> None:
     """Ask a drive who it is (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
-    from ..shared.output import print_json
+    target = Target(line_text, device[0], None, others=device[1:])
 
-    async def work(opened: OpenLine) -> tuple[DriveIdentity, Mapping[str, int]]:
-        identity = await ask(opened.line, device)
-        return identity, await _model_words(opened, identity)
-
-    found, words = on_line(line_text, work, read_only=read_only)
-    if as_json:
+    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+        identity = await ask(opened.line, drive.device)
+        mind_the_drive(opened, drive.device, identity)
+        words = await _model_words(opened, identity)
+        if not as_json:
+            _say_identity(identity, words)
         keys = ("device", "vendor", "reference", "version", "name", "profile")
-        print_json({**{key: getattr(found, key) for key in keys}, "model": _model(found, words)})
-        return
+        told = {key: getattr(identity, key) for key in keys}
+        return {"line": line_text, **told, "model": _model(identity, words)}, DONE
+
+    async def work(opened: OpenLine) -> int:
+        return await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+
+    if status := on_line(line_text, work, read_only=read_only):
+        raise click.exceptions.Exit(status)
+
+
+def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
     say(f"Device     {found.device}")
     for title, text in (
         ("Vendor", found.vendor),

@@ -9,8 +9,12 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.completion import complete_line
+from ..shared.devices import SLAVE_ADDRESS, one_device
 from ..shared.errors import USAGE, Failure, told
-from ..shared.options import SLAVE_ADDRESS, read_only_option
+from ..shared.line_argument import LineArgument
+from ..shared.lines import is_line
+from ..shared.options import read_only_option
 from ..shared.signals import ending_by_signal
 
 if TYPE_CHECKING:
@@ -141,11 +145,19 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
 
 
 @click.command(hidden=True)
-@click.argument("line_text", required=False, metavar="[LINE]")
+@click.argument(
+    "line_text",
+    required=False,
+    metavar="[LINE]",
+    cls=LineArgument,
+    shell_complete=complete_line,
+)
 @click.option(
     "-d",
     "--device",
     type=SLAVE_ADDRESS,
+    multiple=True,
+    callback=one_device,
     metavar="ADDRESS",
     help="Watch the drive at this slave address at once; without it, look for drives.",
 )
@@ -169,6 +181,10 @@ def panel(
     """Open the panel."""
     if device is not None and line_text is None:
         raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
+    if line_text is not None and not is_line(line_text):
+        from ..main import no_such_command
+
+        raise click.UsageError(no_such_command(line_text))
     run_panel(
         line_text,
         device,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import click
 
 from ..shared.errors import told
@@ -14,18 +16,30 @@ from ..shared.say import say
 @told
 def ports(as_json: bool) -> None:
     """List the serial ports of this machine and who holds them."""
+    from tui.bus.transport.port_names import lasting_name
     from tui.bus.transport.ports import holder, list_ports
 
     from ..shared.output import print_json
 
     found = [(port, holder(port.path)) for port in list_ports()]
+    names = {port.path: lasting_name(port.path) for port, _ in found}
     if as_json:
-        print_json(
-            [{"path": p.path, "description": p.description, "holder": by} for p, by in found]
-        )
+        rows: list[dict[str, Any]] = [
+            {"path": p.path, "description": p.description, "holder": by} for p, by in found
+        ]
+        for row in rows:
+            name = names[row["path"]]
+            lasts = name.lasting and name.path != row["path"]
+            row |= {"lasting": name.path if lasts else None, "adapter": name.adapter or None}
+        print_json(rows)
         return
     if not found:
         say("No serial port found. Plug in the adapter, or use tcp:HOST or rtu-tcp:HOST:PORT.")
     for port, by in found:
         used = f"  in use by {by}" if by else ""
         say(f"{port.path:<20} {port.description}{used}")
+        name = names[port.path]
+        if name.lasting and name.path != port.path:
+            say(f"{'':<20} always {name.path}")
+        if name.shared:
+            say(f"{'':<20} without a serial number of its own: known by its socket alone")

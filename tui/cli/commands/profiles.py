@@ -9,6 +9,7 @@ import click
 
 from tui.drive.plain import plain
 
+from ..shared.completion import complete_profile
 from ..shared.errors import told
 from ..shared.options import json_option
 from ..shared.say import say
@@ -19,7 +20,12 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("profile_id", required=False, metavar="[ID|new NEW-ID|path]")
+@click.argument(
+    "profile_id",
+    required=False,
+    metavar="[ID|new NEW-ID|path]",
+    shell_complete=complete_profile,
+)
 @click.argument("more", nargs=-1, metavar="")
 @click.option(
     "--check",
@@ -63,11 +69,11 @@ def profiles(
 
         say(schema_text().rstrip())
     elif words[:1] == ("new",):
-        _begin(words[1:], origin)
+        _begin(words[1:], origin, as_json)
     elif more or origin is not None:
         raise click.UsageError("Say one ID, or: profiles new NEW-ID --from ID.")
     elif profile_id == "path":
-        say(str(library.user_folder()))
+        _tell_folder(as_json)
     elif profile_id is not None and wiring:
         _show_wiring(library.load(profile_id), as_json)
     elif profile_id is not None:
@@ -101,10 +107,24 @@ def check_files(files: list[Path], as_json: bool) -> None:
         raise Failure("\n".join((f"{told_count} found:", *faults)), USAGE)
 
 
-def _begin(words: tuple[str, ...], origin: str | None) -> None:
+def _tell_folder(as_json: bool) -> None:
+    from tui.drive.profile import library
+
+    from ..shared.output import print_json
+
+    folder = str(library.user_folder())
+    if as_json:
+        print_json({"folder": folder})
+    else:
+        say(folder)
+
+
+def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     """Write the file of a new profile, a copy of another; never over a file."""
     from tui.drive.profile import library
     from tui.drive.profile.new_file import new_profile_text
+
+    from ..shared.output import print_json
 
     if len(words) != 1 or origin is None:
         raise click.UsageError("Say what it is to be, and what it begins as: new NEW-ID --from ID.")
@@ -123,6 +143,9 @@ def _begin(words: tuple[str, ...], origin: str | None) -> None:
             file.write(text)
     except FileExistsError:
         raise click.UsageError(f"{path} is there already; nothing was written.") from None
+    if as_json:
+        print_json({"id": new_id, "from": source.id, "file": str(path)})
+        return
     say(f"{path}")
     say(f"It begins as {source.id}. Change it, then: drivepanel profiles --check {path}")
 

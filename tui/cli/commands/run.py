@@ -11,6 +11,7 @@ from ..shared.options import (
     drive_options,
     json_option,
     line_argument,
+    never_forced,
     on_line,
     read_only_option,
 )
@@ -45,6 +46,7 @@ from .orders import arm_option, need_arming
 )
 @read_only_option
 @json_option
+@never_forced
 @told
 def run(
     target: Target,

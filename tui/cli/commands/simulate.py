@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.completion import complete_profile
 from ..shared.errors import told
+from ..shared.options import json_option
+from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.standard_input import stay_in_background, typed_lines
 
@@ -23,7 +26,13 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
 
 
 @click.command()
-@click.argument("drives", nargs=-1, required=True, metavar="PROFILE[@ADDRESS]...")
+@click.argument(
+    "drives",
+    nargs=-1,
+    required=True,
+    metavar="PROFILE[@ADDRESS]...",
+    shell_complete=complete_profile,
+)
 @click.option("--pty", "pty", metavar="PATH", help="A pseudo-terminal, with a link at PATH.")
 @click.option("--serial", "serial", metavar="PATH", help="A serial port.")
 @click.option("--tcp", metavar="HOST:PORT", help="Modbus TCP.")
@@ -73,6 +82,7 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
     metavar="HZ",
     help="Motors run at this frequency: by their inputs, or as another master left them.",
 )
+@json_option
 @told
 def simulate(
     drives: tuple[str, ...],
@@ -89,6 +99,7 @@ def simulate(
     faults: tuple[str, ...],
     seed: int,
     run_hz: float,
+    as_json: bool,
 ) -> None:
     """Serve simulated drives until Ctrl-C or SIGTERM.
 
@@ -118,22 +129,34 @@ def simulate(
     with simulation:
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
-        say(f"Ready: {names} on {where}. Ctrl-C ends it.")
+        if as_json:
+            found = [{"profile": spec.profile, "device": spec.address} for spec in specs]
+            print_json({"event": "ready", "line": where, "drives": found}, compact=True)
+        else:
+            say(f"Ready: {names} on {where}. Ctrl-C ends it.")
         stay_in_background()
-        threading.Thread(target=_follow, args=(simulation,), name="inputs", daemon=True).start()
+        inputs = (simulation, as_json)
+        threading.Thread(target=_follow, args=inputs, name="inputs", daemon=True).start()
         stop.wait()
 
 
-def _follow(simulation: Simulation) -> None:
+def _follow(simulation: Simulation, as_json: bool) -> None:
     """Set inputs as the lines of standard input say; a line that is wrong is told of."""
     from tui.simulator import SimulatorError, set_inputs
 
     for line in typed_lines():
         if line.strip():
             try:
-                say(set_inputs(simulation, line))
+                text = set_inputs(simulation, line)
             except SimulatorError as error:
                 say(str(error), err=True)
+                continue
+            if as_json:
+                # click knows no command in a thread
+                told = {"command": "simulate", "event": "inputs", "text": text}
+                print_json(told, compact=True)
+            else:
+                say(text)
 
 
 def _serve(

@@ -11,12 +11,14 @@ import click
 from tui.drive.plain import plain
 
 from ..shared.control import control_json, control_row
-from ..shared.errors import told
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, told
 from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
 from ..shared.options import (
     Target,
     connect_drive,
-    drive_options,
+    drives_options,
+    force_profile_option,
     json_option,
     line_argument,
     on_line,
@@ -251,7 +253,8 @@ def _watch_text(status: Status) -> str:
 
 @click.command()
 @line_argument
-@drive_options
+@drives_options
+@force_profile_option
 @read_only_option
 @json_option
 @told
@@ -261,14 +264,16 @@ def status(
     as_json: bool,
 ) -> None:
     """Tell what a drive does, who commands it, and what it does when the line falls silent."""
-    from ..shared.output import print_json
 
-    async def work(opened: OpenLine) -> Status:
-        return await status_of_drive(await connect_drive(opened, target), opened)
+    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+        found = await status_of_drive(await connect_drive(opened, drive), opened)
+        if not as_json:
+            for title, text in status_table(found):
+                say(f"{title:<17} {plain(text) or '-----'}")
+        return status_json(target.line_text, found), DONE
 
-    found = on_line(target, work, read_only=read_only)
-    if as_json:
-        print_json(status_json(target.line_text, found))
-        return
-    for title, text in status_table(found):
-        say(f"{title:<17} {plain(text) or '-----'}")
+    async def work(opened: OpenLine) -> int:
+        return await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+
+    if status := on_line(target, work, read_only=read_only):
+        raise click.exceptions.Exit(status)

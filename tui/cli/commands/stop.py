@@ -4,24 +4,25 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Iterable
-from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import click
 
+from ..running.stop_telling import StopTelling
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
 from ..shared.options import (
     Target,
     connect_drive,
-    drive_options,
+    drives_options,
+    json_option,
     line_argument,
     on_line,
     read_only_option,
     unidentified,
 )
-from ..shared.say import say
-from .orders import close_journal, complain
+from ..shared.output import print_json
+from .orders import close_journal
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -37,7 +38,7 @@ STOP_POLL_INTERVAL = 0.05
 
 @click.command()
 @line_argument
-@drive_options
+@drives_options
 @click.option("--all", "every", is_flag=True, help="Stop every drive found on the line.")
 @click.option(
     "--addresses",
@@ -55,6 +56,7 @@ STOP_POLL_INTERVAL = 0.05
 )
 @click.option("--arm", is_flag=True, help="Let --give-back write to the drive; no stop needs it.")
 @read_only_option
+@json_option
 @told
 def stop(
     target: Target,
@@ -65,32 +67,42 @@ def stop(
     give_back: bool,
     arm: bool,
     read_only: bool,
+    as_json: bool,
 ) -> None:
     """Stop a motor on its ramp and wait until it stands. Needs no arming."""
     if quick and freewheel:
         raise click.UsageError("Either --quick or --freewheel.")
     if addresses and not every:
         raise click.UsageError("--addresses goes with --all.")
-    if give_back and every:
-        raise click.UsageError("--give-back is for one drive, not for --all.")
+    if give_back and (every or target.others):
+        raise click.UsageError("--give-back is for one drive, not for several.")
     if read_only:
         raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
     devices = _devices(addresses) if every else None
+    telling = StopTelling(target.line_text, as_json=as_json)
 
     async def work(opened: OpenLine) -> int:
-        if not every:
+        if not (every or target.others):
             found = await _wanted(opened, target)
-            status = await _stop_one(opened, found, order)
+            status = await _stop_one(opened, found, order, telling)
             if give_back and not status:
                 from ..running.giving_back import give_control_back
 
-                await give_control_back(found.session, arm=arm)
+                text = await give_control_back(found.session, arm=arm)
+                telling.gave_back(text)
             return status
         wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
-        return await _stop_all(opened, wanted, order, target.profile_id)
+        if not every:
+            wanted = tuple(one.device for one in target.each())
+        profile_id = target.profile_id
+        return await _stop_all(opened, wanted, order, profile_id, telling, named=not every)
 
-    if worst := on_line(target, work):
+    worst = on_line(target, work)
+    if as_json:
+        several = every or len(target.each()) > 1
+        print_json(telling.documents if several else telling.documents[0])
+    if worst:
         raise click.exceptions.Exit(worst)
 
 
@@ -140,7 +152,9 @@ async def _wanted(opened: OpenLine, target: Target) -> StoppableDrive:
     return StoppableDrive(session, library.load(target.profile_id).name)
 
 
-async def _stop_one(opened: OpenLine, found: StoppableDrive, order: OrderId) -> int:
+async def _stop_one(
+    opened: OpenLine, found: StoppableDrive, order: OrderId, telling: StopTelling
+) -> int:
     from tui.session.command.stop import Stopper
     from tui.session.journal import Journal
 
@@ -152,12 +166,14 @@ async def _stop_one(opened: OpenLine, found: StoppableDrive, order: OrderId) -> 
         )
     journal = Journal()
     try:
-        return await _seen_through(Stopper(opened.line, journal), found, order)
+        return await _seen_through(Stopper(opened.line, journal), found, order, telling)
     finally:
         close_journal(journal)
 
 
-async def _seen_through(stopper: Stopper, found: StoppableDrive, order: OrderId) -> int:
+async def _seen_through(
+    stopper: Stopper, found: StoppableDrive, order: OrderId, telling: StopTelling
+) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
     from tui.session.command.stop_report import Phase
 
@@ -166,11 +182,11 @@ async def _seen_through(stopper: Stopper, found: StoppableDrive, order: OrderId)
     report = await ended(stopper, session.device)
     who = f"Device {session.device}, {found.name}"
     if report.phase is Phase.STOPPED:
-        with suppress(OSError):  # a reader that went away must not end the other stops
-            say(f"{who}: {report.text}.")
+        telling.stopped(session.device, session.profile.id, f"{who}: {report.text}.")
         return 0
-    complain(f"{who}: {report.text}")
-    return await _why(session)
+    status = await _why(session)
+    telling.failed(session.device, session.profile.id, f"{who}: {report.text}", status)
+    return status
 
 
 async def _why(session: DriveSession) -> int:
@@ -189,12 +205,20 @@ async def _why(session: DriveSession) -> int:
 
 
 async def _stop_all(
-    opened: OpenLine, devices: Iterable[int], order: OrderId, profile_id: str | None
+    opened: OpenLine,
+    devices: Iterable[int],
+    order: OrderId,
+    profile_id: str | None,
+    telling: StopTelling,
+    *,
+    named: bool,
 ) -> int:
     """Stop each drive as soon as it is found; what one does holds up no other.
 
-    Every address is asked once in haste before any is asked with patience: a silent one takes
-    seconds to rule out, and meanwhile motors turn.
+    Of `named` addresses every one has to answer.
+
+    Every address is first asked once, shortly, before any is asked with patience: a silent one
+    takes seconds to rule out, and meanwhile motors turn.
     """
     from tui.session.command.stop import Stopper
     from tui.session.journal import Journal
@@ -211,21 +235,23 @@ async def _stop_all(
                 try:
                     found = await _found(opened, device, profile_id, patient=patient)
                 except Failure as failure:
-                    complain(failure.format_message())
-                    worst = max(worst, failure.exit_code)
+                    telling.failed(device, None, failure.message, failure.status)
+                    worst = max(worst, failure.status)
                     continue
                 if found is None:
                     left.append(device)
                     continue
                 # a drive without the wished way is stopped all the same
                 way: OrderId = order if has_order(found.session, order) else "stop"
-                stops.append(asyncio.create_task(_seen_through(stopper, found, way)))
+                stops.append(asyncio.create_task(_seen_through(stopper, found, way, telling)))
     finally:
         # whatever went wrong with the search: stops that were begun are seen through
         worst = max([worst, *await asyncio.gather(*stops)])
         close_journal(journal)
     if left:
-        complain(f"No answer at {', '.join(map(str, left))}.")
+        status = LINE_TROUBLE if named else 0
+        telling.silent(left, status)
+        worst = max(worst, status)
     return worst or (0 if stops else LINE_TROUBLE)
 
 

@@ -53,7 +53,7 @@ class RunTelling:
 
     def tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
         """One line, or one JSON object a line, about an event."""
-        from ..shared.output import iso_time, json_text
+        from ..shared.output import document, iso_time, json_text
 
         now = time.time()
         if not self._as_json:
@@ -70,4 +70,4 @@ class RunTelling:
                 "values": values_json(self._session.profile, latest.readings),
                 "error": latest.error or None,
             }
-        self._say(json_text(data))
+        self._say(json_text(document(data)))

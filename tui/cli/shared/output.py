@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal
+
+import click
 
 from tui.drive.plain import commands, plain
 
@@ -18,6 +20,10 @@ if TYPE_CHECKING:
 
     from tui.session.drive import DriveSession
     from tui.session.reading import Reading
+
+JSON_SCHEMA = 1
+"""Version of all that `--json` prints: fields are added to it, none is taken out or renamed."""
+JsonObject = Mapping[str, Any]
 
 COLUMNS = {
     "Code": False,
@@ -38,10 +44,26 @@ PIPE_WIDTH = 200
 """Width of a table that goes to a file or another program, in characters."""
 
 
-def print_json(data: object, *, compact: bool = False) -> None:
-    """Print JSON on standard output, at once."""
-    sys.stdout.write(json_text(data, compact=compact) + "\n")
+def print_json(data: JsonObject | Sequence[JsonObject], *, compact: bool = False) -> None:
+    """Print one document, or a list of them, on standard output, at once."""
+    told = document(data) if isinstance(data, Mapping) else [document(one) for one in data]
+    sys.stdout.write(json_text(told, compact=compact) + "\n")
     sys.stdout.flush()
+
+
+def document(data: JsonObject) -> dict[str, Any]:
+    """The object with what every one begins with: version of the schema, and the command."""
+    return {"schema": JSON_SCHEMA, "command": _command(), **data}
+
+
+def _command() -> str | None:
+    """The name of the command that was called; None where the words name none."""
+    context = click.get_current_context(silent=True)
+    while context is not None and context.parent is not None and context.parent.parent is not None:
+        context = context.parent
+    if context is None:
+        return None
+    return context.invoked_subcommand if context.parent is None else context.info_name
 
 
 def json_text(data: object, *, compact: bool = True) -> str:
@@ -56,12 +78,13 @@ def readings_json(
     line: str, session: DriveSession, readings: Mapping[str, Reading]
 ) -> dict[str, Any]:
     """The object that `read` and `watch` print."""
-    return {
-        "line": line,
-        "device": session.device,
-        "profile": session.profile.id,
-        "values": {code: reading_json(reading) for code, reading in readings.items()},
-    }
+    values = {code: reading_json(reading) for code, reading in readings.items()}
+    return {**drive_json(line, session), "values": values}
+
+
+def drive_json(line: str, session: DriveSession) -> dict[str, Any]:
+    """Which drive, on which line as it was typed: how every document about one begins."""
+    return {"line": line, "device": session.device, "profile": session.profile.id}
 
 
 def reading_json(reading: Reading) -> dict[str, Any]:

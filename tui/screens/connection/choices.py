@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import lru_cache
 
 from rich.text import Text
 
 from tui.bus.errors import LinkSyntaxError
+from tui.drive.plain import plain
 from tui.drive.profile.library import demo_drives
+from tui.session.connect.named_lines import LineSettings, line_named
 from tui.session.connect.open_line import check_line
 from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT, PLAIN, RUNNING, STRONG
 
+_LASTING = re.compile(r"(?:serial:)?/dev/serial/by-(?:id|path)/(?:usb-)?")
 COUNTED = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
 
 
@@ -49,6 +53,10 @@ class LineChoice:
     text: str
     description: str
     path: str = ""
+    name: str = ""
+    """How the settings file calls it."""
+    device: int | None = None
+    """The drive that is meant by the name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,15 +68,35 @@ class Group:
     empty: str = ""
 
 
-def groups(ports: list[tuple[str, str]], recent: list[str]) -> list[Group]:
+def groups(
+    ports: list[tuple[str, str]], recent: list[str], settings: LineSettings | None = None
+) -> list[Group]:
     """The headings with their lines; `ports` are paths with descriptions."""
     serial = tuple(LineChoice(path, description, path) for path, description in ports)
     lately = tuple(LineChoice(text, "") for text in recent if not _offered_simulated(text))
     return [
+        *_named(settings),
         Group("Serial ports", serial, "none found"),
         Group("Recent", lately, "none yet: n types one"),
         Group("Simulated", tuple(LineChoice(text, about) for text, about in simulated_lines()[:2])),
     ]
+
+
+def _named(settings: LineSettings | None) -> list[Group]:
+    """The lines with a name, and that the file that names them has faults; nothing without one."""
+    if settings is None or not (settings.lines or settings.faults):
+        return []
+    fault = f"wrong: {settings.path.name}" if settings.faults else ""
+    lines = tuple(
+        LineChoice(one.line, _without_settings(one.line), name=one.name, device=one.device)
+        for one in settings.lines.values()
+    )
+    return [Group("Named", lines, fault)]
+
+
+def _without_settings(line: str) -> str:
+    """A line whose adapter's name leaves no room for its settings."""
+    return line.partition(",")[0] if _LASTING.match(line) else line
 
 
 def _offered_simulated(text: str) -> bool:
@@ -87,9 +115,10 @@ def _with_addresses(line: str) -> str:
 
 
 def fault_of_line(text: str) -> str:
-    """What is wrong with a typed line, or nothing."""
+    """What is wrong with a typed line, or with the name of one, or nothing."""
     try:
-        check_line(text)
+        named = line_named(text.strip())
+        check_line(named.line if named else text)
     except LinkSyntaxError as error:
         return str(error)
     return ""
@@ -115,11 +144,21 @@ def same_line(one: str, other: str) -> bool:
     return settings[0] == settings[1]
 
 
+def line_in(text: str, width: int) -> str:
+    """A line in at most so many cells; of an adapter's lasting name the end tells which it is."""
+    found = _LASTING.match(text)
+    if found is None or len(text) <= width:
+        return short(text, width)
+    rest = text[found.end() :].replace("-if00-port0", "", 1)
+    return short(rest, width) if len(rest) <= width else f"…{plain(rest)[1 - width :]}"
+
+
 def choice_line(choice: LineChoice, width: int, *, here: bool = False) -> Text:
     """A line that can be opened, with as much of its description as there is room for."""
     text = Text("● " if here else "  ", RUNNING if here else PLAIN)
-    text.append(short(choice.text, width - 2), STRONG if here else PLAIN)
+    text.append(line_in(choice.name or choice.text, width - 2), STRONG if here else PLAIN)
     room = width - text.cell_len - 2
     if choice.description and room >= 6:
-        text.append("  " + short(choice.description, room), FAINT)
+        drive = "" if choice.device is None else f"{choice.device} on "
+        text.append(f"  {drive}{line_in(choice.description, room - len(drive))}", FAINT)
     return text

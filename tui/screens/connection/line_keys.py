@@ -10,6 +10,7 @@ from textual.worker import WorkerError
 
 from tui.bus.errors import LineError, LinkSyntaxError
 from tui.drive.errors import DriveError
+from tui.session.connect.named_lines import line_named
 
 from ..opening import leave_opening
 from .choices import LineChoice, fault_of_line, line_forms, same_line
@@ -38,7 +39,8 @@ class LineKeys(Scanning):
 
         def typed(text: str | None) -> None:
             if text:
-                self.open_line(text)
+                named = line_named(text.strip())
+                self.open_line(*(named.line, named.device) if named else (text, None))
 
         about = "\n".join(line_forms())
         dialog = Ask(
@@ -47,8 +49,11 @@ class LineKeys(Scanning):
         self.app.push_screen(dialog, typed)
 
     @work(exclusive=True, group="ask", exit_on_error=False)
-    async def open_line(self, text: str) -> None:
-        """Open a line and ask for its drives; a good one is not left for it without asking."""
+    async def open_line(self, text: str, device: int | None = None) -> None:
+        """Open a line and ask for its drives; a good one is not left for it without asking.
+
+        With `device` that drive alone is asked for.
+        """
         if self._opening and same_line(text, self._opening):
             return
         always = ""
@@ -59,13 +64,18 @@ class LineKeys(Scanning):
             always = f"{self._what_is_here()} It is closed, and {text} is opened."
         question = "Close the line for another?"
         if await self.app.may_let_go(question, yes="closes it", no="keeps it", always=always):
-            self._open_in_its_place(text)
+            self._open_in_its_place(text, device)
 
     @work(exclusive=True, group="line", exit_on_error=False)
-    async def _open_in_its_place(self, text: str) -> None:
+    async def _open_in_its_place(self, text: str, device: int | None) -> None:
         self.forget_drives()
-        if await self._opens(text):
+        if not await self._opens(text):
+            return
+        if device is None:
             self.action_scan()
+        else:
+            self.form.offer_addresses(str(device))
+            self.scan([device])
 
     def tell_opening(self, text: str) -> None:
         """What there is to see until the line is there."""

@@ -6,6 +6,7 @@ from rich.text import Text
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
 
+from tui.session.connect.named_lines import line_settings
 from tui.session.paths import recent_lines
 from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT
@@ -33,7 +34,10 @@ class LineList(OptionList):
 
         lately = recent_lines()
         named = [self._named] if self._named and self._named not in lately else []
-        self._groups = groups(serial_ports(), [*named, *lately])
+        settings = line_settings()
+        known = {one.line for one in settings.lines.values()}
+        recent = [text for text in [*named, *lately] if text not in known]
+        self._groups = groups(serial_ports(), recent, settings)
 
     def choice(self, id: str | None) -> LineChoice | None:
         """The line of an option; None for a heading."""
@@ -47,7 +51,9 @@ class LineList(OptionList):
 
     def offer(self, text: str) -> None:
         """Put the cursor on a line that was named, so that Enter means no other."""
-        self._named = text
+        from tui.session.connect.known_lines import remembered_text
+
+        self._named = text = remembered_text(text)
         self.look_for_lines()
         self._fill()
         fits = [id for id, choice in self._choices.items() if choice.text == text]
@@ -84,11 +90,11 @@ class LineList(OptionList):
         """A heading with its lines, or with what is said of none."""
         found = [entry(Text(f" {group.title}", FAINT), disabled=True)]
         for choice in group.choices:
-            key = f"{group.title} {choice.text}"
+            key = f"{group.title} {choice.name} {choice.text}"
             self._choices[key] = choice
             here = bool(self._here) and _key(choice.text) == self._here
             found.append(entry(choice_line(choice, width, here=here), id=key))
-        if not group.choices:
+        if group.empty and (not group.choices or group.title == "Named"):
             found.append(entry(Text(short(f"  {group.empty}", width), FAINT), disabled=True))
         return found
 

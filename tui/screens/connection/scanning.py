@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import threading
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -11,6 +12,7 @@ from textual import work
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
+from .found import WATCHED_ONLY
 from .state import ALARM_KIND, LineView
 
 if TYPE_CHECKING:
@@ -109,21 +111,38 @@ class Scanning(LineView):
         from tui.session.drive import DriveSession
 
         typed = self.form.profile
-        wanted = typed or identity.profile or next(iter(identity.candidates), None)
         fleet = self.app.fleet
         if fleet is None:
             return
+        named = None
+        if not (typed or identity.profile):
+            named = await asyncio.to_thread(_named, self.app.line_text, identity.device)
+        wanted = typed or identity.profile or named or next(iter(identity.candidates), None)
         if wanted is None:
             fleet.note(identity)
             return
         try:
             profile = await asyncio.to_thread(library.load, wanted)
+            if identity.profile is not None:
+                # at hand for a stop, which goes by what the drive says of itself
+                await asyncio.to_thread(library.load, identity.profile)
         except DriveError as error:
             fleet.note(identity)
             self.fail(error)
             return
         session = DriveSession(fleet.line, identity.device, profile, identity, fleet.clock)
-        fleet.take(session, guessed=not typed and identity.profile is None)
+        before = fleet.console(session.device)
+        guessed = not (typed or identity.profile or named)
+        console = fleet.take(session, guessed=guessed)
+        if console is not before and session.contradiction:
+            self.app.events.add(
+                ALARM_KIND, f"{session.contradiction} {WATCHED_ONLY}", session.device
+            )
+        known = self.app.opened.known if self.app.opened else None
+        if known is not None:
+            told = (identity, identity.device, "" if guessed else profile.id)
+            # reads files: in a thread that nobody waits for
+            threading.Thread(target=known.note, args=told, daemon=True).start()
 
     @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:
@@ -171,6 +190,14 @@ class Scanning(LineView):
             self.app.fleet.forget()
         self.warned.clear()
         self.look()
+
+
+def _named(line: str, device: int) -> str | None:
+    """The profile that the settings file names for a drive that does not say what it is."""
+    from tui.session.connect.line_key import line_key
+    from tui.session.connect.named_lines import profile_named
+
+    return profile_named(line_key(line), device)
 
 
 def _remember(line: str, addresses: str) -> None:

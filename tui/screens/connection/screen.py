@@ -26,7 +26,7 @@ class ConnectionScreen(LineKeys):
         if event.option_list is self.drives:
             self.open_drive(int(event.option.id or 0))
         elif choice := self.lines.choice(event.option.id):
-            self.open_line(self.line_of(choice))
+            self.open_line(self.line_of(choice), choice.device)
 
     def on_option_list_option_highlighted(self, event: OptionList.OptionHighlighted) -> None:
         """Say all that the chosen drive says of itself; a line that is no port has no settings."""

@@ -15,6 +15,7 @@ from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
 from tui.drive.plain import plain
+from tui.session.connect.named_lines import line_settings
 from tui.widgets.drawing import pair, rule, wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN
@@ -108,6 +109,8 @@ class LineView(PanelScreen):
         """Show what there is."""
         self.advise("No line is open.", "Choose a line and press Enter, or n to type one.")
         self.lines.look_for_lines()
+        for fault in line_settings().faults:
+            self.app.events.add(ALARM_KIND, fault)
         self._looking = [self.set_interval(SELDOM if self.app.low_bandwidth else STATES, self.look)]
 
     def on_resize(self, event: Resize) -> None:

@@ -47,6 +47,7 @@ SAVE = "Save what is shown to a file: a backup, an assignment, the record of a t
 OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
 FIND = "Find a parameter by code, name, address or value, from anywhere."
 WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
+ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
 PLACES: tuple[tuple[str, str, str], ...] = (
@@ -131,6 +132,7 @@ ACTIONS: tuple[Action, ...] = (
     of_app("eeprom", "S", "", EEPROM),
     of_app("command_palette", "ctrl+p", "all", "Find any action by its words."),
     of_app("help", "?,f1", "help", "Show every key."),
+    of_app("accept_line", "", "", ACCEPT),
     of_app("redraw", "ctrl+l", "", "Draw the screen anew, should it be garbled."),
     of_app("quit", "q,ctrl+q", "leave", "Leave the panel; asks where it matters."),
 )

@@ -72,6 +72,11 @@ async def identify_drive(
         return _nameless(device)
     except (NoAnswer, RequestRefused):
         return _nameless(device, await _nameless_families(line, device, priority))
+    return await identity_told(device, answer)
+
+
+async def identity_told(device: int, answer: IdentificationObjects) -> DriveIdentity:
+    """Who a drive is by its answer to function 43; looks for fitting profiles in a thread."""
     return await asyncio.to_thread(_identity, device, answer)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import re
 from ipaddress import ip_address
 
@@ -16,10 +15,11 @@ _WINDOWS_PORT = re.compile(r"(?:\\\\\.\\)?(COM\d+)", re.IGNORECASE)
 
 
 def line_key(text: str) -> str:
-    """The line without its spelling: a port's real path, a host in small letters, no settings.
+    """The line without its spelling: a port's lasting name, a host in small letters, no settings.
 
-    Takes what a person typed, or a line's label. Links such as /dev/serial/by-id are followed as
-    they lead now; names of hosts are not looked up. A text that is no line is its own key.
+    Takes what a person typed, or a line's label. A port is called by its adapter where that has a
+    name of its own, else by its real path, as links lead now; names of hosts are not looked up. A
+    text that is no line is its own key.
     """
     text = text.strip()
     if text.casefold().startswith(SIMULATED_PREFIX):
@@ -40,7 +40,9 @@ def line_key(text: str) -> str:
 def _port(path: str) -> str:
     if found := _WINDOWS_PORT.fullmatch(path):
         return found[1].upper()
-    return os.path.realpath(_LABEL_SETTINGS.sub("", path))
+    from tui.bus.transport.port_names import lasting_name
+
+    return lasting_name(_LABEL_SETTINGS.sub("", path)).path
 
 
 def _host(host: str) -> str:

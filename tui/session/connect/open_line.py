@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from tui.bus.link import Link, UsualSettings
     from tui.simulator import DriveSpec, Simulation
 
+    from .known_line import KnownLine
+
 
 @dataclass(slots=True)
 class OpenLine:
@@ -30,6 +32,8 @@ class OpenLine:
     simulation: Simulation | None = None
     devices: tuple[int, ...] = ()
     """Addresses known to be taken: those of a simulated line, else none."""
+    known: KnownLine | None = None
+    """Whether it is still what it was, where that is looked at; None for a simulated line."""
 
     @property
     def label(self) -> str:

@@ -19,6 +19,7 @@ from typing import TYPE_CHECKING, Literal
 from tui.drive.errors import DriveError
 
 from ..clock import REAL_CLOCK, Clock
+from ..connect.known_lines import remembered_text
 from ..connect.line_key import line_key
 from ..paths import state_folder
 from .files import StartFiles
@@ -264,7 +265,9 @@ class Starts:
             if task.record is None:
                 self._remove(*task.drive)
             elif not task.void:
-                self._files.write_record(task.record, lambda: not task.void)
+                # by its adapter's name: whoever looks for it may find that under another number
+                record = replace(task.record, line=remembered_text(task.record.line))
+                self._files.write_record(record, lambda: not task.void)
         except OSError as error:
             return error.strerror or str(error)
         except Exception as error:

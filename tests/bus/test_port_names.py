@@ -1,0 +1,72 @@
+"""The lasting name of a port: the adapter's own where it has one, else that of its socket."""
+
+from __future__ import annotations
+
+from tests.adapters import Adapters, adapters
+from tui.bus.transport.port_names import lasting_name
+
+__all__ = ["adapters"]
+
+
+def test_an_adapter_with_a_serial_number_keeps_its_name_in_any_socket(adapters: Adapters) -> None:
+    first = lasting_name(adapters.plug("ttyUSB0", "1.1", serial="A50285BI"))
+    assert first.path == str(adapters.links / "by-id" / "usb-FTDI_6001_A50285BI-if00-port0")
+    assert (first.adapter, first.lasting, first.shared) == ("0403:6001 A50285BI", True, False)
+    adapters.unplug("ttyUSB0")
+    assert lasting_name(adapters.plug("ttyUSB3", "1.4", serial="A50285BI")) == first
+    assert lasting_name(first.path) == first
+
+
+def test_an_adapter_without_a_serial_number_is_known_by_its_socket(adapters: Adapters) -> None:
+    found = lasting_name(adapters.plug("ttyUSB0", "1.1"))
+    assert found.path == str(adapters.links / "by-path" / "pci-usb-1.1-port0")
+    assert (found.adapter, found.shared) == ("0403:6001", True)
+
+
+def test_two_of_one_make_share_their_by_id_name_and_are_told_apart(adapters: Adapters) -> None:
+    one = lasting_name(adapters.plug("ttyUSB0", "1.1"))
+    two = lasting_name(adapters.plug("ttyUSB1", "1.2"))
+    assert one.path != two.path
+    shared = adapters.links / "by-id" / "usb-FTDI_6001-if00-port0"
+    # typed by the name that both have, it is known as the one that it leads to now
+    assert lasting_name(str(shared)) == two
+
+
+def test_two_with_one_serial_number_are_told_apart(adapters: Adapters) -> None:
+    one = lasting_name(adapters.plug("ttyUSB0", "1.1", serial="0001"))
+    assert not one.shared
+    two = adapters.plug("ttyUSB1", "1.2", serial="0001")
+    names = [lasting_name(adapters.port("ttyUSB0")), lasting_name(two)]
+    assert [name.path for name in names] == [
+        str(adapters.links / "by-path" / f"pci-usb-1.{n}-port0") for n in (1, 2)
+    ]
+    assert all(name.shared for name in names)
+
+
+def test_the_ports_of_one_adapter_are_no_twins(adapters: Adapters) -> None:
+    one = adapters.plug("ttyUSB0", "1.1", serial="FT4232")
+    interface = adapters.system / "ttyUSB1"
+    interface.mkdir()
+    (interface / "device").symlink_to((adapters.system / "ttyUSB0" / "device").resolve())
+    assert not lasting_name(one).shared
+
+
+def test_a_serial_number_with_signs_that_a_link_cannot_have(adapters: Adapters) -> None:
+    assert "by-id" in lasting_name(adapters.plug("ttyUSB0", "1.1", serial="A 5")).path
+
+
+def test_what_is_not_on_usb_has_its_own_path(adapters: Adapters) -> None:
+    (adapters.dev / "ttyS0").touch()
+    port = adapters.port("ttyS0")
+    found = lasting_name(port)
+    assert (found.path, found.adapter, found.lasting) == (port, "", False)
+    link = adapters.dev / "pump"
+    link.symlink_to(port)
+    assert lasting_name(str(link)).path == port
+
+
+def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> None:
+    port = adapters.plug("ttyUSB0", "1.1", serial="A5")
+    nowhere = adapters.dev / "nowhere"
+    assert lasting_name(port, nowhere, nowhere).path == port
+    assert lasting_name(port, nowhere, adapters.system).path == port

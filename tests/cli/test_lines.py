@@ -1,0 +1,294 @@
+"""Lines by their names and out of the environment; lines that are not as they were."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from click.shell_completion import ShellComplete
+
+from tests.adapters import Adapters, adapters
+from tests.programs import drivepanel
+from tui.cli.main import main
+from tui.cli.shared.lines import is_line
+from tui.session.connect.known_lines import load_memory
+from tui.session.connect.named_lines import settings_file
+
+from .commands import held, invoked, refused, run, tcp_line
+
+__all__ = ["adapters"]
+
+ACC = 9001
+
+
+@pytest.fixture
+def line() -> Iterator[str]:
+    """A line with two drives, one of which does not say who it is."""
+    with tcp_line("atv71@1", "powerdrive@5") as found:
+        yield found
+
+
+def settings(text: str) -> None:
+    path = settings_file()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(text, "utf-8")
+
+
+def named(line: str) -> None:
+    """`pump` is the first drive of a line, `fan` the other."""
+    settings(
+        f'[lines]\npump = "{line}"\n'
+        f'[lines.fan]\nline = "{line}"\ndevice = 5\nprofile = "powerdrive"\n'
+    )
+
+
+def test_a_name_stands_where_a_line_is_typed(line: str) -> None:
+    named(line)
+    assert json.loads(run(0, "read", "pump", "ACC", "--json"))["line"] == line
+    assert json.loads(run(0, "identify", "PUMP", "--json"))["profile"] == "atv71"
+    told = json.loads(run(0, "read", "fan", "5.01", "--json"))
+    assert (told["device"], told["profile"]) == (5, "powerdrive")
+
+
+def test_what_is_typed_goes_before_what_the_name_says(line: str) -> None:
+    named(line)
+    assert json.loads(run(0, "read", "fan", "ACC", "-d", "1", "--json"))["profile"] == "atv71"
+    assert "-p" in refused(2, "read", "pump", "5.01", "-d", "5")
+    assert "no parameter '1.99'" in refused(2, "read", "fan", "1.99", "-p", "varmeca")
+
+
+def test_a_drive_of_a_name_may_be_compared_and_restored_to(line: str, tmp_path: Path) -> None:
+    named(line)
+    file = tmp_path / "fan.toml"
+    run(0, "backup", "fan", file)
+    assert 'profile = "powerdrive"' in file.read_text("utf-8")
+    assert invoked("compare", file, "fan").exit_code == 0
+    assert "0 to write" in run(0, "restore", "fan", file, "--dry-run")
+
+
+def test_the_environment_says_which_line_is_meant(
+    line: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    assert "Missing argument 'LINE'" in refused(2, "identify")
+    monkeypatch.setenv("DRIVEPANEL_LINE", line)
+    assert "atv71" in run(0, "identify")
+    assert {*json.loads(run(0, "read", "ACC", "DEC", "--json"))["values"]} == {"ACC", "DEC"}
+    assert "ACC" in run(0, "read", "ACC")
+    assert "ACC" in run(0, "read", line, "ACC")
+    file = tmp_path / "pump.toml"
+    run(0, "backup", file)
+    run(0, "backup", file, "--force")  # that it exists makes no line of it
+    assert invoked("compare", file).exit_code == 0
+    assert "to write" in run(0, "restore", file, "--dry-run")
+    assert "ACC" in run(0, "write", "ACC=4", "DEC=4", "--dry-run")
+    assert "stopped" in run(0, "stop")
+    assert "NMA1" in run(0, "block")
+
+
+def test_a_line_that_is_written_goes_before_the_environment(
+    line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DRIVEPANEL_LINE", "tcp:127.0.0.1:1")
+    assert "atv71" in run(0, "identify", line)
+    assert "Missing argument 'CODE...'" in refused(2, "read", line)
+    named(line)
+    assert "ACC" in run(0, "read", "pump", "ACC")
+    assert "Missing argument 'CODE...'" in refused(2, "read", "pump")
+
+
+def test_the_environment_may_hold_a_name(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    named(line)
+    monkeypatch.setenv("DRIVEPANEL_LINE", "fan")
+    assert json.loads(run(0, "read", "5.01", "--json"))["device"] == 5
+
+
+def test_a_name_that_is_none_is_told_with_those_there_are(line: str) -> None:
+    named(line)
+    told = refused(2, "read", "pumb", "ACC")
+    assert "pumb is no LINE, and none of those in" in told
+    assert "pump, fan" in told
+
+
+def test_a_fault_in_the_settings_is_told_where_a_name_is_used_and_nowhere_else(line: str) -> None:
+    settings(f'[lines]\npump = "{line}"\nfan = 5\n')
+    told = refused(2, "read", "fan", "ACC")
+    assert "settings.toml:3: lines.fan: a LINE in quotes" in told
+    for where in ("pump", line):
+        done = invoked("read", where, "ACC")
+        assert (done.exit_code, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("profile", ["", 'profile = "gone"'])
+def test_no_settings_file_keeps_a_stop_from_its_drive(line: str, profile: str) -> None:
+    settings(f'[lines.fan]\nline = "{line}"\ndevice = 5\n{profile}\n[broken')
+    refused(2, "read", "fan", "5.01")
+    done = invoked("stop", "fan")
+    assert done.exit_code == 0, done.output
+    assert "Device 5" in done.stdout
+    assert "stopped" in done.stdout
+    assert "settings.toml" in done.stderr
+    assert "stopped" in run(0, "stop", line)
+
+
+def test_the_profile_of_one_drive_stops_no_other(line: str) -> None:
+    settings(f'[lines.fan]\nline = "{line}"\ndevice = 1\nprofile = "atv71"\n')
+    told = run(0, "stop", "fan", "--all", "--addresses", "5")
+    assert "Device 5, Powerdrive or Proxidrive or Varmeca" in told
+
+
+def test_lines_lists_the_names_and_what_is_remembered(line: str) -> None:
+    assert "No line has a name" in run(0, "lines")
+    named(line)
+    run(0, "identify", "pump")
+    told = json.loads(run(0, "lines", "--json"))
+    assert told["settings"] == str(settings_file())
+    assert told["faults"] == []
+    assert told["lines"] == [
+        {"name": "pump", "line": line, "device": None, "profile": None},
+        {"name": "fan", "line": line, "device": 5, "profile": "powerdrive"},
+    ]
+    (known,) = told["known"]
+    assert (known["line"], known["drives"][0]["profile"]) == (line, "atv71")
+    text = run(0, "lines")
+    assert "fan" in text
+    assert "device 5  powerdrive" in text
+    assert "ATV71" in text
+
+
+def test_lines_checks_the_settings() -> None:
+    settings(
+        '[lines]\nstop = "tcp:x"\nbad = "tcp:x:y"\nfan = { line = "tcp:x", profile = "gone" }\n'
+        "old = 5\n"
+    )
+    done = invoked("lines")
+    assert done.exit_code == 2
+    for row, key in ((2, "stop"), (3, "bad"), (4, "fan"), (5, "old")):
+        assert f"settings.toml:{row}: lines.{key}: " in done.stderr
+    done = invoked("lines", "--json")
+    assert done.exit_code == 2
+    assert len(json.loads(done.stdout)["faults"]) == 4
+
+
+def test_a_list_of_ports_tells_what_each_adapter_is_called_for_good(
+    adapters: Adapters, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    from tui.bus.transport.ports import PortInfo
+
+    ports = [
+        adapters.plug("ttyUSB0", "1.1", serial="A5"),
+        adapters.plug("ttyUSB1", "1.2", product="7523"),
+    ]
+    monkeypatch.setattr(
+        "tui.bus.transport.ports.list_ports", lambda: [PortInfo(p, "adapter") for p in ports]
+    )
+    one, two = json.loads(run(0, "ports", "--json"))
+    assert one["lasting"].endswith("by-id/usb-FTDI_6001_A5-if00-port0")
+    assert one["adapter"] == "0403:6001 A5"
+    assert two["lasting"].endswith("by-path/pci-usb-1.2-port0")
+    text = run(0, "ports")
+    assert f"always {one['lasting']}" in text
+    assert text.count("without a serial number of its own") == 1
+
+
+# Lines that are not as they were
+
+
+def swapped(before: str) -> None:
+    """The line was used with another drive before."""
+    run(0, "identify", before)
+    memory = load_memory()
+    text = (memory_file := _memory_file()).read_text("utf-8")
+    assert memory.lines
+    memory_file.write_text(text.replace("ATV71HU15M3", "ATV71HD22N4"), "utf-8")
+
+
+def _memory_file() -> Path:
+    from tui.session.connect.known_lines import memory_file
+
+    return memory_file()
+
+
+def test_reading_a_drive_that_is_another_one_goes_on_with_a_warning(line: str) -> None:
+    swapped(line)
+    for command in (["read", line, "ACC"], ["identify", line], ["status", line]):
+        done = invoked(*command)
+        assert done.exit_code == 0
+        assert "Device 1 was ATV71HD22N4" in done.stderr
+        assert "--accept-line" in done.stderr
+    assert "ACC" in run(0, "write", line, "ACC=7", "--dry-run")
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        ["write", "ACC=7"],
+        ["run", "--for", "1"],
+        ["reference", "20Hz"],
+        ["reset"],
+        ["block", "set", "NMA3=LCR"],
+    ],
+    ids=lambda command: command[0],
+)
+def test_nothing_is_written_to_a_drive_that_is_another_one(line: str, command: list[str]) -> None:
+    before = held(line, ACC)
+    swapped(line)
+    done = drivepanel(command[0], line, *command[1:], "--arm")
+    assert done.returncode == 5, done.stderr
+    assert "Nothing is written to this line: Device 1 was ATV71HD22N4" in done.stderr
+    assert "--accept-line takes the line as it is now" in done.stderr
+    assert done.stderr.count("Device 1 was") == 1
+    assert held(line, ACC) == before
+
+
+def test_a_stop_goes_to_a_drive_that_is_another_one(line: str) -> None:
+    swapped(line)
+    assert "stopped" in run(0, "stop", line)
+    assert "stopped" in run(0, "stop", line, "--all", "--addresses", "1,5")
+
+
+def test_what_was_accepted_once_is_accepted_for_good(line: str) -> None:
+    swapped(line)
+    refused(5, "write", line, "ACC=7", "--arm")
+    run(0, "write", line, "ACC=7", "--arm", "--accept-line")
+    assert held(line, ACC) == 70
+    done = invoked("write", line, "ACC=8", "--arm")
+    assert (done.exit_code, done.stderr) == (0, "")
+
+
+def test_a_stop_asks_no_file_at_all(line: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def hangs(*_: object) -> None:
+        raise AssertionError("a disk that hangs")
+
+    monkeypatch.setattr("tui.session.connect.known_lines.read_small_text", hangs)
+    monkeypatch.setattr("tui.session.connect.named_lines.read_small_text", hangs)
+    assert "stopped" in run(0, "stop", line)
+
+
+def completed(typed: str) -> list[str]:
+    """What a shell offers for a line whose last word has begun."""
+    *words, incomplete = typed.split(" ")
+    found = ShellComplete(main, {}, "drivepanel", "_X").get_completions(words, incomplete)
+    return [item.value for item in found]
+
+
+def test_names_are_completed_and_codes_of_their_drive() -> None:
+    assert "pump" not in completed("read p")
+    named("tcp:gateway")
+    assert completed("read pu") == ["pump"]
+    assert "pump" in completed("pu")
+    assert "5.01" in completed("read fan 5.0")
+    settings("[broken")
+    assert completed("read pu") == []
+
+
+def test_a_name_opens_the_panel_and_a_word_that_is_none_does_not() -> None:
+    assert not is_line("pump")
+    named("tcp:gateway")
+    assert is_line("pump")
+    assert not is_line("pumb")
+    assert "no such command" in refused(2, "pumb")
+    settings("[broken")
+    assert is_line("pump")
+    assert "settings.toml:1" in refused(2, "pump")

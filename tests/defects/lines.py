@@ -1,0 +1,128 @@
+"""Defects of what a line is called, and of whether it is the one that it was."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+KNOWN = "tests/session/test_known_line.py"
+NAMES = "tests/bus/test_port_names.py"
+NAMED = "tests/session/test_named_lines.py"
+COMMANDS = "tests/cli/test_lines.py"
+
+DEFECTS = (
+    Defect(
+        "shared-by-id-name-believed",
+        "tui/bus/transport/port_names.py",
+        "own = bool(usb.serial) and not _has_twin(usb, os.path.basename(real), system)",
+        "own = True",
+        "Settings are written to the drive on the other of two adapters of one make.",
+        (f"{NAMES}::test_two_with_one_serial_number_are_told_apart",),
+    ),
+    Defect(
+        "another-adapter-not-noticed",
+        "tui/session/connect/known_line.py",
+        "before is not None and before != name.key:",
+        "before is not None and not name.key:",
+        "After adapters were replugged the motor of another machine is started.",
+        (f"{KNOWN}::test_another_adapter_under_the_same_name_holds_the_line",),
+    ),
+    Defect(
+        "another-drive-not-noticed",
+        "tui/session/connect/known_lines.py",
+        "return self.said == now.said",
+        "return self.vendor == now.vendor",
+        "A drive that was put in another's place is run with what was meant for that.",
+        (f"{KNOWN}::test_another_drive_at_an_address_holds_the_line",),
+    ),
+    Defect(
+        "changed-line-accepted-unasked",
+        "tui/session/connect/known_line.py",
+        "if device not in self._changed and None not in self._changed and before != now:",
+        "if before != now:\n                self._changed = {}",
+        "The second command writes to the wrong drive, as the first has taken it for known.",
+        (f"{KNOWN}::test_another_drive_at_an_address_holds_the_line",),
+    ),
+    Defect(
+        "held-line-writes",
+        "tui/bus/limits.py",
+        "    if held and request.changes:\n        return held\n",
+        "",
+        "A line that is held is written to by whatever does not ask for arming.",
+        (f"{KNOWN}::test_a_held_line_takes_nothing_but_a_stop",),
+    ),
+    Defect(
+        "held-line-keeps-a-stop-back",
+        "tui/bus/line.py",
+        'held = "" if priority is Priority.STOP else self.held',
+        "held = self.held",
+        "A motor cannot be stopped since somebody has changed the adapter.",
+        (
+            f"{KNOWN}::test_the_real_line_holds_too",
+            f"{COMMANDS}::test_a_stop_goes_to_a_drive_that_is_another_one",
+        ),
+    ),
+    Defect(
+        "held-line-arms",
+        "tui/session/arming.py",
+        "        if self._line.held:\n            raise OrderRefused(self._line.held)\n",
+        "",
+        "The panel shows a drive as armed that takes no command.",
+        (f"{KNOWN}::test_a_held_line_arms_nothing",),
+    ),
+    Defect(
+        "armed-though-the-line-changed",
+        "tui/session/arming.py",
+        "        if self._line.held:\n            self.disarm(",
+        "        if not self._line.link:\n            self.disarm(",
+        "A drive that was armed stays so though another adapter has come under its line's name.",
+        (f"{KNOWN}::test_a_held_line_arms_nothing",),
+    ),
+    Defect(
+        "start-recorded-by-number",
+        "tui/session/starts/starts.py",
+        "line=remembered_text(task.record.line)",
+        "line=task.record.line",
+        "A motor left running is looked for on the adapter that has its number now.",
+        (f"{KNOWN}::test_a_start_is_found_where_its_adapter_is_plugged_in_now",),
+    ),
+    Defect(
+        "name-drops-the-address",
+        "tui/cli/shared/line_argument.py",
+        'usual |= {"device": (named.device,), "devices": (named.device,)}',
+        'usual |= {"devices": (named.device,)}',
+        "A command by a drive's name goes to the drive at address 1.",
+        (f"{COMMANDS}::test_a_name_stands_where_a_line_is_typed",),
+    ),
+    Defect(
+        "named-profile-for-every-drive",
+        "tui/cli/shared/line_argument.py",
+        '    if ctx.params.get("every"):\n        return None\n',
+        "",
+        "A stop of all sends one family's stop word to drives of others.",
+        (f"{COMMANDS}::test_the_profile_of_one_drive_stops_no_other",),
+    ),
+    Defect(
+        "broken-settings-keep-a-stop-back",
+        "tui/session/connect/named_lines.py",
+        "        if found := _salvaged(line_settings().text, text):\n            return found\n",
+        "",
+        "A missing bracket in the settings keeps a motor from being stopped.",
+        (f"{NAMED}::test_a_stop_finds_its_line_in_a_broken_file",),
+    ),
+    Defect(
+        "address-lost-in-a-broken-file",
+        "tui/session/connect/named_lines.py",
+        'return found._replace(device=int(parts["device"]))',
+        "return found",
+        "A stop by name stops the drive at address 1 while the other runs on.",
+        (f"{NAMED}::test_a_stop_finds_its_drive_in_a_broken_file",),
+    ),
+    Defect(
+        "first-word-taken-for-the-line",
+        "tui/cli/shared/line_argument.py",
+        "if isinstance(opts, MutableMapping) and self._is_left_out(ctx, opts):",
+        "if False:",
+        "With DRIVEPANEL_LINE a code is taken for the line, and the command refused.",
+        (f"{COMMANDS}::test_the_environment_says_which_line_is_meant",),
+    ),
+)

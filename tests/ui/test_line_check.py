@@ -1,0 +1,242 @@
+"""The panel on lines with a name, and on lines that are not as they were."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from textual.widgets import Input
+
+from tests.adapters import Adapters, adapters
+from tests.programs import rtu_tcp
+from tui.app import DrivePanelApp
+from tui.bus.link import parse_link
+from tui.screens.connection.choices import groups, line_in
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.monitor.screen import MonitorScreen
+from tui.session.connect.known_line import KnownLine
+from tui.session.connect.known_lines import (
+    DriveMark,
+    LineMark,
+    LinesMemory,
+    keep_memory,
+    line_name,
+    load_memory,
+)
+from tui.session.connect.line_key import line_key
+from tui.session.connect.named_lines import LineSettings, NamedLine, settings_file
+from tui.session.connect.open_line import OpenLine
+from tui.session.paths import recent_lines
+from tui.simulator import DriveSpec, Simulation
+
+from . import fakes
+from .test_flows import shown, until
+
+__all__ = ["adapters"]
+
+BY_ID = "serial:/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0,19200,8E1"
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+@pytest.fixture
+def simulation() -> Iterator[Simulation]:
+    """Two drives whose motors run; the second does not say who it is."""
+    made = Simulation([DriveSpec("atv71", 2, run_hz=30.0), DriveSpec("powerdrive", 5, run_hz=20.0)])
+    made.start()
+    yield made
+    made.stop()
+
+
+def another_before(line: str, device: int = 2) -> None:
+    """Another drive was on the line when it was used last."""
+    drives = {device: DriveMark("Telemecanique", "ATV31H037M2", "0201", "MIXER", "atv31")}
+    keep_memory(LinesMemory({line_key(line): LineMark("", drives)}, {}))
+
+
+def settings(text: str) -> None:
+    settings_file().parent.mkdir(parents=True, exist_ok=True)
+    settings_file().write_text(text, "utf-8")
+
+
+async def test_another_drive_is_asked_about_and_read_only_till_then(simulation: Simulation) -> None:
+    line = rtu_tcp(simulation)
+    another_before(line)
+    app = DrivePanelApp(start=line, device=2)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: bool(app.screen.query("#follows")))
+        told = str(app.screen.query_one("#follows").render())
+        assert "Device 2 was ATV31H037M2 MIXER" in told
+        assert "ATV71" in told
+        assert "read-only" in told
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        assert app.chosen is not None
+        await pilot.press("a")
+        await until(pilot, lambda: "Nothing is written to this line" in shown(app, "said"))
+        assert app.chosen.session.arming.armed_for is None
+        # a stop needs no answer
+        await pilot.press("space")
+        await until(pilot, lambda: simulation.drive(2).motor.frequency == 0)
+        # nor is it asked again by itself
+        assert isinstance(app.screen, MonitorScreen)
+        await app.run_action("accept_line")
+        await until(pilot, lambda: isinstance(app.screen, Confirm))
+        await pilot.pause(0.4)
+        await pilot.press("y")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        assert app.opened is not None
+        await until(pilot, lambda: app.opened is not None and not app.opened.line.held)
+        await pilot.press("a")
+        await until(
+            pilot, lambda: app.chosen is not None and bool(app.chosen.session.arming.armed_for)
+        )
+    assert load_memory().lines[line_key(line)].drives[2].profile == "atv71"
+
+
+async def test_a_line_that_is_as_it_was_is_not_asked_about(simulation: Simulation) -> None:
+    line = rtu_tcp(simulation)
+    for _ in range(2):
+        await opened_unasked(line)
+
+
+async def opened_unasked(line: str) -> None:
+    """Open the panel on a drive until that is remembered; no question may come."""
+    app = DrivePanelApp(start=line, device=2)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        key = line_key(line)
+        await until(pilot, lambda: bool(load_memory().lines.get(key, LineMark()).drives))
+        app.look_around()
+        assert isinstance(app.screen, MonitorScreen)
+        await app.run_action("accept_line")
+        await until(pilot, lambda: "nothing to accept" in shown(app, "said"))
+
+
+async def test_it_is_asked_once_the_search_is_over(simulation: Simulation) -> None:
+    line = rtu_tcp(simulation)
+    another_before(line)
+    app = DrivePanelApp(start=line)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.opened is not None and bool(app.opened.line.held))
+        assert app.fleet is not None
+        assert app.fleet.search is not None
+        if app.fleet.search.goes_on:
+            assert app.screen is app.connection
+        app.connection.action_stop_scan()
+        await until(pilot, lambda: isinstance(app.screen, Confirm))
+
+
+async def test_an_adapter_that_changed_while_the_line_was_lost_is_asked_about(
+    adapters: Adapters,
+) -> None:
+    port = adapters.plug("ttyUSB0", "1.1", serial="A5")
+    app = fakes.app_of()
+    async with app.run_test(size=(80, 24)) as pilot:
+        line = fakes.StillLine()
+        line.link = parse_link(port)
+        app.opened = OpenLine(port, line, known=KnownLine(line))
+        app.look_around()
+        assert line.held == ""
+        adapters.unplug("ttyUSB0")
+        adapters.plug("ttyUSB0", "1.1", serial="B7")
+        line.state = replace(fakes.CONNECTED, since=fakes.NOW - 1)
+        app.look_around()
+        await until(pilot, lambda: "B7" in line.held)
+        app.look_around()
+        await until(pilot, lambda: bool(app.screen.query("#follows")))
+        assert "B7" in str(app.screen.query_one("#follows").render())
+        app.opened = None
+
+
+async def test_a_port_is_remembered_by_its_adapter(
+    adapters: Adapters, simulation: Simulation
+) -> None:
+    port = adapters.plug("ttyUSB0", "1.1", serial="A5", leads_to=Path(simulation.serve_pty()))
+    app = DrivePanelApp(start=port, device=2)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+    (recent,) = recent_lines()
+    assert recent.startswith("serial:")
+    assert "/by-id/usb-FTDI_6001_A5-if00-port0,19200," in recent
+    assert line_name(parse_link(recent)).key == line_name(parse_link(port)).key
+
+
+async def test_a_named_line_is_offered_and_opens_its_drive(simulation: Simulation) -> None:
+    settings(
+        f'[lines.fan]\nline = "{rtu_tcp(simulation)}"\ndevice = 5\nprofile = "powerdrive"\n'
+        "[lines.old]\nline = 3\n"
+    )
+    app = DrivePanelApp()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.connection.lines.chosen is not None)
+        chosen = app.connection.lines.chosen
+        assert chosen is not None
+        assert (chosen.name, chosen.device) == ("fan", 5)
+        rows = [str(option.prompt) for option in app.connection.lines.options]
+        assert rows[0].strip() == "Named"
+        assert any("wrong: settings.toml" in row for row in rows)
+        assert any("settings.toml:6: lines.old.line" in event.text for event in app.events.events)
+        await pilot.press("enter")
+        await until(pilot, lambda: app.connection.drives.option_count == 1)
+        (found,) = app.connection.found.values()
+        assert found.identity.device == 5
+        assert not found.guessed
+        assert found.session is not None
+        assert found.session.profile.id == "powerdrive"
+        assert app.connection.query_one("#addresses", Input).value == "5"
+
+
+async def test_a_name_may_be_typed(simulation: Simulation) -> None:
+    settings(f'[lines.fan]\nline = "{rtu_tcp(simulation)}"\ndevice = 5\n')
+    app = DrivePanelApp()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await pilot.press("n")
+        await until(pilot, lambda: isinstance(app.screen, Ask))
+        await pilot.press(*"fun", "enter")
+        assert isinstance(app.screen, Ask)
+        await pilot.press("backspace", "backspace", *"an", "enter")
+        await until(pilot, lambda: 5 in app.connection.found)
+        assert 2 not in app.connection.found
+
+
+async def test_a_drive_that_says_who_it_is_is_believed_before_the_settings(
+    simulation: Simulation,
+) -> None:
+    settings(f'[lines.all]\nline = "{rtu_tcp(simulation)}"\nprofile = "powerdrive"\n')
+    app = DrivePanelApp(start=rtu_tcp(simulation), device=2)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.chosen is not None)
+        assert app.chosen is not None
+        assert app.chosen.session.profile.id == "atv71"
+
+
+def test_names_stand_above_the_ports_and_no_line_twice() -> None:
+    told = LineSettings(Path("settings.toml"), {"fan": NamedLine("fan", BY_ID, 5)})
+    named, serial, *_ = groups([("/dev/ttyUSB0", "")], [], told)
+    assert (named.title, serial.title) == ("Named", "Serial ports")
+    (fan,) = named.choices
+    assert (fan.text, fan.name, fan.device) == (BY_ID, "fan", 5)
+    assert groups([], [], LineSettings(Path("settings.toml")))[0].title == "Serial ports"
+
+
+@pytest.mark.parametrize(
+    ("width", "text"),
+    [
+        (90, BY_ID),
+        (40, "FTDI_FT232R_USB_UART_A50285BI,19200,8E1"),
+        (24, "…USB_UART_A50285BI,19200,8E1"[-24:]),
+        (20, "…T_A50285BI,19200,8E1"[-20:]),
+    ],
+)
+def test_of_a_lasting_name_the_end_is_shown(width: int, text: str) -> None:
+    told = line_in(BY_ID, width)
+    assert len(told) <= width
+    assert told[1:] == text[1:]
+    assert line_in("tcp:192.168.0.10", 10) == "tcp:192.1…"

@@ -1,0 +1,96 @@
+"""`drivepanel lines`: the lines that have a name, and what is remembered of lines."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..shared.errors import USAGE, told
+from ..shared.options import json_option
+from ..shared.say import say
+
+if TYPE_CHECKING:
+    from tui.session.connect.known_lines import LineMark
+    from tui.session.connect.named_lines import NamedLine
+
+
+@click.command()
+@json_option
+@told
+def lines(as_json: bool) -> None:
+    """List the lines that the settings file names, and the adapters and drives remembered.
+
+    The settings file is checked: each fault is told with its file, line and key, and the status
+    is 2 then.
+    """
+    from tui.session.connect.known_lines import load_memory
+    from tui.session.connect.named_lines import line_settings
+
+    from ..shared.output import print_json
+
+    settings, memory = line_settings(), load_memory()
+    named = list(settings.lines.values())
+    places = settings.places.items()
+    found = (f"{at}: {fault}" for name, at in places for fault in _faults(settings.lines[name]))
+    faults = [*settings.faults, *found]
+    if as_json:
+        print_json(
+            {
+                "settings": str(settings.path),
+                "faults": faults,
+                "lines": [_named_json(one) for one in named],
+                "known": [_known_json(key, mark) for key, mark in memory.lines.items()],
+            }
+        )
+    else:
+        if not named and not faults:
+            say(f"No line has a name. Lines are named in {settings.path}.")
+        for one in named:
+            profile = f"  {one.profile}" if one.profile else ""
+            drive = "" if one.device is None else f"  device {one.device}"
+            say(f"{one.name:<12} {one.line}{drive}{profile}")
+        for key, mark in memory.lines.items():
+            say(f"Remembered: {key}{f' ({mark.adapter})' if mark.adapter else ''}")
+            for device, drive_mark in mark.drives.items():
+                say(f"  {device:>3} {drive_mark.text}")
+    for fault in faults:
+        say(f"drivepanel: {fault}", err=True)
+    if faults:
+        raise click.exceptions.Exit(USAGE)
+
+
+def _faults(one: NamedLine) -> Iterator[str]:
+    """What keeps a name from being used, as far as can be told without opening its line."""
+    from tui.bus.errors import LinkSyntaxError
+    from tui.drive.errors import DriveError
+    from tui.drive.profile import library
+    from tui.session.connect.open_line import check_line
+
+    from ..main import COMMANDS
+
+    if one.name.casefold() in COMMANDS:
+        yield "a command has this name: the panel cannot be opened by it."
+    try:
+        check_line(one.line)
+    except LinkSyntaxError as error:
+        yield str(error)
+    try:
+        if one.profile is not None:
+            library.load(one.profile)
+    except DriveError as error:
+        yield str(error)
+
+
+def _named_json(one: NamedLine) -> dict[str, Any]:
+    return {"name": one.name, "line": one.line, "device": one.device, "profile": one.profile}
+
+
+def _known_json(key: str, mark: LineMark) -> dict[str, Any]:
+    keys = ("vendor", "reference", "version", "name", "profile")
+    drives = [
+        {"device": device, **{key: getattr(drive, key) or None for key in keys}}
+        for device, drive in mark.drives.items()
+    ]
+    return {"line": key, "adapter": mark.adapter or None, "drives": drives}

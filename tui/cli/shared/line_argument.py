@@ -1,0 +1,209 @@
+"""LINE on the command line: written out, by the name that the settings give it, or left out.
+
+Where it is left out, the variable DRIVEPANEL_LINE says which is meant. A name brings along the
+address and the profile of its drive; -d and -p go before them.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Callable, Mapping, MutableMapping
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from .completion import complete_line
+from .lines import is_known_name
+from .say import say
+
+if TYPE_CHECKING:
+    from tui.session.connect.named_lines import NamedLine
+    from tui.session.connect.open_line import OpenLine
+
+LINE_VARIABLE = "DRIVEPANEL_LINE"
+_ACCEPTED = "drivepanel.accept-line"
+_WRITTEN_OUT = re.compile(
+    r"(?:serial|tcp|rtu-tcp|sim):|/dev/|\\\\\.\\|COM\d+(?:,|$)", re.IGNORECASE
+)
+_FILE_OR_LINE = re.compile(r"[/\\:]")
+_STOP = "stop"
+"""The command that no settings file keeps from its work."""
+
+
+class LineArgument(click.Argument):
+    """The LINE of a command; taken apart before every option, as a name decides about some."""
+
+    def __init__(self, *names: Any, **attrs: Any) -> None:
+        super().__init__(*names, is_eager=True, envvar=LINE_VARIABLE, **attrs)
+
+    def consume_value(self, ctx: click.Context, opts: Mapping[str, Any]) -> Any:
+        """The LINE, or what the environment says where it was left out."""
+        if isinstance(opts, MutableMapping) and self._is_left_out(ctx, opts):
+            self._shift(ctx, opts)
+        return super().consume_value(ctx, opts)
+
+    def process_value(self, ctx: click.Context, value: Any) -> Any:
+        """The LINE that is meant, written out."""
+        text = super().process_value(ctx, value)
+        if not isinstance(text, str) or (ctx.resilient_parsing and not is_known_name(text)):
+            return text
+        return _resolved(ctx, text)
+
+    def _others(self, ctx: click.Context) -> list[click.Argument]:
+        return [
+            one for one in ctx.command.params if isinstance(one, click.Argument) and one is not self
+        ]
+
+    def _is_left_out(self, ctx: click.Context, opts: Mapping[str, Any]) -> bool:
+        """Whether what stands in its place belongs to the arguments behind it."""
+        text = opts.get(self.name or "")
+        if not isinstance(text, str) or self.resolve_envvar_value(ctx) is None:
+            return False
+        others = self._others(ctx)
+        if not others or _WRITTEN_OUT.match(text) or is_known_name(text):
+            return False
+        if any(one.required and not _given(opts.get(one.name or "")) for one in others):
+            return True
+        # one more word would fit: it is a line where it looks like one
+        return any(one.nargs < 0 or not one.required for one in others) and not (
+            _FILE_OR_LINE.search(text)
+        )
+
+    def _shift(self, ctx: click.Context, opts: MutableMapping[str, Any]) -> None:
+        """Give each word to the argument behind the one that has it."""
+        words: list[str] = [opts.pop(self.name or "")]
+        others = self._others(ctx)
+        for one in others:
+            held = opts.pop(one.name or "", None)
+            words += held if isinstance(held, tuple) else [held] if _given(held) else []
+        for one in others:
+            if one.nargs < 0:
+                opts[one.name or ""] = tuple(words)
+                return
+            if words:
+                opts[one.name or ""] = words.pop(0)
+        if words:
+            ctx.fail(f"Got unexpected extra argument ({' '.join(words)})")
+
+
+def _given(value: object) -> bool:
+    return isinstance(value, str) or (isinstance(value, tuple) and bool(value))
+
+
+def _resolved(ctx: click.Context, text: str) -> str:
+    """The LINE of a name, whose drive becomes the usual one; any other text as it is."""
+    named = named_line_of(text, stops=ctx.command.name == _STOP)
+    if named is None:
+        return text
+    usual = dict(ctx.default_map or {})
+    if named.device is not None:
+        usual |= {"device": (named.device,), "devices": (named.device,)}
+    if named.profile is not None:
+        usual["profile_id"] = lambda: _profile_here(ctx, named)
+    ctx.default_map = {key: one for key, one in usual.items() if key in _names(ctx)}
+    return named.line
+
+
+def named_line_of(text: str, *, stops: bool = False) -> NamedLine | None:
+    """The line of a name, or None for a text that is none. Raises SettingsError as a usage error.
+
+    For a stop what is wrong in the file is said, and gone around where that can be.
+    """
+    from tui.session.connect import named_lines
+
+    if not named_lines.is_name(text):
+        return None
+    try:
+        found = named_lines.line_to_stop(text) if stops else named_lines.line_named(text)
+    except named_lines.SettingsError as error:
+        raise click.UsageError(str(error)) from error
+    settings = named_lines.line_settings()
+    if found is None and settings.lines and not os.path.exists(text):
+        names = ", ".join(one.name for one in settings.lines.values())
+        raise click.UsageError(f"{text} is no LINE, and none of those in {settings.path}: {names}.")
+    if found is not None and text.casefold() not in settings.lines:
+        for fault in settings.faults:
+            say(f"drivepanel: {fault}", err=True)
+    return found
+
+
+def _names(ctx: click.Context) -> set[str | None]:
+    return {one.name for one in ctx.command.params}
+
+
+def _profile_here(ctx: click.Context, named: NamedLine) -> str | None:
+    """The profile of a name, for the drive that it names and no other."""
+    if ctx.params.get("every"):
+        return None
+    given = ctx.params.get("devices") or ctx.params.get("device") or ()
+    devices = given if isinstance(given, tuple) else (given,)
+    if named.device is not None and any(one != named.device for one in devices):
+        return None
+    return _usable(named) if ctx.command.name == _STOP else named.profile
+
+
+def _usable(named: NamedLine) -> str | None:
+    """Its profile, unless it cannot be used: then the drive itself is asked what stops it."""
+    from tui.drive.errors import DriveError
+    from tui.drive.profile import library
+
+    try:
+        library.load(named.profile or "")
+    except DriveError as error:
+        say(f"drivepanel: {error}", err=True)
+        return None
+    return named.profile
+
+
+def _note_accepted(ctx: click.Context, _option: click.Parameter, value: bool) -> None:
+    if value:
+        ctx.meta[_ACCEPTED] = True
+
+
+_accept_option = click.option(
+    "--accept-line",
+    is_flag=True,
+    expose_value=False,
+    callback=_note_accepted,
+    help="Take the line as it is now: another adapter, or other drives, than before.",
+)
+
+
+def takes_line(command: Callable[..., Any]) -> Callable[..., Any]:
+    """LINE, and the option that accepts one that is not as it was."""
+    argument = click.argument(
+        "line_text", metavar="LINE", cls=LineArgument, shell_complete=complete_line
+    )
+    return argument(_accept_option(command))
+
+
+def mind_the_line(opened: OpenLine) -> None:
+    """Compare an open line with what is remembered of it; nothing keeps a stop from its work."""
+    ctx = click.get_current_context(silent=True)
+    if opened.simulation is not None or (ctx is not None and ctx.command.name == _STOP):
+        return
+    from tui.session.connect.known_line import KnownLine
+
+    opened.known = KnownLine(opened.line)
+    if ctx is not None and ctx.meta.get(_ACCEPTED):
+        opened.known.accept(all_that_comes=True)
+    tell_changes(opened, ())
+
+
+def tell_changes(opened: OpenLine, before: tuple[str, ...]) -> None:
+    """Say what is not as it was, but for what was said `before`; a refusal tells it itself."""
+    ctx = click.get_current_context(silent=True)
+    if opened.known is None or (ctx is not None and ctx.params.get("arm")):
+        return
+    new = [text for text in opened.known.changed if text not in before]
+    if new:
+        say(f"drivepanel: {' '.join(new)} {opened.known.way}", err=True)
+
+
+def mind_the_drive(opened: OpenLine, device: int, identity: Any, profile: str = "") -> None:
+    """Compare a drive with the one that is remembered at its address."""
+    if opened.known is not None:
+        before = opened.known.changed
+        opened.known.note(identity, device, profile)
+        tell_changes(opened, before)

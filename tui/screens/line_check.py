@@ -1,0 +1,88 @@
+"""Asking about a line that is not as it was: another adapter, or other drives, than before."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+
+from .app_port import Panel
+
+if TYPE_CHECKING:
+    from tui.session.connect.known_line import KnownLine
+
+QUESTION = "Is this the line that is meant?"
+FOLLOWS = (
+    "Until that is said the line is read-only: values are shown and stops go out, nothing else is"
+    " written to its drives."
+)
+AS_IT_WAS = "There is nothing to accept: the line is as it was."
+
+
+class LineCheck(Panel):
+    """Looks at the open line now and then; what differs is asked once, and on demand."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._asked_of: tuple[str, ...] = ()
+        """What differs, as it was asked about last."""
+        self._connected_since: float | None = None
+
+    def mind_line(self) -> None:
+        """Ask about what differs, once nobody searches and no other question stands."""
+        known = self._known()
+        if known is None:
+            self._asked_of, self._connected_since = (), None
+            return
+        self._look_again(known)
+        if not known.changed:
+            self._asked_of = ()
+        elif set(known.changed) - {*self._asked_of} and not self._is_busy():
+            self._ask(known)
+
+    def action_accept_line(self) -> None:
+        """Ask again whether the line is meant as it is now."""
+        known = self._known()
+        if known is None or not known.changed:
+            self.tell(AS_IT_WAS)
+        else:
+            self._ask(known)
+
+    def _known(self) -> KnownLine | None:
+        return self.opened.known if self.opened is not None else None
+
+    def _is_busy(self) -> bool:
+        search = self.fleet.search if self.fleet is not None else None
+        searching = search is not None and search.goes_on
+        return self.screen.is_modal or (searching and self.chosen is None)
+
+    def _look_again(self, known: KnownLine) -> None:
+        """A line that was lost may have come back with another adapter."""
+        assert self.opened is not None
+        state = self.opened.line.state
+        if state.status.value != "connected":
+            return
+        before, self._connected_since = self._connected_since, state.since
+        if before not in (None, state.since):
+            threading.Thread(target=known.look, name="line check", daemon=True).start()
+
+    def _ask(self, known: KnownLine) -> None:
+        from .dialogs.confirm import Confirm
+
+        self._asked_of = changed = known.changed
+        self.events.add("alarm", " ".join(changed))
+
+        def told(sure: bool | None) -> None:
+            if sure and known.changed == changed:
+                # in a thread: the disk may hang, and the line is written to at once
+                threading.Thread(target=known.accept, name="line check", daemon=True).start()
+            elif sure:
+                self._asked_of = ()  # more has come meanwhile: all of it is asked
+
+        asked = Confirm(
+            QUESTION,
+            "\n".join((*changed, FOLLOWS)),
+            yes="takes it as it is now",
+            no="keeps it read-only",
+            loses=True,
+        )
+        self.push_screen(asked, told)

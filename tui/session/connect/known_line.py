@@ -1,0 +1,166 @@
+"""Whether an open line is still the one that it was: its adapter, and the drives on it.
+
+Another adapter under the same name, or another drive at an address, holds all writes to the line
+but stops back until a person says that it is right.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Mapping
+from dataclasses import replace
+
+from tui.bus.api import ModbusLine
+from tui.drive.plain import plain
+
+from .identify import DriveIdentity
+from .known_lines import (
+    LONGEST_SAID,
+    DriveMark,
+    LineMark,
+    LineName,
+    LinesMemory,
+    keep_memory,
+    line_name,
+    load_memory,
+)
+
+log = logging.getLogger(__name__)
+
+BY_OPTION = "If that is right, --accept-line takes the line as it is now."
+
+
+class KnownLine:
+    """One open line, compared with what is remembered of it; for any thread."""
+
+    def __init__(self, line: ModbusLine, *, way: str = BY_OPTION) -> None:
+        self._line = line
+        self._lock = threading.RLock()
+        self._found: dict[int, DriveMark] = {}
+        self._changed: Mapping[int | None, str] = {}
+        """What differs, by device, with None for the adapter; replaced as a whole."""
+        self._accepts = False
+        self.way = way
+        """How a person says that it is right."""
+        self._name = LineName("")
+        self.look()
+
+    @property
+    def changed(self) -> tuple[str, ...]:
+        """What is not as it was, a sentence each; empty where all of it is. Waits for nothing."""
+        return tuple(self._changed.values())
+
+    @property
+    def text(self) -> str:
+        """All of that in one text."""
+        return " ".join(self.changed)
+
+    def look(self) -> None:
+        """See which adapter is there now: at the opening, and when a lost line came back."""
+        with self._lock:
+            self._name = line_name(self._line.link)
+            self._say(None, self._adapter_changed(load_memory()) if self._name.key else "")
+            if not self._changed:
+                self._keep()
+
+    def note(self, identity: DriveIdentity | None, device: int, profile: str = "") -> None:
+        """A drive answered: compare it with the one that was at its address."""
+        with self._lock:
+            if not self._name.key:
+                return
+            now = _mark_of(identity, profile)
+            if not any(now.said) and not now.profile:
+                return
+            before = self._remembered().drives.get(device)
+            self._found[device] = now
+            told = ""
+            if before is not None and not before.fits(now):
+                told = f"Device {device} was {plain(before.text)}, and is {plain(now.text)} now."
+            self._say(device, told)
+            if device not in self._changed and None not in self._changed and before != now:
+                self._keep()
+
+    def accept(self, *, all_that_comes: bool = False) -> None:
+        """A person says that it is right: it is remembered as it is now.
+
+        With `all_that_comes` what differs later is right as well.
+        """
+        with self._lock:
+            self._accepts = all_that_comes
+            self._changed = {}
+            self._line.held = ""
+            self._keep()
+
+    def _say(self, what: int | None, told: str) -> None:
+        """What is with the adapter or a device now; the line is held while anything differs."""
+        others = {key: text for key, text in self._changed.items() if key != what}
+        self._changed = {**others, what: told} if told and not self._accepts else others
+        reason = f"Nothing is written to this line: {self.text} {self.way}"
+        self._line.held = reason if self._changed else ""
+
+    def _remembered(self) -> LineMark:
+        return load_memory().lines.get(self._name.key, LineMark())
+
+    def _adapter_changed(self, memory: LinesMemory) -> str:
+        """What is another adapter than it was, as a sentence; else nothing."""
+        name = self._name
+        before = memory.names.get(name.typed)
+        if name.typed and before is not None and before != name.key:
+            was = memory.lines.get(before, LineMark()).adapter
+            return (
+                f"{plain(name.typed)} was {_port(before, was)}, and is"
+                f" {_port(name.key, name.port.adapter)} now."
+            )
+        was = memory.lines.get(name.key, LineMark()).adapter
+        if was and name.port.adapter and was != name.port.adapter:
+            return (
+                f"Another adapter is in {plain(name.port.path)}: it was {plain(was)}, and is"
+                f" {plain(name.port.adapter)} now."
+            )
+        return ""
+
+    def _keep(self) -> None:
+        """Remember the line as it is now, but for what differs; that it fails ends nothing."""
+        if not self._name.key:
+            return
+        memory, name = load_memory(), self._name
+        before = memory.lines.get(name.key, LineMark())
+        new = {d: mark for d, mark in self._found.items() if d not in self._changed}
+        drives = {d: _fuller(before.drives.get(d), mark) for d, mark in new.items()}
+        mark = replace(
+            before,
+            adapter=name.port.adapter or before.adapter,
+            drives=dict(sorted({**before.drives, **drives}.items())),
+        )
+        lines = {name.key: mark, **{k: one for k, one in memory.lines.items() if k != name.key}}
+        names = dict(memory.names)
+        if name.typed:
+            names = {name.typed: name.key, **{k: v for k, v in names.items() if k != name.typed}}
+        now = LinesMemory(lines, names)
+        if now == memory:
+            return
+        try:
+            keep_memory(now)
+        except OSError as error:
+            log.warning("what the line is was not remembered: %s", error)
+
+
+def _mark_of(identity: DriveIdentity | None, profile: str) -> DriveMark:
+    if identity is None:
+        return DriveMark(profile=profile)
+    said = (identity.vendor, identity.reference, identity.version, identity.name)
+    vendor, reference, version, name = (text[:LONGEST_SAID] for text in said)
+    return DriveMark(vendor, reference, version, name, profile or identity.profile or "")
+
+
+def _fuller(before: DriveMark | None, now: DriveMark) -> DriveMark:
+    """What is known of a drive that said less of itself this time."""
+    if before is not None and any(before.said) and not any(now.said) and before.fits(now):
+        return before
+    return now
+
+
+def _port(key: str, adapter: str) -> str:
+    path = plain(key.removeprefix("serial:"))
+    return f"{path} ({plain(adapter)})" if adapter else path

@@ -1,0 +1,171 @@
+"""What is remembered of lines: which adapter and which drives each had when it was used last.
+
+One file in the state folder. A port is called by its adapter's lasting name where it has one; what
+a person types for it, such as /dev/ttyUSB0, is remembered with the port that it led to.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+from tui.bus.link import Link, SerialLink, label
+from tui.bus.transport.port_names import PortName, lasting_name
+from tui.drive.profile.library import version_shown
+from tui.drive.small_file import read_small_text
+
+from ..paths import state_folder
+from .line_key import line_key
+
+LINES_KEPT = 60
+NAMES_KEPT = 100
+LONGEST_MEMORY = 2_000_000
+"""Bytes of a file that may be one of these."""
+LONGEST_SAID = 200
+"""Characters that are kept of what a drive says of itself."""
+NO_PORT = PortName("")
+_TERMINALS = "/dev/pts/"
+
+
+@dataclass(frozen=True, slots=True)
+class DriveMark:
+    """By what a drive is known again: what it says of itself, or the profile it was taken by."""
+
+    vendor: str = ""
+    reference: str = ""
+    version: str = ""
+    name: str = ""
+    profile: str = ""
+
+    @property
+    def said(self) -> tuple[str, ...]:
+        """What it says of itself; texts that are all empty where it says nothing."""
+        return self.vendor, self.reference, self.version, self.name
+
+    def fits(self, now: DriveMark) -> bool:
+        """Whether it may be the same drive; by the profile where one of them says nothing."""
+        if any(self.said) and any(now.said):
+            return self.said == now.said
+        return not (self.profile and now.profile) or self.profile == now.profile
+
+    @property
+    def text(self) -> str:
+        """The drive in a few words."""
+        told = " ".join(part for part in (self.reference or self.vendor, self.name) if part)
+        shown = version_shown(self.profile, self.version)
+        version = f"version {shown}" if shown else ""
+        return ", ".join(part for part in (told, version) if part) or self.profile or "a drive"
+
+
+@dataclass(frozen=True, slots=True)
+class LineMark:
+    """What a line had when it was used last."""
+
+    adapter: str = ""
+    drives: Mapping[int, DriveMark] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class LinesMemory:
+    """All that is remembered: lines by their key, and where each typed name led."""
+
+    lines: Mapping[str, LineMark] = field(default_factory=dict)
+    names: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, slots=True)
+class LineName:
+    """What a line is remembered as."""
+
+    key: str
+    """The same for as long as it is the same adapter, host or port; empty for a line that
+    nobody finds again, such as the number of a pseudo-terminal."""
+    typed: str = ""
+    """How a person names a serial port whose name may come to lead elsewhere; else empty."""
+    port: PortName = NO_PORT
+
+
+def line_name(link: Link) -> LineName:
+    """What the line that a link leads to is remembered as, as its port is named now."""
+    if not isinstance(link, SerialLink):
+        return LineName(line_key(label(link)))
+    path = os.path.abspath(link.path) if os.name == "posix" else link.path
+    port = lasting_name(link.path)
+    if port.path.startswith(_TERMINALS):
+        # a number that the next program gets; a link to it is a name that somebody has given
+        return LineName("" if path.startswith(_TERMINALS) else f"serial:{path}")
+    return LineName(line_key(label(link)), path if path != port.path else "", port)
+
+
+def remembered_text(text: str) -> str:
+    """A LINE as it is remembered: a port by its lasting name, where its adapter has one."""
+    from tui.bus.errors import LinkSyntaxError
+    from tui.bus.link import parse_link
+
+    try:
+        link = parse_link(text)
+    except LinkSyntaxError:
+        return text  # a simulated line
+    if not isinstance(link, SerialLink):
+        return text
+    port = lasting_name(link.path)
+    if not port.lasting or port.path == link.path:
+        return text
+    return label(SerialLink(port.path, link.baud, link.format, link.timeout))
+
+
+def memory_file() -> Path:
+    """Where it stands."""
+    return state_folder() / "known-lines.json"
+
+
+def load_memory() -> LinesMemory:
+    """What is remembered; nothing of a file, or a part of one, that is damaged."""
+    try:
+        stored = json.loads(read_small_text(memory_file(), LONGEST_MEMORY))
+    except (OSError, ValueError, RecursionError):
+        return LinesMemory()
+    if not isinstance(stored, dict):
+        return LinesMemory()
+    lines = {key: _line_mark(told) for key, told in _table(stored, "lines").items()}
+    names = {typed: key for typed, key in _table(stored, "names").items() if isinstance(key, str)}
+    return LinesMemory({key: one for key, one in lines.items() if one is not None}, names)
+
+
+def keep_memory(memory: LinesMemory) -> None:
+    """Put it on the disk, whole or not at all; the latest lines come first. Raises OSError."""
+    lines = {
+        key: {
+            "adapter": mark.adapter,
+            "drives": {str(device): asdict(drive) for device, drive in mark.drives.items()},
+        }
+        for key, mark in list(memory.lines.items())[:LINES_KEPT]
+    }
+    names = dict(list(memory.names.items())[:NAMES_KEPT])
+    file = memory_file()
+    file.parent.mkdir(parents=True, exist_ok=True)
+    part = file.with_suffix(f".{os.getpid()}.part")
+    part.write_text(json.dumps({"lines": lines, "names": names}, indent=1), encoding="utf-8")
+    part.replace(file)
+
+
+def _table(told: Mapping[str, Any], key: str) -> dict[str, Any]:
+    found = told.get(key)
+    return found if isinstance(found, dict) else {}
+
+
+def _line_mark(told: object) -> LineMark | None:
+    if not isinstance(told, dict):
+        return None
+    adapter = told.get("adapter")
+    drives = {}
+    for device, mark in _table(told, "drives").items():
+        if device.isdecimal() and isinstance(mark, dict):
+            texts = {one.name: mark.get(one.name, "") for one in fields(DriveMark)}
+            if all(isinstance(text, str) for text in texts.values()):
+                drives[int(device)] = DriveMark(**texts)
+    return LineMark(adapter if isinstance(adapter, str) else "", drives)

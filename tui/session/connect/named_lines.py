@@ -1,0 +1,249 @@
+"""Lines that a person has named in the settings file, with the drive that is meant on each.
+
+    [lines]
+    pump = "serial:/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0,19200,8E1"
+
+    [lines.fan]
+    line = "tcp:192.168.0.10"
+    device = 5
+    profile = "ID"
+
+The file is read when a name is looked for, and never for a LINE that is written out. What is wrong
+with one name hinders no other.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from functools import lru_cache
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from tui.bus.errors import LinkSyntaxError
+from tui.drive.profile.library import user_folder
+from tui.drive.small_file import read_small_text
+
+if TYPE_CHECKING:
+    from tui.drive.profile.toml_lines import TomlPath
+
+LONGEST_SETTINGS = 200_000
+"""Bytes of a file that may be the settings."""
+LINES_TABLE = "lines"
+MOST_NAMED = 200
+_NAME = re.compile(r"(?!COM\d+$)[A-Za-z][A-Za-z0-9_-]{0,31}", re.IGNORECASE)
+_TAKEN = frozenset({"factory"})
+"""Words that mean something else where a LINE may stand."""
+_KEYS = ("line", "device", "profile")
+_DEVICES = range(1, 248)
+NO_LINES: Mapping[str, NamedLine] = MappingProxyType({})
+NO_PLACES: Mapping[str, str] = MappingProxyType({})
+
+
+class SettingsError(LinkSyntaxError):
+    """What is wrong with the settings file, by file, line and key."""
+
+
+class NamedLine(NamedTuple):
+    """A line with its name; `device` and `profile` of the drive that is meant, if told."""
+
+    name: str
+    line: str
+    device: int | None = None
+    profile: str | None = None
+
+
+class LineSettings(NamedTuple):
+    """What the settings file says of lines, and what is wrong with it."""
+
+    path: Path
+    lines: Mapping[str, NamedLine] = NO_LINES
+    """By name in small letters, in the order of the file."""
+    faults: tuple[str, ...] = ()
+    """File, line, key and fault; the lines that they are about are not among the others."""
+    text: str = ""
+    """The file as it stands; empty where it cannot be read."""
+    places: Mapping[str, str] = NO_PLACES
+    """File, line and key by name."""
+
+
+def settings_file() -> Path:
+    """The settings file in the configuration folder, beside the profiles of the user's own."""
+    return user_folder().parent / "settings.toml"
+
+
+def named_lines() -> Mapping[str, NamedLine]:
+    """The lines that have a name, by that name in small letters; raises nothing."""
+    return line_settings().lines
+
+
+def line_settings() -> LineSettings:
+    """What the settings file says, read anew where it has changed; raises nothing."""
+    path = settings_file()
+    try:
+        told = os.stat(path)
+    except OSError:
+        return LineSettings(path)
+    return _read(path, (told.st_mtime_ns, told.st_size, told.st_ino))
+
+
+def is_name(text: str) -> bool:
+    """Whether a text can be the name of a line at all."""
+    return _NAME.fullmatch(text) is not None and text.casefold() not in _TAKEN
+
+
+def line_named(text: str) -> NamedLine | None:
+    """The line of a name; None where the text is a LINE, or no name of any.
+
+    Raises SettingsError where the name stands in a part of the file that cannot be used.
+    """
+    if not is_name(text):
+        return None
+    settings = line_settings()
+    if found := settings.lines.get(text.casefold()):
+        return found
+    if not settings.faults or os.path.exists(text):
+        return None
+    raise SettingsError("\n".join((*settings.faults, f"So it is not known which line {text} is.")))
+
+
+def line_to_stop(text: str) -> NamedLine | None:
+    """The line of a name, even where the rest of the file is broken: a stop has to get through.
+
+    Raises SettingsError where it cannot be told which line or which drive is meant.
+    """
+    try:
+        return line_named(text)
+    except SettingsError:
+        if found := _salvaged(line_settings().text, text):
+            return found
+        raise
+
+
+def profile_named(line_key_of: str, device: int) -> str | None:
+    """The profile that the settings give the drive at an address of a line, by the line's key."""
+    from .line_key import line_key
+
+    for one in named_lines().values():
+        if one.profile and one.device in (None, device) and line_key(one.line) == line_key_of:
+            return one.profile
+    return None
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
+    try:
+        text = read_small_text(path, LONGEST_SETTINGS)
+    except UnicodeDecodeError as error:
+        return LineSettings(path, faults=(f"{path}: byte {error.start} is not UTF-8 text.",))
+    except OSError as error:
+        return LineSettings(path, faults=(f"{path}: cannot be read: {error.strerror}.",))
+    import tomli
+
+    try:
+        tables = tomli.loads(text)
+    except tomli.TOMLDecodeError as error:
+        line = getattr(error, "lineno", 1)
+        return LineSettings(path, faults=(f"{path}:{line}: not valid TOML: {error}.",), text=text)
+    except RecursionError:
+        return LineSettings(path, faults=(f"{path}: it is nested too deep.",), text=text)
+    from tui.drive.profile.toml_lines import toml_lines
+
+    places = toml_lines(text)
+    found: dict[str, NamedLine] = {}
+    at: dict[str, str] = {}
+    faults: list[tuple[TomlPath, str]] = []
+    for key, value in tables.items():
+        if key != LINES_TABLE or not isinstance(value, dict):
+            faults.append(((key,), f"only a table [{LINES_TABLE}] is known here"))
+            continue
+        for name, told in list(value.items())[:MOST_NAMED]:
+            if fault := next(_faults(name, told, found), None):
+                faults.append(fault)
+            else:
+                found[name.casefold()] = _named(name, told)
+                at[name.casefold()] = f"{path}:{places.get((key, name), 1)}: {key}.{name}"
+    told_faults = (
+        f"{path}:{places.get(key, 1)}: {'.'.join(map(str, key))}: {fault}." for key, fault in faults
+    )
+    return LineSettings(path, found, tuple(told_faults), text, at)
+
+
+def _faults(
+    name: str, told: object, others: Mapping[str, NamedLine]
+) -> Iterator[tuple[TomlPath, str]]:
+    """What is wrong with one name."""
+    here: TomlPath = (LINES_TABLE, name)
+    if not is_name(name):
+        yield here, "a name is a letter with up to 31 letters, digits, - and _, and no word of ours"
+    elif name.casefold() in others:
+        yield here, f"{others[name.casefold()].name} is this name already"
+    row = here
+    if isinstance(told, dict):
+        row = (*here, "line") if "line" in told else here
+    elif isinstance(told, str):
+        told = {"line": told}
+    else:
+        yield here, f"a LINE in quotes, or a table with {', '.join(_KEYS)}, is wanted"
+        return
+    for key in told:
+        if key not in _KEYS:
+            yield (*here, key), f"only {', '.join(_KEYS)} are known here"
+    line = told.get("line")
+    if not isinstance(line, str) or not line.strip() or is_name(line.strip()):
+        yield row, "`line` has to be a LINE in quotes"
+    device, profile = told.get("device"), told.get("profile")
+    if "device" in told and (type(device) is not int or device not in _DEVICES):
+        yield (*here, "device"), f"a slave address from 1 to 247 is wanted, not {device!r}"
+    if "profile" in told and (not isinstance(profile, str) or not profile.strip()):
+        yield (*here, "profile"), "the id of a profile in quotes is wanted"
+
+
+def _named(name: str, told: Any) -> NamedLine:
+    told = {"line": told} if isinstance(told, str) else told
+    profile = told.get("profile")
+    return NamedLine(
+        name,
+        told["line"].strip(),
+        told.get("device"),
+        profile.strip().lower() if profile else None,
+    )
+
+
+_PAIR = re.compile(r"""["']?([\w-]+)["']?\s*=\s*(?:"([^"]*)"|'([^']*)'|(\d+))""")
+_HEAD = re.compile(r"""\s*\[\s*(?:lines\s*\.\s*)?["']?([\w-]+)["']?\s*\]""")
+
+
+def _salvaged(text: str, name: str) -> NamedLine | None:
+    """The line of a name out of a broken file, by its lines of text.
+
+    Raises SettingsError where the line is told and its address is not to be made out.
+    """
+    wanted, section = name.casefold(), ""
+    parts: dict[str, str] = {}
+    own: list[str] = []
+    for row in text.splitlines():
+        if head := _HEAD.match(row):
+            section = head[1].casefold()
+            continue
+        key, sign, value = row.partition("=")
+        key = key.strip().removeprefix(f"{LINES_TABLE}.").strip("\"' ").casefold()
+        if section == wanted and sign:
+            own.append(row)
+        elif key == wanted and sign and section in ("", LINES_TABLE):
+            own.append(value if "{" in value else f"line ={value}")
+    for row in own:
+        parts |= {f[1]: f[2] or f[3] or f[4] or "" for f in _PAIR.finditer(row)}
+    if not parts.get("line"):
+        return None
+    found = NamedLine(name, parts["line"].strip(), profile=parts.get("profile") or None)
+    if not any("device" in row for row in own):
+        return found
+    if not parts.get("device", "").isdecimal() or int(parts["device"]) not in _DEVICES:
+        raise SettingsError(
+            f"{settings_file()} is broken, and the address of {name} cannot be made out. Write:"
+            f" drivepanel stop {found.line} -d ADDRESS"
+        )
+    return found._replace(device=int(parts["device"]))
