@@ -123,7 +123,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         if not self.settled:
             # the panel ends without having been asked: an error of its own, or a signal
             await asyncio.to_thread(self.stop_motors)
-        await self.disconnect()
+        await self.disconnect_all()
         if self._journal is not None:
             await asyncio.to_thread(self._journal.close)
 

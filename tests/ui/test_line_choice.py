@@ -18,7 +18,6 @@ from tui.app import DrivePanelApp
 from tui.screens.connection.choices import groups, same_line
 from tui.screens.connection.drive_list import DriveList
 from tui.screens.connection.state import QUIET
-from tui.screens.dialogs.confirm import Confirm
 from tui.screens.monitor.screen import MonitorScreen
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.fleet import FoundDrive
@@ -98,27 +97,20 @@ async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips()
         assert made.simulation.drive(3).fault is None
 
 
-async def test_another_line_is_opened_after_asking_only() -> None:
+async def test_another_line_is_opened_beside_one_with_drives() -> None:
     async with line() as made:
         app, pilot = made.app, made.pilot
         await until(pilot, lambda: app.connection.drives.option_count == 1)
-        for key in ("escape", "q", "n", "enter"):
-            app.connection.lines.focus()
-            app.connection.lines.offer("/dev/ttyUSB0")
-            await pilot.press("enter")
-            await until(pilot, lambda: isinstance(app.screen, Confirm))
-            follows = str(app.screen.query_one("#follows").render())
-            assert "is open, with" in follows
-            assert "/dev/ttyUSB0" in follows
-            await pilot.press(key)
-            if key == "enter":
-                assert isinstance(app.screen, Confirm)
-            else:
-                await until(pilot, lambda: app.screen is app.connection)
-            assert made.kept
-        await pilot.press("y")
+        first = app.opened
+        app.connection.lines.focus()
+        app.connection.lines.offer("/dev/ttyUSB0")
+        await pilot.press("enter")
         await until(pilot, lambda: len(made.opened) == 2)
         assert made.opened[1].startswith("serial:/dev/ttyUSB0")
+        await until(pilot, lambda: app.opened is not first)
+        assert first is not None
+        assert first.line.state.status.value == "connected"
+        assert app.screen is app.connection
 
 
 async def test_enter_in_a_field_looks_again_by_what_was_typed() -> None:

@@ -21,9 +21,11 @@ if TYPE_CHECKING:
     from tui.terminal.stroke import Stroke
     from tui.widgets.strip import FrameView
 
+    from .open_lines import PanelLine
+
 
 class Panel(LeanApp):
-    """The app as its screens see it: one line at a time, the drives found on it."""
+    """The app as its screens see it: the lines that are open, one of them shown, their drives."""
 
     clock: Clock
     read_only: bool
@@ -32,8 +34,11 @@ class Panel(LeanApp):
     period: float
     """Wished time of a monitoring cycle in seconds, the same for every drive."""
     opened: OpenLine | None
+    """The line that is shown."""
     fleet: Fleet | None
-    """The drives of the open line."""
+    """The drives of the line that is shown."""
+    panel_lines: tuple[PanelLine, ...]
+    """All lines that are open."""
     events: EventLog
     """Everything that was said."""
     chosen: DriveConsole | None
@@ -83,13 +88,38 @@ class Panel(LeanApp):
         """The open line as it is called on a screen, or nothing."""
         return self.opened.label if self.opened else ""
 
+    @property
+    def fleets(self) -> list[Fleet]:
+        """The drives of every open line, of the one that is shown first."""
+        shown = [self.fleet] if self.fleet is not None else []
+        return [*shown, *(one.fleet for one in self.panel_lines if one.fleet is not self.fleet)]
+
+    @property
+    def open_texts(self) -> list[str]:
+        """Every open line as it was typed."""
+        return [self.line_text, *(one.opened.text for one in self.panel_lines)]
+
+    @property
+    def faulty_texts(self) -> list[str]:
+        """The open lines with a drive in fault, as they were typed."""
+        lines = self.panel_lines
+        return [one.opened.text for one in lines if one.fleet.alarms.active]
+
+    @abstractmethod
+    def open_line_of(self, text: str) -> PanelLine | None:
+        """The open line that a text means, whatever its settings; None where it is not open."""
+
+    @abstractmethod
+    def show_line(self, one: PanelLine | None) -> None:
+        """Show another of the open lines; no drive is open then."""
+
     @abstractmethod
     async def connect(self, text: str) -> None:
-        """Open a line in place of the one that is open; raises the line's errors."""
+        """Open a line and show it, beside those with drives; raises the line's errors."""
 
     @abstractmethod
     async def disconnect(self) -> None:
-        """Close the open line, if there is one."""
+        """Close the line that is shown, if there is one."""
 
     @abstractmethod
     async def may_let_go(self, question: str, *, yes: str, no: str, always: str = "") -> bool:

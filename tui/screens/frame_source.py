@@ -17,6 +17,7 @@ from .keys.action import BLOCKS, CONNECTION, FAULTS, PARAMETERS
 
 if TYPE_CHECKING:
     from tui.session.command.stop_report import StopReport
+    from tui.session.connect.open_line import OpenLine
     from tui.session.console import DriveConsole
     from tui.session.drive_state import DriveState
     from tui.session.fleet import Fleet
@@ -51,8 +52,8 @@ class FrameSource:
         strip = StripView(
             drive=drive,
             line=self._line(fleet),
-            faults=len(fleet.alarms.active) if fleet else 0,
-            unseen=fleet.alarms.unseen if fleet else False,
+            faults=sum(len(one.alarms.active) for one in app.fleets),
+            unseen=any(one.alarms.unseen for one in app.fleets),
             load=self._measured(now),
             clock=app.clock.time_of_day(),
             read_only=app.read_only,
@@ -68,6 +69,8 @@ class FrameSource:
             parts.append(f"{count} drive{'' if count == 1 else 's'}")
         if fleet is not None and fleet.search is not None and fleet.search.goes_on:
             parts.append(f"search {fleet.search.text}")
+        if len(self._app.panel_lines) > 1:
+            parts.append(f"1 of {len(self._app.panel_lines)} lines")
         if fleet is not None and (others := fleet.line.facts.others):
             parts.append(f"shared by {len(others) + 1}")
         return " · ".join(parts)
@@ -89,7 +92,7 @@ class FrameSource:
 
     def _said(self, console: DriveConsole | None, now: float) -> Said | None:
         """What holds now before what was said: a lost line, a drive that is not heard."""
-        holds = self._line_trouble(now) or self._not_heard()
+        holds = self._line_trouble(now) or self._not_heard() or self._trouble_below(now)
         if holds:
             return Said(self._app.clock.time_of_day(), holds, "alarm", 0.0)
         event = self._app.events.newest
@@ -105,8 +108,17 @@ class FrameSource:
             text = f"drive {event.device} {event.text}"
         return Said(at(event.wall), text, event.kind, time.time() - event.wall, there)
 
-    def _line_trouble(self, now: float) -> str:
-        opened = self._app.opened
+    def _trouble_below(self, now: float) -> str:
+        """The first trouble of the lines that are open and not shown."""
+        for one in self._app.panel_lines:
+            if one.opened is not self._app.opened and (
+                trouble := self._line_trouble(now, one.opened) or self._not_heard(one.fleet)
+            ):
+                return f"{one.opened.label}: {trouble}"
+        return ""
+
+    def _line_trouble(self, now: float, other: OpenLine | None = None) -> str:
+        opened = other or self._app.opened
         if opened is None:
             return ""
         state = opened.line.state
@@ -120,8 +132,8 @@ class FrameSource:
             again = f" Tried again in {max(0.0, state.next_try - now):.0f} s."
         return f"LINE LOST for {since}: {state.reason}{again}"
 
-    def _not_heard(self) -> str:
-        fleet = self._app.fleet
+    def _not_heard(self, other: Fleet | None = None) -> str:
+        fleet = other or self._app.fleet
         warnings = fleet.line_watch.warnings() if fleet else []
         if not warnings:
             return ""

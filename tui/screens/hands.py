@@ -118,10 +118,12 @@ class Hands(Panel):
 
     def _stop(self, *, everything: bool) -> None:
         self._stops += 1
-        fleet = self.fleet
-        if fleet is None:
-            return
-        self._stop_sessions(fleet, fleet.sessions if everything else self._meant(fleet))
+        chosen = None if everything else self._open_drive()
+        for fleet in self.fleets:
+            if chosen is None:
+                self._stop_sessions(fleet, fleet.sessions)
+            elif chosen in fleet.consoles:
+                self._stop_sessions(fleet, [chosen.session])
 
     def _stop_sessions(
         self, fleet: Fleet, sessions: list[DriveSession], order: OrderId = "stop"
@@ -148,8 +150,9 @@ class Hands(Panel):
     def stop_drive(self, console: DriveConsole, order: OrderId) -> None:
         """Stop one drive, in its own way."""
         self._stops += 1
-        if self.fleet is not None:
-            self._stop_sessions(self.fleet, [console.session], order)
+        for fleet in self.fleets:
+            if console in fleet.consoles:
+                self._stop_sessions(fleet, [console.session], order)
 
     async def on_event(self, event: Event) -> None:
         """A key keeps an armed drive armed; the next one waits for it."""
@@ -160,8 +163,9 @@ class Hands(Panel):
                 return  # nobody acts on a screen that cannot be seen
             self.hurry()
             if isinstance(event, Key):
-                for session in self.fleet.sessions if self.fleet else ():
-                    session.arming.touch()
+                for fleet in self.fleets:
+                    for session in fleet.sessions:
+                        session.arming.touch()
         elif isinstance(event, Key) and self._is_void(event):
             return
         await super().on_event(event)
@@ -171,17 +175,14 @@ class Hands(Panel):
         stroke = stroke_of(key)
         return stroke is not None and stroke.stamp != self.stop_stamp()
 
-    def _meant(self, fleet: Fleet) -> list[DriveSession]:
-        """Whom the stop key stops: the drive that was opened, else every drive of the line."""
+    def _open_drive(self) -> DriveConsole | None:
+        """Whom the stop key stops: the drive that was opened; None for every drive."""
         chosen = self.chosen
-        if chosen is not None and chosen in fleet.consoles:
-            return [chosen.session]
-        return fleet.sessions
+        known = chosen is not None and any(chosen in fleet.consoles for fleet in self.fleets)
+        return chosen if known else None
 
     @property
     def stops_whom(self) -> str:
         """The words of the stop key in the line of keys."""
-        fleet, chosen = self.fleet, self.chosen
-        if fleet is not None and chosen is not None and chosen in fleet.consoles:
-            return f"STOP {chosen.device}"
-        return "STOP ALL"
+        chosen = self._open_drive()
+        return f"STOP {chosen.device}" if chosen is not None else "STOP ALL"

@@ -16,6 +16,7 @@ from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
     from tui.session.monitor.timeout import TimeoutWatch
 
 STOPPED_WITHIN = 60.0
@@ -35,42 +36,48 @@ class Leaving(Panel):
         if any(isinstance(screen, Leave) for screen in self.screen_stack):
             return
         if running := self._motors():
-            follows = [self._left_running(running), *self._tripping(running), *self._unfinished()]
-            asked = Leave("\n".join(follows), MotorsNow(self, running))
+            asked = Leave("\n".join(self._told(self.fleets)), MotorsNow(self, running))
             self.push_screen(asked, self._leave_motors)
             return
         if self._asked in self.screen_stack:
             return
-        self._asked = self._question("Leave the panel?", yes="leaves", no="stays")
+        self._asked = self._question(self.fleets, "Leave the panel?", yes="leaves", no="stays")
         if self._asked is None:
             self.exit()
         else:
             self.push_screen(self._asked, self._leave)
 
     def _motors(self) -> list[DriveSession]:
-        """Drives commanded from here whose motors do not surely stand."""
-        return self.fleet.line_watch.under_command() if self.fleet else []
+        """Drives of all lines commanded from here whose motors do not surely stand."""
+        return [one for fleet in self.fleets for one in fleet.line_watch.under_command()]
 
-    def _left_running(self, sessions: list[DriveSession]) -> str:
+    def _told(self, fleets: Sequence[Fleet]) -> list[str]:
+        """What becomes of the drives of lines that are left; of several lines each by its name."""
+        told = []
+        for fleet in fleets:
+            running = fleet.line_watch.under_command()
+            here = [self._left_running(fleet, running)] if running else []
+            here += [*self._tripping(fleet, running), *self._unfinished(fleet)]
+            label = next((o.opened.label for o in self.panel_lines if o.fleet is fleet), "")
+            told += [f"{label}:", *here] if here and len(self.panel_lines) > 1 else here
+        return told
+
+    def _left_running(self, fleet: Fleet, sessions: list[DriveSession]) -> str:
         """Which motors run, and what each drive does when nobody asks it any more."""
         from tui.session.monitor.timeout import left_alone_text
 
-        assert self.fleet is not None
-        line_watch = self.fleet.line_watch
         return "\n".join(
-            left_alone_text(one, watch=line_watch.watch(one.device)) for one in sessions
+            left_alone_text(one, watch=fleet.line_watch.watch(one.device)) for one in sessions
         )
 
-    def _tripping(self, but: Sequence[DriveSession] = ()) -> list[str]:
+    def _tripping(self, fleet: Fleet, but: Sequence[DriveSession] = ()) -> list[str]:
         """Which drives act on their communication time-out once they are left, and when."""
-        if self.fleet is None:
-            return []
         from tui.session.monitor.timeout import left_alone_text, names_of
 
         told = {session.device for session in but}
-        line_watch = self.fleet.line_watch
+        line_watch = fleet.line_watch
         alike: dict[tuple[str, TimeoutWatch], list[DriveSession]] = {}
-        for console in self.fleet.consoles:
+        for console in fleet.consoles:
             watch = line_watch.left_alone().get(console.device)
             if watch is not None and console.device not in told:
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
@@ -116,16 +123,17 @@ class Leaving(Panel):
 
         Waits for it; may be called in any thread but the loop's.
         """
-        fleet, running = self.fleet, self._motors()
-        if not running or fleet is None:
-            return True
         from tui.bus.errors import LineClosed
 
-        try:
-            fleet.stop(running, by="leaving the panel")
-        except LineClosed:
-            return False
-        return not fleet.stopper.wait(running, STOPPED_WITHIN).failed
+        running = [(fleet, fleet.line_watch.under_command()) for fleet in self.fleets]
+        running = [one for one in running if one[1]]
+        for fleet, sessions in running:
+            try:
+                fleet.stop(sessions, by="leaving the panel")
+            except LineClosed:
+                return False
+        waits = [fleet.stopper.wait(sessions, STOPPED_WITHIN) for fleet, sessions in running]
+        return not any(summary.failed for summary in waits)
 
     def _leave(self, sure: bool | None) -> None:
         if sure:
@@ -137,7 +145,8 @@ class Leaving(Panel):
         With `always` it asks in any case, and says that. Belongs into a worker: it waits for
         the answer.
         """
-        asked = self._question(question, yes=yes, no=no, always=always)
+        fleets = [self.fleet] if self.fleet is not None else []
+        asked = self._question(fleets, question, yes=yes, no=no, always=always)
         if asked is None:
             return True
         answer: asyncio.Future[bool | None] = asyncio.get_running_loop().create_future()
@@ -149,27 +158,23 @@ class Leaving(Panel):
         self.push_screen(asked, told)
         return bool(await answer)
 
-    def _question(self, question: str, *, yes: str, no: str, always: str = "") -> Confirm | None:
-        """What to ask before the drives are left alone; None where nothing is to be said."""
-        running = self._motors()
-        told = [*self._tripping(running), *self._unfinished()]
-        if running:
-            told.insert(0, self._left_running(running))
+    def _question(
+        self, fleets: Sequence[Fleet], question: str, *, yes: str, no: str, always: str = ""
+    ) -> Confirm | None:
+        """What to ask before drives are left alone; None where nothing is to be said."""
+        told = self._told(fleets)
         if always:
             told.insert(0, always)
         if not told:
             return None
-        alone = self.fleet.line_watch.left_alone() if self.fleet else {}
-        turning = {session.device for session in running} | alone.keys()
-        sessions = self.fleet.sessions if self.fleet else []
-        drives = [session for session in sessions if session.device in turning]
+        drives = [one for fleet in fleets for one in _concerned(fleet)]
         now = MotorsNow(self, drives) if drives else None
         return Confirm(question, "\n".join(told), yes=yes, no=no, loses=True, now=now)
 
-    def _unfinished(self) -> list[str]:
+    def _unfinished(self, fleet: Fleet) -> list[str]:
         """What would be lost of the work on parameters."""
         told = []
-        for console in self.fleet.consoles if self.fleet else ():
+        for console in fleet.consoles:
             device, editor = console.device, console.begun_editor
             if editor is None:
                 continue
@@ -185,3 +190,10 @@ class Leaving(Panel):
                     " power-off."
                 )
         return told
+
+
+def _concerned(fleet: Fleet) -> list[DriveSession]:
+    """Drives of a line that run by a command from here, or act once they are left alone."""
+    turning = {session.device for session in fleet.line_watch.under_command()}
+    turning |= fleet.line_watch.left_alone().keys()
+    return [session for session in fleet.sessions if session.device in turning]

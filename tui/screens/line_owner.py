@@ -13,6 +13,7 @@ from tui.session.paths import remember_line
 from tui.terminal.loop import soon_in_loop
 
 from .app_port import Panel
+from .open_lines import LineEvents, PanelLine
 
 if TYPE_CHECKING:
     from tui.bus.shared_facts import Program
@@ -32,12 +33,13 @@ Opener = Callable[..., "OpenLine"]
 
 
 class LineOwner(Panel):
-    """Opens a line in place of the one before, and closes it."""
+    """Opens lines and closes them; the one opened or chosen last is shown."""
 
     _open: Opener
     _gone = False
     """Whether the panel was left: what is opened from then on is closed again."""
     _journal: Journal | None = None
+    panel_lines: tuple[PanelLine, ...] = ()
     opened: OpenLine | None = None
     fleet: Fleet | None = None
 
@@ -56,11 +58,18 @@ class LineOwner(Panel):
         return self._journal.trouble if self._journal is not None else ""
 
     async def connect(self, text: str) -> None:
-        """Open a line in place of the one that is open; raises the line's errors."""
-        await self.disconnect()
+        """Open a line and show it; raises the line's errors.
+
+        Lines with drives stay open below. One that is open with other settings is closed before.
+        """
+        if (here := self.open_line_of(text)) is not None:
+            await self._close(here)
+        shown = self._shown()
+        if shown is not None and not shown.fleet.found:
+            await self._close(shown)  # nothing is on it
         opening = asyncio.ensure_future(asyncio.to_thread(self._open_here, text))
         try:
-            self.opened = await asyncio.shield(opening)
+            opened = await asyncio.shield(opening)
         except asyncio.CancelledError:
             opening.add_done_callback(_close_unwanted)
             raise
@@ -68,11 +77,32 @@ class LineOwner(Panel):
         from tui.session.starts.keeper import StartKeeper
 
         # the motors of a simulated line end with it
-        starts = StartKeeper("panel", clock=self.clock) if self.opened.simulation is None else None
-        self.fleet = Fleet(self.opened.line, self.journal, starts, self.events, self.clock)
-        self._look_after(self.fleet)
-        log.info("opened %s", self.opened.label)
-        await asyncio.to_thread(_remember, self.opened.text)
+        starts = StartKeeper("panel", clock=self.clock) if opened.simulation is None else None
+        events = LineEvents(self.events, opened.label, lambda: self.opened is opened)
+        fleet = Fleet(opened.line, self.journal, starts, events, self.clock)
+        one = PanelLine(opened, fleet)
+        self.panel_lines = (*self.panel_lines, one)
+        self.show_line(one)
+        self._look_after(fleet)
+        log.info("opened %s", opened.label)
+        await asyncio.to_thread(_remember, opened.text)
+
+    def open_line_of(self, text: str) -> PanelLine | None:
+        """The open line that a text means, whatever its settings; None where it is not open."""
+        if not self.panel_lines:
+            return None
+        from tui.session.connect.line_key import line_key
+
+        wanted = line_key(text)
+        return next((one for one in self.panel_lines if line_key(one.opened.text) == wanted), None)
+
+    def show_line(self, one: PanelLine | None) -> None:
+        """Show another of the open lines; no drive is open then."""
+        self.chosen = None
+        self.opened, self.fleet = (one.opened, one.fleet) if one is not None else (None, None)
+
+    def _shown(self) -> PanelLine | None:
+        return next((one for one in self.panel_lines if one.opened is self.opened), None)
 
     def _look_after(self, fleet: Fleet) -> None:
         """Tell who shares the line, and stop the motors of programs on it that are gone."""
@@ -97,7 +127,7 @@ class LineOwner(Panel):
             session_of=session_of,
             timeout_of=timeout_of,
             person=True,
-            events=self.events,
+            events=fleet.events,
             clock=self.clock,
         )
 
@@ -123,14 +153,24 @@ class LineOwner(Panel):
         """Another program stopped drives: what is being asked about them is void."""
 
     async def disconnect(self) -> None:
-        """Close the open line, if there is one."""
-        opened, self.opened = self.opened, None
-        fleet, self.fleet, self.chosen = self.fleet, None, None
-        if opened is not None:
-            await asyncio.to_thread(opened.close)
-            if fleet is not None and fleet.starts is not None:
-                await asyncio.to_thread(fleet.starts.close)
-            log.info("closed %s", opened.label)
+        """Close the line that is shown, if there is one; another open one is shown then."""
+        if (shown := self._shown()) is not None:
+            await self._close(shown)
+
+    async def disconnect_all(self) -> None:
+        """Close every line."""
+        for one in self.panel_lines:
+            await self._close(one)
+
+    async def _close(self, one: PanelLine) -> None:
+        self.panel_lines = tuple(other for other in self.panel_lines if other is not one)
+        if self.opened is one.opened:
+            self.show_line(self.panel_lines[-1] if self.panel_lines else None)
+        one.fleet.forget()
+        await asyncio.to_thread(one.opened.close)
+        if one.fleet.starts is not None:
+            await asyncio.to_thread(one.fleet.starts.close)
+        log.info("closed %s", one.opened.label)
 
 
 def _remember(text: str) -> None:

@@ -12,7 +12,6 @@ from .frame_source import FrameSource
 
 if TYPE_CHECKING:
     from tui.session.command.stop_report import StopReport
-    from tui.session.fleet import Fleet
 
 FRAME_LOOK = 0.25
 """Seconds between two looks at what stands around every screen."""
@@ -38,10 +37,10 @@ class Lookout(Panel):
         """What must be seen on every screen: the frame, a new fault, a stop that failed."""
         if not self.is_running:
             return  # the panel ends: its screens are gone before its timers
-        if self.fleet is not None:
-            if self.fleet.alarms.take(self.fleet.line_watch.states) and self.bell_rings:
-                self.bell()
-            self._cry_for_stops(self.fleet)
+        new = [fleet.alarms.take(fleet.line_watch.states) for fleet in self.fleets]
+        if any(new) and self.bell_rings:
+            self.bell()
+        self._cry_for_stops()
         trouble = self.journal_trouble
         if trouble and trouble != self._journal_trouble:
             self.notify(trouble, severity="error")
@@ -65,9 +64,14 @@ class Lookout(Panel):
         self._drawn, self._drawn_at = drawn, now
         self.screen.draw_frame(view)
 
-    def _cry_for_stops(self, fleet: Fleet) -> None:
+    def _cry_for_stops(self) -> None:
         """Say over everything, once, that a motor does not stop."""
-        for report in fleet.stopper.reports.values():
-            if report.phase.value == "failed" and report not in self._cried:
-                self.cry(f"Device {report.device}: {report.text}")
-        self._cried = [r for r in fleet.stopper.reports.values() if r.phase.value == "failed"]
+        failed = []
+        for one in self.panel_lines:
+            line = f"{one.opened.label}: " if len(self.panel_lines) > 1 else ""
+            for report in one.fleet.stopper.reports.values():
+                if report.phase.value == "failed":
+                    failed.append(report)
+                    if report not in self._cried:
+                        self.cry(f"{line}Device {report.device}: {report.text}")
+        self._cried = failed

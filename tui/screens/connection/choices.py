@@ -5,7 +5,9 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Literal
 
+from rich.style import Style
 from rich.text import Text
 
 from tui.bus.errors import LinkSyntaxError
@@ -14,7 +16,7 @@ from tui.drive.profile.library import demo_drives
 from tui.session.connect.named_lines import LineSettings, line_named
 from tui.session.connect.open_line import check_line
 from tui.widgets.drawing import short
-from tui.widgets.palette import FAINT, PLAIN, RUNNING, STRONG
+from tui.widgets.palette import FAINT, FAULT, PLAIN, RUNNING, STRONG
 
 _LASTING = re.compile(r"(?:serial:)?/dev/serial/by-(?:id|path)/(?:usb-)?")
 COUNTED = ("no", "one", "two", "three", "four", "five", "six", "seven", "eight", "nine", "ten")
@@ -57,6 +59,16 @@ class LineChoice:
     """How the settings file calls it."""
     device: int | None = None
     """The drive that is meant by the name."""
+
+
+LineMark = Literal["", "open", "shown", "fault"]
+LINE_MARKS: dict[LineMark, tuple[str, Style]] = {
+    "": ("  ", PLAIN),
+    "open": ("● ", PLAIN),
+    "shown": ("● ", RUNNING),
+    "fault": ("■ ", FAULT),
+}
+"""What stands before a line: open, shown, open below with a drive in fault."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -153,9 +165,11 @@ def line_in(text: str, width: int) -> str:
     return short(rest, width) if len(rest) <= width else f"…{plain(rest)[1 - width :]}"
 
 
-def choice_line(choice: LineChoice, width: int, *, here: bool = False) -> Text:
+def choice_line(choice: LineChoice, width: int, mark: LineMark = "") -> Text:
     """A line that can be opened, with as much of its description as there is room for."""
-    text = Text("● " if here else "  ", RUNNING if here else PLAIN)
+    here = bool(mark)
+    sign, style = LINE_MARKS[mark]
+    text = Text(sign, style)
     text.append(line_in(choice.name or choice.text, width - 2), STRONG if here else PLAIN)
     room = width - text.cell_len - 2
     if choice.description and room >= 6:

@@ -12,6 +12,7 @@ from tui.bus.errors import LineError, LinkSyntaxError
 from tui.drive.errors import DriveError
 from tui.session.connect.named_lines import line_named
 
+from ..open_lines import PanelLine
 from ..opening import leave_opening
 from .choices import LineChoice, fault_of_line, line_forms, same_line
 from .line_form import ADDRESSES
@@ -27,7 +28,7 @@ class LineKeys(Scanning):
     def action_refresh_lines(self) -> None:
         """Look for serial ports and recent lines."""
         self.lines.look_for_lines()
-        self.lines.fill(self.app.line_text)
+        self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
 
     def line_of(self, choice: LineChoice) -> str:
         """The line of a choice, with the settings of the form where it is a port."""
@@ -56,21 +57,51 @@ class LineKeys(Scanning):
         """
         if self._opening and same_line(text, self._opening):
             return
-        always = ""
-        if self._is_good():
-            if same_line(text, self.app.line_text):
-                self._tell_open()
-                return
-            always = f"{self._what_is_here()} It is closed, and {text} is opened."
+        here = self.app.open_line_of(text)
+        if here is not None and same_line(text, here.opened.text):
+            self._show(here, device)
+            return
+        if here is not None:
+            self.app.show_line(here)  # with other settings: it is closed for them
+            self.look()
+        if here is None and self.found:
+            self._open_beside(text, device)  # a line with drives goes on below
+            return
+        always = f"{self._what_is_here()} It is closed, and {text} is opened." if here else ""
         question = "Close the line for another?"
         if await self.app.may_let_go(question, yes="closes it", no="keeps it", always=always):
             self._open_in_its_place(text, device)
 
+    def _show(self, here: PanelLine, device: int | None) -> None:
+        """Show a line that is open, and look for its drives again where it was shown already."""
+        if here.opened is self.app.opened:
+            if self._is_good():
+                self._tell_open()
+            else:
+                self._open_in_its_place(here.opened.text, device)
+            return
+        self.end_search()
+        self.app.show_line(here)
+        self.say(f"{here.opened.label} is shown.", "The other lines go on below.")
+        self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
+        self.look()
+
+    @work(exclusive=True, group="line", exit_on_error=False)
+    async def _open_beside(self, text: str, device: int | None) -> None:
+        """Open one more line; those that are open go on below."""
+        self.end_search()
+        self.warned.clear()
+        if await self._opens(text):
+            self._search_for(device)
+
     @work(exclusive=True, group="line", exit_on_error=False)
     async def _open_in_its_place(self, text: str, device: int | None) -> None:
         self.forget_drives()
-        if not await self._opens(text):
-            return
+        if await self._opens(text):
+            self._search_for(device)
+
+    def _search_for(self, device: int | None) -> None:
+        """Search the line that was opened for its drives, or for one."""
         if device is None:
             self.action_scan()
         else:
@@ -168,7 +199,9 @@ class LineKeys(Scanning):
             return
         self.forget_drives()
         await self.app.disconnect()
-        self.say("The line is closed.", "Choose a line and press Enter.")
-        self.lines.fill("")
+        others = self.app.line_label
+        next_step = f"{others} is shown now." if others else "Choose a line and press Enter."
+        self.say("The line is closed.", next_step)
+        self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
         self.look()
         self.lines.focus()

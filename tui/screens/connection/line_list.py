@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.text import Text
 from textual.widgets import OptionList
 from textual.widgets.option_list import Option
@@ -12,7 +14,7 @@ from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT
 from tui.widgets.plain import entry
 
-from .choices import Group, LineChoice, choice_line, groups
+from .choices import Group, LineChoice, LineMark, choice_line, groups
 
 
 class LineList(OptionList):
@@ -22,9 +24,15 @@ class LineList(OptionList):
         super().__init__(id=id, compact=True)
         self._groups: list[Group] = []
         self._choices: dict[str, LineChoice] = {}
-        self._shown: tuple[int, list[Group], str] | None = None
+        self._shown: tuple[int, list[Group], tuple[str, frozenset[str], frozenset[str]]] | None = (
+            None
+        )
         self._here = ""
-        """The key of the line that is open."""
+        """The key of the line that is shown."""
+        self._open: frozenset[str] = frozenset()
+        """Those of all lines that are open."""
+        self._faulty: frozenset[str] = frozenset()
+        """Those of the open lines with a drive in fault."""
         self._named = ""
         """A line that somebody has named: it may be none of those used lately."""
 
@@ -66,16 +74,18 @@ class LineList(OptionList):
         self.look_for_lines()
         self._fill()
 
-    def fill(self, opened: str) -> None:
-        """Show what was found, and which line is open; the cursor stays on its line."""
-        self._here = _key(opened) if opened else ""
+    def fill(self, shown: str, opened: Sequence[str], faulty: Sequence[str] = ()) -> None:
+        """Show what was found; which lines are open, shown, in fault. The cursor stays."""
+        self._faulty = frozenset(_key(text) for text in faulty)
+        self._here = _key(shown) if shown else ""
+        self._open = frozenset(_key(text) for text in opened if text)
         self._fill()
 
     def _fill(self) -> None:
         width = max(12, self.size.width - 1)
-        if self._shown == (width, self._groups, self._here):
+        if self._shown == (width, self._groups, (self._here, self._open, self._faulty)):
             return
-        self._shown = (width, self._groups, self._here)
+        self._shown = (width, self._groups, (self._here, self._open, self._faulty))
         at = self.highlighted
         chosen = None if at is None else self.get_option_at_index(at).id
         self._choices.clear()
@@ -92,11 +102,18 @@ class LineList(OptionList):
         for choice in group.choices:
             key = f"{group.title} {choice.name} {choice.text}"
             self._choices[key] = choice
-            here = bool(self._here) and _key(choice.text) == self._here
-            found.append(entry(choice_line(choice, width, here=here), id=key))
+            line = _key(choice.text) if self._open else ""
+            found.append(entry(choice_line(choice, width, self._mark(line)), id=key))
         if group.empty and (not group.choices or group.title == "Named"):
             found.append(entry(Text(short(f"  {group.empty}", width), FAINT), disabled=True))
         return found
+
+    def _mark(self, line: str) -> LineMark:
+        if line not in self._open:
+            return ""
+        if line == self._here:
+            return "shown"
+        return "fault" if line in self._faulty else "open"
 
 
 def _key(text: str) -> str:

@@ -137,7 +137,7 @@ class LineView(PanelScreen):
         self.call_after_refresh(self._redraw)
 
     def _redraw(self) -> None:
-        self.lines.fill(self.app.line_text)
+        self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
         self.show_drives()
         self.show_heads()
 
@@ -145,6 +145,8 @@ class LineView(PanelScreen):
         """The drives as they are now, the state of the line, how far the search is."""
         super().draw(width)
         self._follow_line()
+        if len(self.app.panel_lines) > 1:
+            self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
         self.show_drives()
         self.show_heads()
         if self.app.fleet is not None and not (self.search and self.search.goes_on):

@@ -1,0 +1,128 @@
+"""Several lines in one panel: one is shown, the drives of all are looked after and stopped."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+from tui.app import DrivePanelApp
+from tui.screens.dialogs.confirm import Confirm
+from tui.session.connect.open_line import OpenLine, demo_line
+
+from .test_frame import Panel
+from .test_frame import no_ports as no_ports  # the fixture is for these tests too
+
+FIRST, SECOND = "sim:atv71@1", "sim:atv312@1"
+
+
+@asynccontextmanager
+async def two_lines() -> AsyncIterator[Panel]:
+    """The panel with a running drive on each of two lines, the second of them shown."""
+
+    def opener(text: str, **_: object) -> OpenLine:
+        opened = demo_line({"atv71": 30.0} if text == FIRST else {"atv312": 20.0})
+        opened.text = text
+        return opened
+
+    app = DrivePanelApp(open_line=opener, start=FIRST)
+    async with app.run_test(size=(120, 40)) as pilot:
+        made = Panel(app, pilot)
+        await made.until(lambda: app.fleet is not None and len(app.fleet.sessions) == 1)
+        app.connection.open_line(SECOND)
+        await made.until(lambda: len(app.panel_lines) == 2)
+        await made.until(lambda: app.fleet is not None and len(app.fleet.sessions) == 1)
+        yield made
+
+
+def turning(made: Panel) -> list[bool]:
+    """Whether the motor of each line turns, by the simulated drives themselves."""
+    found = []
+    for one in made.app.panel_lines:
+        assert one.opened.simulation is not None
+        found.append(one.opened.simulation.drive(1).motor.frequency > 0)
+    return found
+
+
+async def test_another_line_opens_beside_and_both_are_marked_and_can_be_shown() -> None:
+    async with two_lines() as made:
+        app = made.app
+        first, second = app.panel_lines
+        assert app.opened is second.opened
+        assert app.screen is app.connection  # nothing was asked: nothing is closed
+        assert first.opened.line.state.status.value == "connected"
+        await made.until(lambda: "1 of 2 lines" in made.shown("strip"))
+        app.connection.open_line(FIRST)
+        await made.until(lambda: app.opened is first.opened)
+        await made.until(lambda: app.connection.drives.option_count == 1)
+        assert len(app.panel_lines) == 2
+        await made.until(
+            lambda: "ATV71" in str(app.connection.drives.get_option_at_index(0).prompt)
+        )
+
+
+async def test_a_fault_of_a_line_that_is_not_shown_counts_and_is_told_with_its_line() -> None:
+    async with two_lines() as made:
+        simulation = made.app.panel_lines[0].opened.simulation
+        assert simulation is not None
+        simulation.drive(1).provoke("ObF")
+        await made.until(lambda: "1 fault" in made.shown("strip"))
+        label = made.app.panel_lines[0].opened.label
+        await made.until(
+            lambda: any(
+                one.text.startswith(label) and "ObF" in one.text for one in made.app.events.events
+            )
+        )
+
+
+async def test_stop_all_stops_the_motors_of_every_line() -> None:
+    async with two_lines() as made:
+        await made.until(lambda: turning(made) == [True, True])
+        await made.pilot.press("f9")
+        await made.until(lambda: turning(made) == [False, False])
+
+
+async def test_a_stop_on_line_stops_the_motors_of_every_line() -> None:
+    async with two_lines() as made:
+        await made.until(lambda: turning(made) == [True, True])
+        assert made.app.stops_whom == "STOP ALL"
+        await made.pilot.press("space")
+        await made.until(lambda: turning(made) == [False, False])
+
+
+async def test_closing_one_shows_the_other_and_leaves_it_alone() -> None:
+    async with two_lines() as made:
+        app = made.app
+        first, second = app.panel_lines
+        await app.disconnect()
+        assert app.panel_lines == (first,)
+        assert app.opened is first.opened
+        assert second.opened.line.state.status.value == "closed"
+        assert first.opened.line.state.status.value == "connected"
+        assert turning(made) == [True]
+
+
+async def test_leaving_tells_of_the_drives_of_both() -> None:
+    async with two_lines() as made:
+        app = made.app
+        for one in app.panel_lines:
+            await made.until(lambda one=one: not one.fleet.line_watch.unread())  # type: ignore[misc]
+        for one in app.panel_lines:
+            one.fleet.sessions[0].note_command()
+        await made.pilot.press("q")
+        await made.until(lambda: app.screen is not app.connection)
+        said = "\n".join(str(one.render()) for one in app.screen.query("#follows"))
+        for one in app.panel_lines:
+            assert one.opened.label in said
+        assert "Altivar 71" in said
+        assert "Altivar 312" in said
+
+
+async def test_the_same_line_with_other_settings_is_closed_only_after_asking() -> None:
+    async with two_lines() as made:
+        app = made.app
+        app.panel_lines[0].opened.text = "serial:/dev/ttyUSB7,19200,8N1"
+        app.connection.open_line("serial:/dev/ttyUSB7,9600,8N1")
+        await made.until(lambda: isinstance(app.screen, Confirm))
+        await made.pilot.press("escape")
+        await made.until(lambda: app.screen is app.connection)
+        assert len(app.panel_lines) == 2
