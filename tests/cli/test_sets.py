@@ -234,7 +234,7 @@ WRITES_REFUSED_HERE = [
     (("ACC=100000", "--arm"), "out of range"),
     (("ACC=soon", "--arm"), "'soon'"),
     (("RFR=5", "--arm"), "only be read"),
-    (("CMD=6", "--arm"), "order"),
+    (("CMD=6", "--arm"), "is a command"),
     (("LSP=60", "HSP=40", "--arm"), "above HSP"),
     (("BIR=1", "--arm"), "unverified"),
     (("FRY=1", "--arm"), "not written from here"),
