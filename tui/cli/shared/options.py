@@ -28,7 +28,7 @@ CONNECT_WITHIN = 5.0
 line_argument = takes_line
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
-read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
+read_only_option = click.option("--read-only", is_flag=True, help="Write nothing on this line.")
 
 profile_option = click.option(
     "-p",
@@ -36,14 +36,14 @@ profile_option = click.option(
     "profile_id",
     metavar="ID",
     shell_complete=complete_profile,
-    help="Profile of the drive; it has to fit what the drive says of itself.",
+    help="Profile of the drive; it must match the drive's identification.",
 )
 rated_current_option = click.option(
     "--rated-current",
     "rated_current",
     type=float,
     metavar="A",
-    help="Rated current of the drive in A, for families that give currents in %.",
+    help="Rated current of the drive in A, for families that tell currents in %.",
 )
 
 
@@ -71,7 +71,7 @@ force_profile_option = click.option(
     FORCE_PROFILE,
     "force_profile",
     is_flag=True,
-    help="Go by the profile of -p though the drive says it is another.",
+    help="Use the profile of -p although the drive identifies as another.",
 )
 """For commands that read, watch or write; it reaches them in their Target."""
 
