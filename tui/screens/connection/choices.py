@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from rich.text import Text
 
@@ -42,8 +42,7 @@ def simulated_lines() -> tuple[tuple[str, str], ...]:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class LineChoice:
+class LineChoice(NamedTuple):
     """A line that can be opened; `path` where it is a serial port with settings of its own."""
 
     text: str
@@ -51,8 +50,7 @@ class LineChoice:
     path: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class Group(NamedTuple):
     """Choices under one heading."""
 
     title: str
