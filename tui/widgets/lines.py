@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rich.style import Style
 from rich.text import Text
@@ -19,8 +19,16 @@ class Lines(Widget):
 
     DEFAULT_CSS = "Lines { height: auto; width: 1fr; }"
 
-    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        id: str | None = None,
+        classes: str | None = None,
+        fit: Callable[[int], Sequence[Text]] | None = None,
+    ) -> None:
+        """With `fit` the first lines are made for the width that the place turns out to have."""
         super().__init__(id=id, classes=classes)
+        self._fit = fit
         self._lines: list[Text] = []
         self._strips: dict[int, Strip] = {}
         self.redrawn = 0
@@ -33,7 +41,7 @@ class Lines(Widget):
 
     def show(self, lines: Sequence[Text]) -> None:
         """Show these lines; only those that differ from the ones before are drawn."""
-        old = self._lines
+        old, self._fit = self._lines, None
         self._lines = list(lines)
         changed = [
             y
@@ -57,7 +65,13 @@ class Lines(Widget):
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
         """One row a line."""
+        self._fill(width)
         return len(self._lines)
+
+    def _fill(self, width: int) -> None:
+        """Make the first lines, now that there is a width for them."""
+        if self._fit is not None and width:
+            self._lines = list(self._fit(width))
 
     def notify_style_update(self) -> None:
         """Draw anew when colours change."""
@@ -69,6 +83,8 @@ class Lines(Widget):
         width = self.size.width
         strip = self._strips.get(y)
         if strip is None or strip.cell_length != width:
+            if y == 0:
+                self._fill(width)
             strip = self._draw(y, width)
             self._strips[y] = strip
         return strip
