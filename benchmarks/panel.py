@@ -59,13 +59,16 @@ LOW_SECONDS = 6.0
 
 
 def word_sign(text: str) -> tuple[object, ...]:
-    """The word of bits that Monitor shows first: its title and the names of its bits."""
+    """The word of bits that Monitor shows first: its title and the names of its bits.
+
+    Where the trend stands in its place, that.
+    """
     rows = text.split("\n")
     for y, row in enumerate(rows):
         if title := re.match(r" ?([A-Z]\w+(?: .*)?) ─+ 16#", row):
             bits = takewhile(re.compile(r" +\d+ [●·] ").match, rows[y + 1 :])
             return title[1], *(row[5:13].strip() for row in bits)
-    return ()
+    return ("trend",) if any(re.match(r" +-\d+ (s|min) +now\b", row) for row in rows) else ()
 
 
 def saying(*words: str) -> Callable[[str], tuple[object, ...]]:
