@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 from tui.terminal.loop import soon_in_loop
 
 from .app_port import Panel
-from .dialogs.confirm import Confirm
-from .dialogs.leave import Leave, LeaveChoice
-from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.monitor.timeout import TimeoutWatch
+
+    from .dialogs.confirm import Confirm
+    from .dialogs.leave import LeaveChoice
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
@@ -32,6 +32,9 @@ class Leaving(Panel):
 
     async def action_quit(self) -> None:
         """Leave; where a motor runs by a command from here, or a drive trips, not unasked."""
+        from .dialogs.leave import Leave
+        from .dialogs.now import MotorsNow
+
         if any(isinstance(screen, Leave) for screen in self.screen_stack):
             return
         if running := self._motors():
@@ -151,6 +154,9 @@ class Leaving(Panel):
 
     def _question(self, question: str, *, yes: str, no: str, always: str = "") -> Confirm | None:
         """What to ask before the drives are left alone; None where nothing is to be said."""
+        from .dialogs.confirm import Confirm
+        from .dialogs.now import MotorsNow
+
         running = self._motors()
         told = [*self._tripping(running), *self._unfinished()]
         if running:

@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
@@ -47,8 +46,7 @@ rated_current_option = click.option(
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """What the shared options name."""
 
     line_text: str
@@ -63,7 +61,7 @@ class Target:
     def each(self) -> list[Target]:
         """A target for each drive, in the order in which they were named."""
         devices = dict.fromkeys((self.device, *self.others))
-        return [replace(self, device=device, others=()) for device in devices]
+        return [self._replace(device=device, others=()) for device in devices]
 
 
 FORCE_PROFILE = "--force-profile"
@@ -106,7 +104,7 @@ def _target_of(*options: Option) -> Option:
         ) -> Any:
             first, *more = device if isinstance(device, tuple) else (device,)
             target = Target(line_text, first, profile_id, rated_current, force_profile)
-            return command(target=replace(target, others=tuple(more)), **others)
+            return command(target=target._replace(others=tuple(more)), **others)
 
         decorated: CommandFunction = handed_over
         for option in reversed(options):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
+from typing import NamedTuple
 
 from rich.text import Text
 
@@ -46,8 +46,7 @@ def simulated_lines() -> tuple[tuple[str, str], ...]:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class LineChoice:
+class LineChoice(NamedTuple):
     """A line that can be opened; `path` where it is a serial port with settings of its own."""
 
     text: str
@@ -59,8 +58,7 @@ class LineChoice:
     """The drive that is meant by the name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class Group(NamedTuple):
     """Choices under one heading."""
 
     title: str

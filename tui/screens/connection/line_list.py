@@ -18,6 +18,11 @@ from .choices import Group, LineChoice, choice_line, groups
 class LineList(OptionList):
     """Lines under headings; drawn anew only when they or its width have changed."""
 
+    def update_node_styles(self, animate: bool = True) -> None:
+        """Nothing is styled before it stands on a screen: then it is, as a whole."""
+        if self.is_attached:
+            super().update_node_styles(animate)
+
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True)
         self._groups: list[Group] = []
@@ -72,7 +77,7 @@ class LineList(OptionList):
         self._fill()
 
     def _fill(self) -> None:
-        width = max(12, self.size.width - 1)
+        width = max(12, (self.size.width or list_width(self.app.size.width)) - 1)
         if self._shown == (width, self._groups, self._here):
             return
         self._shown = (width, self._groups, self._here)
@@ -97,6 +102,11 @@ class LineList(OptionList):
         if group.empty and (not group.choices or group.title == "Named"):
             found.append(entry(Text(short(f"  {group.empty}", width), FAINT), disabled=True))
         return found
+
+
+def list_width(width: int) -> int:
+    """The width that the styles give the list on a terminal of so many columns."""
+    return max(22, min(32, width * 32 // 100))
 
 
 def _key(text: str) -> str:
