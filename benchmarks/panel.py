@@ -30,7 +30,7 @@ from rich.table import Table
 from benchmarks.hello import TEXTS
 from benchmarks.terminal import Figures, Key, Terminal, press_often, spread, steady
 from benchmarks.wire import ROOT
-from tui.cli.commands.panel import run_panel
+from tui.cli.opening import open_panel
 from tui.terminal.dialects import APART
 
 SIZES = ((80, 24), (120, 40))
@@ -46,7 +46,7 @@ FIRST_WORDS = (
     "Lines ─",
     "Simulated",
     "No line ─",
-    "Choose a line",
+    "hoose a line and press",
     "? help",
 )
 """What the first full picture of the panel says, from its first row to its last one."""
@@ -59,13 +59,16 @@ LOW_SECONDS = 6.0
 
 
 def word_sign(text: str) -> tuple[object, ...]:
-    """The word of bits that Monitor shows first: its title and the names of its bits."""
+    """The word of bits that Monitor shows first: its title and the names of its bits.
+
+    Where the trend stands in its place, that.
+    """
     rows = text.split("\n")
     for y, row in enumerate(rows):
         if title := re.match(r" ?([A-Z]\w+(?: .*)?) ─+ 16#", row):
             bits = takewhile(re.compile(r" +\d+ [●·] ").match, rows[y + 1 :])
             return title[1], *(row[5:13].strip() for row in bits)
-    return ()
+    return ("trend",) if any(re.match(r" +-\d+ (s|min) +now\b", row) for row in rows) else ()
 
 
 def saying(*words: str) -> Callable[[str], tuple[object, ...]]:
@@ -175,7 +178,7 @@ def faster(terminal: Terminal) -> None:
 
 def low_bandwidth(bench: Bench, size: tuple[int, int]) -> Figures | None:
     """The panel in its low-bandwidth mode; None where it has no such mode."""
-    if "low_bandwidth" not in inspect.signature(run_panel).parameters:
+    if "low_bandwidth" not in inspect.signature(open_panel).parameters:
         return None
     with bench.watch(size, "--low-bandwidth") as terminal:
         terminal.see("FORWARD")
@@ -185,7 +188,7 @@ def low_bandwidth(bench: Bench, size: tuple[int, int]) -> Figures | None:
 
 def low_screens(bench: Bench, size: tuple[int, int]) -> Figures | None:
     """Bytes a second of every screen in the low-bandwidth mode; None where it has no such mode."""
-    if "low_bandwidth" not in inspect.signature(run_panel).parameters:
+    if "low_bandwidth" not in inspect.signature(open_panel).parameters:
         return None
     found: Figures = {}
     with bench.watch(size, "--low-bandwidth") as terminal:

@@ -18,6 +18,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from itertools import zip_longest
 from pathlib import Path
 from queue import Empty, Queue
 from statistics import median
@@ -275,11 +276,11 @@ class Key:
     signs: Callable[[str], tuple[object, ...]]
 
     def changed(self, before: tuple[object, ...], text: str) -> bool:
-        """Whether every sign is another one than before; empty ones count for nothing."""
+        """Whether every sign is another one than before, or gone; empty ones count for nothing."""
         now = self.signs(text)
-        if not before or len(now) != len(before):
+        if not before or not now:
             return False
-        return all(b != a for a, b in zip(before, now, strict=True) if a != "")
+        return all(b != a for a, b in zip_longest(before, now[: len(before)]) if a != "")
 
 
 def steady(

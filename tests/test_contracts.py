@@ -81,11 +81,11 @@ def test_a_command_imports_what_it_needs_and_no_more(
 def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> None:
     start = (
         "import asyncio, gc, sys\n"
-        "from tui.cli.commands import panel\n"
+        "from tui.cli import opening\n"
         "from tui.app import DrivePanelApp\n"
         "async def first_picture():\n"
         "    gc.disable()\n"
-        "    app = DrivePanelApp(on_shown=panel._collect_garbage)\n"
+        "    app = DrivePanelApp(on_shown=opening.collect_garbage)\n"
         "    async with app.run_test() as pilot:\n"
         "        await pilot.pause()\n"
         "        assert app.connection.query_one('#lines').option_count\n"
@@ -93,12 +93,20 @@ def test_the_panel_shows_itself_before_it_imports_what_a_line_is_made_of() -> No
         "        await pilot.press('space', 'f12', 'f9')\n"  # the stop keys work all the same
         "asyncio.run(first_picture())\n"
         "print(*sys.modules)\n"
+        "ours = [m for n, m in list(sys.modules.items()) if n.startswith('tui.')]\n"
+        "slow = {n for m in ours for n, one in vars(m).items() if isinstance(one, type)"
+        " and one.__module__ == m.__name__ and '__dataclass_fields__' in vars(one)}\n"
+        "print('data classes:', *slow)\n"
     )
     done = run(sys.executable, "-c", start)
     assert done.returncode == 0, done.stderr
-    loaded = set(done.stdout.split())
+    modules, _, data_classes = done.stdout.partition("data classes:")
+    loaded = set(modules.split())
     assert "tui.screens.connection.screen" in loaded
-    assert not loaded & {"pymodbus", "msgspec", "tui.bus.line", "tui.simulator"}
+    assert not loaded & {"pymodbus", "msgspec", "tui.bus.line", "tui.bus.link", "tui.simulator"}
+    assert not loaded & {"click", "tui.screens.dialogs.question"}
+    # to make one takes ten times as long as a named tuple
+    assert set(data_classes.split()) <= {"OpenLine"}
     assert not loaded & {
         "tui.session.monitor.monitor",
         "tui.screens.monitor.screen",

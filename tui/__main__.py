@@ -2,9 +2,20 @@
 
 from __future__ import annotations
 
+import os
+import sys
+
+ASKING = ("_DRIVEPANEL_COMPLETE", "DRIVEPANEL_LINE")
+"""Set where a shell asks what may follow, and where a LINE is meant though none is typed."""
+
 
 def main() -> None:
-    """Run the command line."""
+    """Run the command line, or the panel where there is none."""
+    if len(sys.argv) == 1 and not any(os.environ.get(name) for name in ASKING):
+        from tui.cli.alone import alone
+
+        alone()
+        return
     from tui.cli.main import main as command
 
     command(prog_name="drivepanel")

@@ -8,7 +8,9 @@ from collections.abc import Callable
 from typing import ClassVar
 
 from textual.driver import Driver
+from textual.reactive import Reactive
 from textual.screen import Screen
+from textual.theme import Theme
 
 from tui.drive.plain import plain
 from tui.screens.connection.screen import ConnectionScreen
@@ -43,6 +45,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
 
     TITLE = "Drive Panel"
     BINDINGS: ClassVar = bindings(None)
+    theme: Reactive[str] = Reactive(THEME.name)  # from the start: another one styles all anew
     ENABLE_COMMAND_PALETTE = False  # Textual's own: its key stands in the table of actions
 
     def __init__(
@@ -62,8 +65,6 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
     ) -> None:
         super().__init__()
         self.fit_terminal(abilities, slow=low_bandwidth)
-        self.register_theme(THEME)
-        self.theme = THEME.name
         self.clock = clock or Clock()
         self.read_only = read_only
         self.low_bandwidth = low_bandwidth
@@ -79,6 +80,10 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         self._on_shown = on_shown
         self.settled = leave_running
         """Whether it was decided what becomes of motors that run by an order from here."""
+
+    def get_theme(self, theme_name: str) -> Theme | None:
+        """The panel's theme, or one of Textual's own."""
+        return THEME if theme_name == THEME.name else super().get_theme(theme_name)
 
     def get_driver_class(self) -> type[Driver]:
         """The driver of this platform, with the stop keys before everything else."""
@@ -100,9 +105,13 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
             self.pop_screen()
         self.connection.start(line, device)
 
+    def get_default_screen(self) -> Screen[None]:
+        """Line, at the bottom of all."""
+        self.take_styles(self.connection)
+        return self.connection
+
     def on_mount(self) -> None:
-        """Show Connection, and open the line that was named."""
-        self.push_screen(self.connection)
+        """Open the line that was named."""
         first: Screen[None] = self.connection
         if self._start is not None and self._device is not None:
             from tui.screens.opening import OpeningScreen
@@ -113,9 +122,9 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         if self._on_shown is not None:
             first.call_after_refresh(self._on_shown)
         if self._start is None:
-            self.call_after_refresh(self.try_f12)
+            first.call_after_refresh(self.try_f12)
         else:
-            self.call_after_refresh(self.connection.start, self._start, self._device)
+            first.call_after_refresh(self.connection.start, self._start, self._device)
 
     async def on_unmount(self) -> None:
         """Leave no line open."""

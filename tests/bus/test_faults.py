@@ -280,6 +280,20 @@ async def test_damaged_reply_is_known_as_soon_as_the_line_is_silent(
         assert line.counters.timeouts == 0
 
 
+async def test_the_silence_that_ends_a_reply_counts_from_its_last_piece(
+    open_line: OpenLine,
+) -> None:
+    def in_pieces(request: bytes, _: int) -> Sequence[Step]:
+        whole = reply(request)
+        return [whole[:2], 0.3, whole[2:4], 0.3, whole[4:6], 0.3, whole[6:8], 0.3, whole[8:]]
+
+    timing = Timing(first_timeout=30.0, min_timeout=30.0, retries=0, frame_gap=1.0)
+    with PtyPeer(in_pieces) as peer:
+        line = open_line(peer.path, timing)
+        assert (await line.read(1, 5, 3, priority=OPERATOR)).words == (5, 6, 7)
+        assert line.counters.requests == 1
+
+
 @pytest.mark.parametrize("priority", [Priority.BACKGROUND, Priority.PATIENT])
 async def test_an_empty_address_that_was_searched_is_no_failure(
     priority: Priority, open_line: OpenLine

@@ -7,7 +7,10 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from tui.__main__ import main as run
+from tui.bus.errors import PortBusy
 from tui.cli.main import main
+from tui.cli.shared.errors import LINE_TROUBLE, USAGE
 from tui.session.connect.open_line import open_line
 
 
@@ -28,7 +31,7 @@ class FakePanel:
 @pytest.fixture
 def panel(monkeypatch: pytest.MonkeyPatch) -> type[FakePanel]:
     """A panel that is not drawn, on a terminal that is none."""
-    monkeypatch.setattr("tui.cli.commands.panel._terminal_trouble", str)
+    monkeypatch.setattr("tui.cli.commands.panel.terminal_trouble", str)
     monkeypatch.setattr("tui.app.DrivePanelApp", FakePanel)
     monkeypatch.setattr(FakePanel, "ends_with", 0)
     return FakePanel
@@ -58,6 +61,43 @@ def test_the_panel_opens_on_what_was_typed(
     given = panel.given
     assert (given["start"], given["device"], given["read_only"]) == (start, device, read_only)
     assert given["open_line"] is open_line
+
+
+def test_without_arguments_nothing_is_taken_apart(
+    panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.cli.alone.terminal_trouble", str)
+    monkeypatch.setattr("sys.argv", ["drivepanel"])
+    monkeypatch.setattr(panel, "ends_with", 1)
+    with pytest.raises(SystemExit) as ended:
+        run()
+    assert ended.value.code == 1
+    assert (panel.given["start"], panel.given["device"]) == (None, None)
+
+
+def test_without_arguments_an_error_is_told_as_by_every_command(
+    panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def fail(panel: FakePanel) -> None:
+        raise PortBusy("/dev/ttyUSB0")
+
+    monkeypatch.setattr("tui.cli.alone.terminal_trouble", str)
+    monkeypatch.setattr("sys.argv", ["drivepanel"])
+    monkeypatch.setattr(panel, "run", fail)
+    with pytest.raises(SystemExit) as ended:
+        run()
+    assert ended.value.code == LINE_TROUBLE
+    assert capsys.readouterr().err.startswith("drivepanel: /dev/ttyUSB0 is in use")
+
+
+def test_without_arguments_and_without_a_terminal_it_says_so(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.argv", ["drivepanel"])
+    with pytest.raises(SystemExit) as ended:
+        run()
+    assert ended.value.code == USAGE
+    assert "needs a terminal" in capsys.readouterr().err
 
 
 def test_the_demo_opens_a_line_of_its_own(panel: type[FakePanel]) -> None:

@@ -252,4 +252,4 @@ async def test_every_screen_of_a_drive_is_one_key_away_from_every_other() -> Non
             await made.pilot.press(key)
             await until(made.pilot, lambda key=key: isinstance(made.app.screen, places[key]))  # type: ignore[misc]
             assert made.app.screen is not screen
-            assert len(made.app.screen_stack) <= 4
+            assert len(made.app.screen_stack) <= 3

@@ -26,7 +26,7 @@ from tui.terminal.lean import Picture, strips_of
 from tui.terminal.lean_app import LeanApp
 from tui.terminal.pacing import ASK, WHOLE
 from tui.terminal.sgr import of_blank
-from tui.widgets.lines import Lines, cells, runs
+from tui.widgets.lines import Lines, looks, runs
 
 from .bytes_per_second import compare
 
@@ -219,7 +219,7 @@ def test_runs_are_where_two_lines_differ_and_no_more_than_a_move_beyond(
 ) -> None:
     before, after = (strip_of(text) for text in (one, other))
     found = runs(before, after)
-    old, new = cells(before), cells(after)
+    old, new = (list(zip(*looks(one), strict=True)) for one in (before, after))
     inside = {x for first, end in found for x in range(first, end)}
     assert {x for x in range(COLUMNS) if old[x] != new[x]} <= inside
     for first, end in found:

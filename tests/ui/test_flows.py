@@ -7,6 +7,7 @@ import time
 from collections.abc import Callable
 
 import pytest
+from rich.text import Text
 from textual.pilot import Pilot
 from textual.screen import ModalScreen
 from textual.widgets import OptionList
@@ -238,6 +239,23 @@ async def test_only_changed_lines_are_drawn() -> None:
         screen.look()
         screen.look()
         assert word.redrawn == before
+
+
+@pytest.mark.parametrize(("size", "place"), [((80, 24), "trend"), ((120, 40), "word0")])
+async def test_another_word_of_bits_draws_that_alone(size: tuple[int, int], place: str) -> None:
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=size) as pilot:
+        screen = await to_monitor(app, pilot, 2)
+        await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
+        for one in ("_timer", "_still"):
+            if timer := getattr(screen, one):
+                timer.pause()
+        words, motor = screen.query_one(f"#{place}", Lines), screen.query_one("#motor", Lines)
+        before = words.lines
+        motor.show([Text("as it was")])
+        screen.action_next_word()
+        assert words.lines != before
+        assert [line.plain for line in motor.lines] == ["as it was"]
 
 
 async def test_nothing_is_drawn_below_the_help_and_it_is_told_that_values_stand_still(

@@ -6,7 +6,6 @@ import itertools
 import time
 from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager
-from dataclasses import replace
 
 import pytest
 from textual.pilot import Pilot
@@ -162,19 +161,19 @@ async def test_on_a_slow_link_figures_are_drawn_seldom_and_a_trip_at_once(
 
         def trembling() -> FrameView:
             assert view.strip.drive is not None
-            drive = replace(view.strip.drive, frequency=f"{next(values)}")
-            return replace(view, strip=replace(view.strip, drive=drive))
+            drive = view.strip.drive._replace(frequency=f"{next(values)}")
+            return view._replace(strip=view.strip._replace(drive=drive))
 
         monkeypatch.setattr(made.app._frame, "view", trembling)
         for _ in range(50):
             made.app.draw_frame()
         assert len(drawn) <= 1
-        view = replace(view, strip=replace(view.strip, faults=1, unseen=True))
+        view = view._replace(strip=view.strip._replace(faults=1, unseen=True))
         made.app.draw_frame()
         assert drawn[-1].strip.faults == 1
         assert view.strip.drive is not None
-        drive = replace(view.strip.drive, words="FAULT", kind="fault")
-        view = replace(view, strip=replace(view.strip, drive=drive))
+        drive = view.strip.drive._replace(words="FAULT", kind="fault")
+        view = view._replace(strip=view.strip._replace(drive=drive))
         made.app.draw_frame()
         assert drawn[-1].strip.drive is not None
         assert drawn[-1].strip.drive.kind == "fault"

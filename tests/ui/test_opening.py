@@ -54,7 +54,7 @@ async def test_monitor_stands_first_and_its_drive_takes_its_place() -> None:
         held.let()
         await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))
-        assert len(app.screen_stack) == 3, "Esc goes to Line"
+        assert len(app.screen_stack) == 2, "Esc goes to Line"
 
 
 @pytest.mark.parametrize("key", ["escape", "1"])

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -59,7 +57,7 @@ def test_nothing_moves_when_a_value_changes(
     width: int,
 ) -> None:
     plain = strip_line(StripView(drive=RUNS), width).plain
-    drive = replace(RUNS, words=words, frequency=frequency, current=current, name=name, armed=armed)
+    drive = RUNS._replace(words=words, frequency=frequency, current=current, name=name, armed=armed)
     other = strip_line(StripView(drive=drive, faults=faults), width)
     assert other.cell_len == width
     if width >= 80 and faults < 10:
@@ -68,14 +66,14 @@ def test_nothing_moves_when_a_value_changes(
 
 
 def test_a_drive_that_is_not_heard_is_told_by_its_age() -> None:
-    line = strip_line(replace(VIEW, drive=replace(RUNS, age=12.0)), 80).plain
+    line = strip_line(VIEW._replace(drive=RUNS._replace(age=12.0)), 80).plain
     assert "? 12s ago" in line
     assert "FORWARD" not in line
 
 
 def test_a_fault_that_was_looked_at_shouts_no_more() -> None:
     def style_of(unseen: bool) -> object:
-        line = strip_line(replace(VIEW, unseen=unseen), 80)
+        line = strip_line(VIEW._replace(unseen=unseen), 80)
         at = line.plain.index("■")
         return next(span.style for span in line.spans if span.start <= at < span.end)
 
@@ -84,7 +82,7 @@ def test_a_fault_that_was_looked_at_shouts_no_more() -> None:
 
 
 def test_who_commands_where_it_is_not_this_panel() -> None:
-    drive = replace(RUNS, armed=None, by="Terminals")
+    drive = RUNS._replace(armed=None, by="Terminals")
     assert "by Terminals" in strip_line(StripView(drive=drive), 80).plain
 
 

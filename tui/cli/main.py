@@ -18,40 +18,45 @@ if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
 
 COMMANDS = {
-    "backup": ("backup", "Write every parameter of a drive to a file."),
-    "block": ("block", "Show or change a drive's indirect blocks or scanner."),
+    "backup": ("backup", "Write the settings of a drive to a file."),
+    "block": ("block", "Show or change a drive's blocks or scanner."),
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
-    "demo": ("panel", "Open the panel on five simulated, running drives."),
+    "demo": ("panel", "Open the panel on five simulated drives that run."),
     "identify": ("identify", "Ask a drive who it is."),
     "lines": ("lines", "List the lines that have a name, and what is known of them."),
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "prove": ("prove", "Prove that a drive reacts to a silent line."),
     "read": ("read", "Read parameters of a drive."),
-    "reference": ("single_orders", "Give a drive its reference."),
+    "reference": ("single_orders", "Set a drive's reference."),
     "report": ("report", "Write a report on a drive to a file."),
     "reset": ("single_orders", "Reset a drive's fault."),
-    "restore": ("restore", "Bring a parameter set back into a drive."),
-    "run": ("run", "Run a motor until this command is ended."),
-    "simulate": ("simulate", "Serve simulated drives."),
-    "status": ("status", "Tell what a drive does and who commands it."),
+    "restore": ("restore", "Write a parameter set back to a drive."),
+    "run": ("run", "Run a motor until this command ends."),
+    "simulate": ("simulate", "Serve simulated drives to any Modbus client."),
+    "status": ("status", "Tell a drive's state, control source and fault."),
     "stop": ("stop", "Stop a drive, or every drive of a line."),
-    "teach": ("teach", "Teach a raw value's scale by the drive's display."),
-    "watch": ("watch", "Watch parameters of a drive."),
+    "teach": ("teach", "Teach a raw value's scale from the drive's display."),
+    "watch": ("watch", "Watch parameters of drives, cycle by cycle."),
     "write": ("write", "Write settings of a drive."),
 }
 
 LINE_HELP = """
-LINE is serial:PATH[,BAUD[,FORMAT]] or a device path, tcp:HOST[:PORT], rtu-tcp:HOST:PORT, or
-sim:PROFILE[@ADDRESS][,...] for simulated drives. Formats are written 8E1, 8N2. A name out of the
-settings file stands for a LINE too; DRIVEPANEL_LINE is the LINE where none is written.
+\b
+LINE is one of
+  /dev/ttyUSB0  serial:PATH[,BAUD[,FORMAT]]  a serial port; formats 8E1, 8N2
+  tcp:HOST[:PORT]                            Modbus TCP
+  rtu-tcp:HOST:PORT                          RTU frames over TCP
+  sim:PROFILE[@ADDRESS][,...]                simulated drives
+  NAME                                       a line of the settings file
+Left out, it is that of DRIVEPANEL_LINE.
 
--v may stand anywhere. With --json errors come as JSON on standard output too.
+-v may stand anywhere. With --json errors are printed as JSON on standard output too.
 
 \b
 Exit status:
     0  done
-    1  different: compare, block verify, a teach that disagrees
+    1  different: compare, block verify, a contradicting teach
     2  usage: options, files, codes, profiles
     3  no answer, or trouble on the line
     4  the drive refused

@@ -39,7 +39,7 @@ class PanelScreen(Framed):
         yield from self.framed()
         yield Lines(id="frame-room")  # the place of strip and tabs
         yield from self.body()
-        yield Lines(id="keys")
+        yield Lines(id="keys", fit=self._keys)
 
     def body(self) -> Iterable[Widget]:
         """What stands between the tabs and the message."""
@@ -67,8 +67,12 @@ class PanelScreen(Framed):
 
     def draw(self, width: int) -> None:
         """Put every line, here that of the keys; the screen is on top and has a size."""
+        self.put("keys", self._keys(width))
+
+    def _keys(self, width: int) -> list[Text]:
+        """The line of keys."""
         whom, typing = self.app.stops_whom, takes_space(self.focused)
-        self.put("keys", [key_line(keys_line(self.name_of_screen, width, whom, typing=typing))])
+        return [key_line(keys_line(self.name_of_screen, width, whom, typing=typing))]
 
     @property
     def name_of_screen(self) -> str:

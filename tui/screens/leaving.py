@@ -10,14 +10,14 @@ from typing import TYPE_CHECKING
 from tui.terminal.loop import soon_in_loop
 
 from .app_port import Panel
-from .dialogs.confirm import Confirm
-from .dialogs.leave import Leave, LeaveChoice
-from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
     from tui.session.monitor.timeout import TimeoutWatch
+
+    from .dialogs.confirm import Confirm
+    from .dialogs.leave import LeaveChoice
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
@@ -33,6 +33,9 @@ class Leaving(Panel):
 
     async def action_quit(self) -> None:
         """Leave; where a motor runs by a command from here, or a drive trips, not unasked."""
+        from .dialogs.leave import Leave
+        from .dialogs.now import MotorsNow
+
         if any(isinstance(screen, Leave) for screen in self.screen_stack):
             return
         if running := self._motors():
@@ -83,7 +86,7 @@ class Leaving(Panel):
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
         found = [left_alone_text(*same, watch=watch) for (_, watch), same in alike.items()]
         found += [
-            f"{names_of([one])}: what it does left alone was not read yet."
+            f"{names_of([one])}: what it does on loss of communication was not read yet."
             for one in line_watch.unread()
             if one.device not in told
         ]
@@ -162,6 +165,9 @@ class Leaving(Panel):
         self, fleets: Sequence[Fleet], question: str, *, yes: str, no: str, always: str = ""
     ) -> Confirm | None:
         """What to ask before drives are left alone; None where nothing is to be said."""
+        from .dialogs.confirm import Confirm
+        from .dialogs.now import MotorsNow
+
         told = self._told(fleets)
         if always:
             told.insert(0, always)

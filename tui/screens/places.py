@@ -47,16 +47,16 @@ class Places(Panel):
 
         log.info("watching device %s, %s", console.device, console.session.profile.id)
         self.chosen = console
-        while len(self.screen_stack) > 3:
+        while len(self.screen_stack) > 2:
             self.pop_screen()
-        if len(self.screen_stack) == 3:  # no picture of Line in between
+        if len(self.screen_stack) == 2:  # no picture of Line in between
             self.switch_screen(MonitorScreen(console))
         else:
             self.push_screen(MonitorScreen(console))
 
     def _to_base(self) -> None:
         """Back to the list of lines, whatever is above it."""
-        while len(self.screen_stack) > 2:
+        while len(self.screen_stack) > 1:
             self.pop_screen()
 
     def action_goto(self, place: str) -> AwaitMount | None:
@@ -81,10 +81,10 @@ class Places(Panel):
                 " g gives it back, where it has a word for that."
             )
             return None
-        below = self.screen_stack[2] if len(self.screen_stack) > 2 else None
+        below = self.screen_stack[1] if len(self.screen_stack) > 1 else None
         if not isinstance(below, MonitorScreen) or below.console is not console:
             self.show_monitor(console)
-        while len(self.screen_stack) > 3:
+        while len(self.screen_stack) > 2:
             self.pop_screen()
         return self.push_screen(_made(place, console)) if place != MONITOR else None
 

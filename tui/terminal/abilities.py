@@ -9,9 +9,8 @@ from __future__ import annotations
 import codecs
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Final
+from typing import Final, NamedTuple
 
 from rich.color import ColorSystem
 
@@ -41,8 +40,7 @@ BEGINNING = Path("/proc/self/environ")
 """The environment as the program was given it; Python changes LC_CTYPE where it is C or unset."""
 
 
-@dataclass(frozen=True, slots=True)
-class Abilities:
+class Abilities(NamedTuple):
     """What a terminal can show."""
 
     encoding: str = UTF_8
@@ -75,7 +73,7 @@ def fewer_colours(abilities: Abilities) -> Abilities:
     """The same with sixteen colours at most: to set one of them takes half the bytes."""
     if abilities.colours in (None, ColorSystem.STANDARD):
         return abilities
-    return replace(abilities, colours=ColorSystem.STANDARD)
+    return abilities._replace(colours=ColorSystem.STANDARD)
 
 
 def encoding_of(environment: Mapping[str, str], written_as: str = UTF_8) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from typing import Protocol
 
 from textual.app import App
@@ -59,7 +58,7 @@ class Admission:
             return False  # a stop was the last word
         late = time.monotonic() - stroke.read_at > LATE
         if late:
-            attach(event, replace(stroke, alone=False, held=False, steps=False))
+            attach(event, stroke._replace(alone=False, held=False, steps=False))
         if (stroke.acts and not late) or self._harmless(event):
             return True
         self._count(late)

@@ -7,9 +7,8 @@ once. Times are seconds of one clock, given with each key; nothing here looks at
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
-from typing import Final
+from typing import Final, NamedTuple
 
 from .dialects import APART
 from .tokens import KeyToken, Paste
@@ -30,8 +29,7 @@ STEPPING: Final = frozenset({"up", "down", "left", "right", "pageup", "pagedown"
 """Keys that a person holds down to go on."""
 
 
-@dataclass(frozen=True, slots=True)
-class Given:
+class Given(NamedTuple):
     """A key, or a paste, and the company in which it came."""
 
     what: KeyToken | Paste

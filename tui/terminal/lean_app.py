@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Sequence
+from typing import Any
 
 from rich.color import ColorSystem
 from rich.console import RenderableType
@@ -64,6 +65,25 @@ class LeanApp(App[None]):
         """Textual's own, but for its way to leave colours out, and those of this terminal."""
         own = [one for one in super().get_line_filters() if not isinstance(one, Monochrome)]
         return [*own, *self._instead]
+
+    def take_styles(self, screen: object) -> None:
+        """Know the styles of a screen before it is shown; they concern nothing that stands already.
+
+        Textual would read all styles of the app anew, and style all that stands.
+        """
+        for path in screen.css_path if isinstance(screen, Screen) else ():
+            if not self.stylesheet.has_source(str(path), ""):
+                self.stylesheet.read(path)
+
+    def push_screen(self, screen: Any, *args: Any, **settings: Any) -> Any:
+        """Show a screen over the others."""
+        self.take_styles(screen)
+        return super().push_screen(screen, *args, **settings)
+
+    def switch_screen(self, screen: Any) -> Any:
+        """Show a screen in place of the one on top."""
+        self.take_styles(screen)
+        return super().switch_screen(screen)
 
     def hurry(self) -> None:
         """What changes now is for a person who waits for it, or must see it at once."""

@@ -7,8 +7,7 @@ the terminal takes.
 from __future__ import annotations
 
 import codecs
-from dataclasses import dataclass
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 from .bursts import Bursts, Given
 from .dialects import ESCAPE_DELAY, Tokenizer
@@ -36,8 +35,7 @@ class Stops(Protocol):
         """A sequence came that no known terminal sends; it did nothing."""
 
 
-@dataclass(frozen=True, slots=True)
-class Pressed:
+class Pressed(NamedTuple):
     """A key for the app."""
 
     name: str

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
 from functools import lru_cache
+from typing import NamedTuple
 
 RESET = "0"
 NOT_BOLD = "22"
@@ -16,11 +16,10 @@ NUMBERS = {2: 5, 5: 3}
 """Numbers of an extended colour in all, by the one that follows 38 or 48."""
 
 
-@dataclass(frozen=True, slots=True)
-class CellLook:
+class CellLook(NamedTuple):
     """Attributes and colours of a character; a colour that is empty is the terminal's own."""
 
-    attributes: frozenset[str] = field(default_factory=frozenset)
+    attributes: frozenset[str] = frozenset()
     foreground: str = ""
     background: str = ""
 

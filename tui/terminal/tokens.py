@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from typing import NamedTuple
 
 
-@dataclass(frozen=True, slots=True)
-class KeyToken:
+class KeyToken(NamedTuple):
     """A key: its name in Textual, what it types, when its first and its last character was read."""
 
     name: str
@@ -17,16 +16,14 @@ class KeyToken:
     """Whatever was given with the read in which it began."""
 
 
-@dataclass(frozen=True, slots=True)
-class Paste:
+class Paste(NamedTuple):
     """A text that was pasted, with the brackets that terminals put around it."""
 
     text: str
     at: float
 
 
-@dataclass(frozen=True, slots=True)
-class Report:
+class Report(NamedTuple):
     """Something that the terminal says of itself and Textual wants to hear."""
 
     text: str

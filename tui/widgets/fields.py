@@ -12,6 +12,11 @@ from .plain import Signs
 class Field(Input):
     """A field of one line; a space belongs to the text."""
 
+    def update_node_styles(self, animate: bool = True) -> None:
+        """Nothing is styled before it stands on a screen: then it is, as a whole."""
+        if self.is_attached:
+            super().update_node_styles(animate)
+
     takes_space: ClassVar[bool] = True
     """Whether Space is typed into it; where it is not, Space stops the motor there too."""
 

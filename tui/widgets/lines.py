@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import lru_cache
 
+from rich.console import Console
+from rich.segment import Segment
 from rich.style import Style
-from rich.text import Text
+from rich.text import Span, Text
 from textual.geometry import Region, Size
 from textual.strip import Strip
 from textual.widget import Widget
@@ -19,10 +22,20 @@ class Lines(Widget):
 
     DEFAULT_CSS = "Lines { height: auto; width: 1fr; }"
 
-    def __init__(self, *, id: str | None = None, classes: str | None = None) -> None:
+    def __init__(
+        self,
+        *,
+        id: str | None = None,
+        classes: str | None = None,
+        fit: Callable[[int], Sequence[Text]] | None = None,
+    ) -> None:
+        """With `fit` the first lines are made for the width that the place turns out to have."""
         super().__init__(id=id, classes=classes)
+        self._fit = fit
         self._lines: list[Text] = []
         self._strips: dict[int, Strip] = {}
+        self._under: Style | None = None
+        """The colours of the place itself; to ask for them costs more than to draw a line."""
         self.redrawn = 0
         """How many lines were sent so far, for tests and benchmarks."""
 
@@ -33,59 +46,123 @@ class Lines(Widget):
 
     def show(self, lines: Sequence[Text]) -> None:
         """Show these lines; only those that differ from the ones before are drawn."""
-        old = self._lines
+        old, self._fit = self._lines, None
         self._lines = list(lines)
         changed = [
             y
             for y in range(max(len(old), len(lines)))
             if y >= len(old) or y >= len(lines) or not same(old[y], lines[y])
         ]
-        regions = [region for y in changed for region in self._redraw(y)]
+        width = self.size.width if changed else 0
+        regions = [region for y in changed for region in self._redraw(y, width)]
         if regions:
             self.redrawn += len(changed)
             self.refresh(*regions)
         if len(old) != len(lines) and self.styles.is_auto_height:
             self.refresh(layout=True)
 
-    def _redraw(self, y: int) -> list[Region]:
+    def _redraw(self, y: int, width: int) -> list[Region]:
         """Draw a line anew; the parts of it that look different now."""
         before = self._strips.pop(y, None)
-        if not (width := self.size.width):
+        if not width:
             return []
         self._strips[y] = self._draw(y, width)
         return [Region(x, y, end - x, 1) for x, end in runs(before, self._strips[y])]
 
     def get_content_height(self, container: Size, viewport: Size, width: int) -> int:
         """One row a line."""
+        self._fill(width)
         return len(self._lines)
+
+    def _fill(self, width: int) -> None:
+        """Make the first lines, now that there is a width for them."""
+        if self._fit is not None and width:
+            self._lines = list(self._fit(width))
 
     def notify_style_update(self) -> None:
         """Draw anew when colours change."""
         self._strips.clear()
+        self._under = None
         super().notify_style_update()
+
+    def render_lines(self, crop: Region) -> list[Strip]:
+        """The lines of a region; nothing stands around them, so Textual need not look for it."""
+        width = self.size.width
+        if self.size != self.outer_size:
+            return super().render_lines(crop)
+        strips = [self._strip(y, width) for y in crop.line_range]
+        for one in self.get_line_filters():
+            background = self.background_colors[1]
+            strips = [strip.apply_filter(one, background) for strip in strips]
+        if crop.column_span != (0, width):
+            strips = [strip.crop(*crop.column_span) for strip in strips]
+        return strips
 
     def render_line(self, y: int) -> Strip:
         """A line, cut or filled to the width."""
-        width = self.size.width
+        return self._strip(y, self.size.width)
+
+    def _strip(self, y: int, width: int) -> Strip:
         strip = self._strips.get(y)
         if strip is None or strip.cell_length != width:
+            if y == 0:
+                self._fill(width)
             strip = self._draw(y, width)
             self._strips[y] = strip
         return strip
 
     def _draw(self, y: int, width: int) -> Strip:
-        style = self.rich_style
+        if self._under is None:
+            self._under = self.rich_style
         if y >= len(self._lines):
-            return Strip.blank(width, style)
+            return Strip.blank(width, self._under)
         line = self._lines[y]
-        # rich drops the style of a text that has no spans
-        styled = Text(plain(line.plain), end="")
-        styled.stylize(line.style)
-        for span in line.spans:
+        return strip_of(line.plain, tuple(line.spans), line.style, width, self._under)
+
+
+@lru_cache(maxsize=1)
+def _names_of_styles() -> Console:
+    return Console()
+
+
+@lru_cache(maxsize=1024)
+def strip_of(
+    text: str, spans: tuple[Span, ...], style: Style | str, width: int, under: Style
+) -> Strip:
+    """A line in exactly so many cells, on the colours of its place.
+
+    Kept for when it comes again: most of what changes becomes what it was before.
+    """
+    text = plain(text)
+    segments = in_order(text, spans, style)
+    if segments is None:
+        styled = Text(text, end="")
+        styled.stylize(style)  # rich drops the style of a text that has no spans
+        for span in spans:
             styled.stylize(span.style, span.start, span.end)
-        segments = list(styled.render(self.app.console, end=""))
-        strip = Strip(segments).apply_style(style).adjust_cell_length(width, style)
-        return strip.simplify()
+        segments = list(styled.render(_names_of_styles(), end=""))
+    strip = Strip(segments).apply_style(under).adjust_cell_length(width, under)
+    return strip.simplify()
+
+
+def in_order(text: str, spans: Sequence[Span], style: Style | str) -> list[Segment] | None:
+    """The pieces of a text that was put together piece by piece; None for any other."""
+    if not isinstance(style, Style):
+        if style:
+            return None
+        style = Style.null()
+    found, at = [], 0
+    for start, end, over in spans:
+        if start < at or end > len(text) or not isinstance(over, Style):
+            return None
+        if start > at:
+            found.append(Segment(text[at:start], style))
+        if end > start:
+            found.append(Segment(text[start:end], style + over))
+            at = end
+    if at < len(text):
+        found.append(Segment(text[at:], style))
+    return found
 
 
 def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
@@ -93,13 +170,15 @@ def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
 
     Runs with little between them are one: to move costs as much as to write some cells again.
     """
+    if before is after:
+        return []
     width = after.cell_length
-    old, new = cells(before) if before is not None else [], cells(after)
-    if len(old) != width or len(new) != width:
+    old, new = looks(before) if before is not None else ("", []), looks(after)
+    if len(old[0]) != width or len(new[0]) != width:
         return [(0, width)]
     found: list[tuple[int, int]] = []
-    for x in range(width):
-        if old[x] == new[x]:
+    for x, (was, was_style, now, now_style) in enumerate(zip(*old, *new, strict=True)):
+        if was == now and (was_style is now_style or was_style == now_style):
             continue
         if found and x - found[-1][1] < CURSOR_MOVE:
             found[-1] = (found[-1][0], x + 1)
@@ -108,11 +187,16 @@ def runs(before: Strip | None, after: Strip) -> list[tuple[int, int]]:
     return found
 
 
-def cells(strip: Strip) -> list[tuple[str, Style | None]]:
-    """The characters of a strip with their colours; fewer than its cells where some are wide."""
-    return [(character, style) for text, style, _ in strip for character in text]
+def looks(strip: Strip) -> tuple[str, list[Style | None]]:
+    """The characters of a strip, and their colours; fewer than its cells where some are wide."""
+    styles: list[Style | None] = []
+    for text, style, _ in strip:
+        styles += [style] * len(text)
+    return strip.text, styles
 
 
 def same(one: Text, other: Text) -> bool:
     """Whether two lines look the same, their colours too."""
+    if one is other:
+        return True
     return one.plain == other.plain and one.spans == other.spans and one.style == other.style

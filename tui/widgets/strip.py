@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from typing import NamedTuple
 
 from rich.style import Style
 from rich.text import Text
@@ -48,8 +48,7 @@ STRIP_STYLES: Mapping[str, Style] = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class DriveNow:
+class DriveNow(NamedTuple):
     """The open drive at one moment, in words and figures."""
 
     device: int
@@ -72,8 +71,7 @@ class DriveNow:
     """Who commands it, where it is not this panel."""
 
 
-@dataclass(frozen=True, slots=True)
-class StripView:
+class StripView(NamedTuple):
     """All that the strip tells."""
 
     drive: DriveNow | None = None
@@ -167,8 +165,7 @@ def _right(view: StripView, *, narrow: bool) -> Text:
     return text
 
 
-@dataclass(frozen=True, slots=True)
-class Tab:
+class Tab(NamedTuple):
     """A screen of the panel as its tab shows it."""
 
     place: str
@@ -217,8 +214,7 @@ def said_line(when: str, said: str, style: Style, hint: str, width: int) -> Text
     return text
 
 
-@dataclass(frozen=True, slots=True)
-class Said:
+class Said(NamedTuple):
     """The message of now; `age` in seconds."""
 
     when: str
@@ -229,8 +225,7 @@ class Said:
     """Whether it is about another drive than the one that is open."""
 
 
-@dataclass(frozen=True, slots=True)
-class FrameView:
+class FrameView(NamedTuple):
     """All that stands around a screen at one moment."""
 
     strip: StripView

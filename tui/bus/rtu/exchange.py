@@ -5,7 +5,7 @@ Knows no clock and no port: fed with bytes, told of silence and of the time-out.
 
 from __future__ import annotations
 
-from ..expectation import Expectation
+from ..expectation import EXCEPTION, Expectation
 from ..result import ExchangeResult, Piece, ResultKind
 from .frames import Match, begins_reply, find_reply, pieces
 
@@ -66,10 +66,21 @@ class RtuExchange:
         return self.feed(b"")
 
     def _find(self, expectation: Expectation) -> Match | None:
+        if self._is_too_short(expectation):
+            return None
         start = max(self._after_echo(), self._skipped_to)
         return find_reply(
             self.buffer, self._device, expectation, start=start, exceptions=self._exceptions
         )
+
+    def _is_too_short(self, expectation: Expectation) -> bool:
+        """Whether neither the reply nor a refusal can be there yet, as after most pieces."""
+        if expectation.length is None:
+            return False
+        if len(self.buffer) - self._skipped_to >= expectation.length + 3:
+            return False
+        refusal = bytes((self._device, expectation.function | EXCEPTION))
+        return not self._exceptions or refusal not in self.buffer
 
     def _after_echo(self) -> int:
         """Where a reply may begin: behind the echo of the request, if there is one."""

@@ -57,6 +57,8 @@ class RtuMaster:
         self._exchange: RtuExchange | None = None
         self._done: asyncio.Future[ExchangeResult] | None = None
         self._timer: asyncio.TimerHandle | None = None
+        self._due = 0.0
+        self._action: Callable[[], None] | None = None
         self._sent = 0.0
         self._idle = bytearray()
         self._early: deque[bool] = deque(maxlen=REMEMBERED)
@@ -190,7 +192,6 @@ class RtuMaster:
                 return self._done.result()
 
     def _fell_silent(self) -> None:
-        self._timer = None
         if self._exchange is not None:
             result = self._exchange.silent()
             if result is not None:
@@ -228,8 +229,23 @@ class RtuMaster:
             trace.add(time, "in", piece.data, note)
 
     def _start_timer(self, delay: float, action: Callable[[], None]) -> None:
-        self._stop_timer()
-        self._timer = asyncio.get_running_loop().call_later(delay, action)
+        """Do this once so many seconds have gone by; a timer that is set for it is put off."""
+        loop = asyncio.get_running_loop()
+        self._due, before, self._action = loop.time() + delay, self._action, action
+        if self._timer is not None and (before != action or self._timer.when() > self._due):
+            self._stop_timer()
+        if self._timer is None:
+            self._timer = loop.call_at(self._due, self._ring)
+
+    def _ring(self) -> None:
+        """The time that was set first is over; to set it anew for each piece costs more."""
+        loop = asyncio.get_running_loop()
+        if loop.time() < self._due:
+            self._timer = loop.call_at(self._due, self._ring)
+            return
+        self._timer = None
+        if self._action is not None:
+            self._action()
 
     def _stop_timer(self) -> None:
         if self._timer is not None:

@@ -8,7 +8,7 @@ import re
 import stat
 import sys
 from contextlib import suppress
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import serial
 from serial.tools import list_ports as system_ports
@@ -22,8 +22,7 @@ PSEUDO_TERMINALS = range(136, 144)
 """Major device numbers of the slave sides of pseudo-terminals on Linux."""
 
 
-@dataclass(frozen=True, slots=True)
-class PortInfo:
+class PortInfo(NamedTuple):
     """A serial port that a person may choose."""
 
     path: str

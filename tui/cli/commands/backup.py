@@ -11,6 +11,7 @@ from ..shared.messages import Messages
 from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.say import say
 from ..shared.sets import (
+    complain_absent,
     file_argument,
     force_option,
     refuse_existing,
@@ -26,7 +27,7 @@ STANDARD_OUTPUT = Path("-")
 @file_argument
 @force_option
 @click.option(
-    "--all", "everything", is_flag=True, help="Measurements, counters and command words too."
+    "--all", "everything", is_flag=True, help="Add measurements, counters and command words."
 )
 @json_option
 @settings_options
@@ -60,8 +61,7 @@ def backup(target: Target, file: Path, force: bool, everything: bool, as_json: b
         write_down(file, text, force=force)
         what = "parameters" if everything else "settings"
         messages.tell(f"{file}: {len(values.raws)} {what} of {session.profile.name}")
-    for code, why in values.absent.items():
-        messages.complain(f"{code} could not be read: {why}")
+    complain_absent(messages, values.absent)
     if as_json:
         found = {
             "file": str(file),

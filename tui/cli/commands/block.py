@@ -64,24 +64,24 @@ def block(
     as_json: bool,
     read_only: bool,
 ) -> None:
-    """Show, compare or change what a drive's indirect blocks or communication scanner bring.
+    """Show, compare or change the mapping of a drive's indirect blocks or communication scanner.
 
     \b
-    show              the slots, what they bring, the same read directly
+    show              the slots, the values that they bring, the same read directly
     verify            the same, compared several times; ends with 1 where a slot differs
-    set NMA3=LCR ...  what slots stand for: a code, a number, an address, or none
+    set NMA3=LCR ...  what slots are mapped to: a code, a number, an address, or none
     factory           every slot as it left the factory
     load FILE         the slots as a file has them
     save FILE         the slots of now into a file, one line each
 
-    Slots are written with the motor at rest, one after another, each read back. Another master
-    on the line may rely on today's assignment.
+    Slots are written at standstill, one after another, each read back. Another master on the line
+    may rely on the present assignment.
     """
     wanted = Wanted(action, words, dry_run, as_json)
     _check_usage(wanted)
     writes = action in WRITING and not dry_run
     if writes:
-        need_arming(arm, "this changes what the drive's blocks stand for")
+        need_arming(arm, "this changes what the drive's slots are mapped to")
 
     async def work(opened: OpenLine) -> int:
         session = await connect_drive(opened, target)
@@ -138,7 +138,7 @@ async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
 
 
 def _status(views: list[BlockView]) -> int:
-    """0 where every slot in use that can be compared brings what it stands for."""
+    """0 where every slot in use that can be compared brings what it is mapped to."""
     from tui.session.read.verdict import SlotMatch
 
     wrong = (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE)

@@ -25,14 +25,14 @@ FACTORY = "factory"
 @click.command()
 @click.argument("a", shell_complete=complete_side)
 @click.argument("b", shell_complete=complete_side, envvar=LINE_VARIABLE)
-@click.option("--all", "all_rows", is_flag=True, help="Show equal and measured ones too.")
+@click.option("--all", "all_rows", is_flag=True, help="Show equal settings and measurements too.")
 @click.option(
     "--format",
     "format_",
     type=click.Choice(["text", "markdown", "csv"]),
     default="text",
     show_default=True,
-    help="Form of the table.",
+    help="Format of the table.",
 )
 @json_option
 @click.option(
@@ -84,18 +84,19 @@ def compare(
             USAGE,
         )
     profile = library.load(ids.pop())
+    names = (f"{a} -d {places[0]}", f"{b} -d {places[-1]}") if a == b else (a, b)
     drive = next(found for found in sets if found is not None)
     sides = [
         factory_side(profile, drive) if found is None else side_of(text, found)
-        for text, found in zip((a, b), sets, strict=True)
+        for text, found in zip(names, sets, strict=True)
     ]
     rows = rows_of(profile, *sides, all_rows=all_rows)
     if as_json:
         equal = not any(row.differs for row in rows)
-        told = {"a": a, "b": b, "profile": profile.id, "equal": equal}
+        told = {"a": names[0], "b": names[1], "profile": profile.id, "equal": equal}
         print_json({**told, "rows": [_row_json(row) for row in rows]})
     else:
-        say(table(rows, (a, b), format_).removesuffix("\n"))
+        say(table(rows, names, format_).removesuffix("\n"), indent=3)
     if any(row.differs for row in rows):
         raise click.exceptions.Exit(DIFFERENT)
 

@@ -21,11 +21,14 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.say import say
+from ..shared.say import say_row
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
+
+TITLES = 11
+"""Width of the column of titles, with its gap."""
 
 
 @click.command()
@@ -58,8 +61,8 @@ def identify(line_text: str, device: tuple[int, ...], read_only: bool, as_json: 
 
 
 def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
-    say(f"Device     {found.device}")
     for title, text in (
+        ("Device", str(found.device)),
         ("Vendor", found.vendor),
         ("Reference", found.reference),
         ("Version", found.version_text),
@@ -67,7 +70,7 @@ def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
         ("Profile", found.profile or _choices(found)),
         *_model_row(found, words),
     ):
-        say(f"{title:<10} {plain(text) or '-----'}")
+        say_row(title, plain(text) or "-----", TITLES)
 
 
 async def _model_words(opened: OpenLine, identity: DriveIdentity) -> Mapping[str, int]:

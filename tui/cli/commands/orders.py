@@ -35,14 +35,14 @@ if TYPE_CHECKING:
 COMMAND_POLL_INTERVAL = 0.02
 """Seconds between two looks at what the line's thread has come to."""
 PERIOD = 0.25
-"""Wished time of a cycle of the monitor in seconds."""
+"""Target cycle time of the monitor in seconds."""
 FIRST_TRIES = 3
 """Cycles that may fail before the drive counts as silent."""
 LEARNT_WITHIN = 3.0
-"""Seconds in which a drive's watch over the line is read."""
+"""Seconds in which a drive's communication time-out is read."""
 
 arm_option = click.option(
-    "--arm", is_flag=True, help="Let this command write to the drive; without it nothing is."
+    "--arm", is_flag=True, help="Arm the drive for this command; without it nothing is written."
 )
 
 
@@ -138,7 +138,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     await _until(lambda: work.outcome is not before or not work.busy_for(commander))
     outcome = work.outcome if work.outcome is not before else None
     if outcome is None:
-        raise Failure("The order was not sent: a newer one took its place.", REFUSED_HERE)
+        raise Failure("The command was not sent: a newer one took its place.", REFUSED_HERE)
     if outcome.kind is OutcomeKind.REFUSED:
         raise Failure(outcome.text + _way_on(outcome.error), _status(outcome.error))
     return outcome

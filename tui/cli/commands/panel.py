@@ -2,101 +2,25 @@
 
 from __future__ import annotations
 
-import gc
-import os
-import sys
-from typing import TYPE_CHECKING
+from typing import Any
 
 import click
 
+from ..opening import DEMO_LINE, LEAVE_RUNNING, STOP, open_panel, terminal_trouble
 from ..shared.completion import complete_line
 from ..shared.devices import SLAVE_ADDRESS, one_device
 from ..shared.errors import USAGE, Failure, told
 from ..shared.line_argument import LineArgument
 from ..shared.lines import is_line
 from ..shared.options import read_only_option
-from ..shared.signals import ending_by_signal
-
-if TYPE_CHECKING:
-    from tui.session.connect.open_line import OpenLine
-
-STOP, LEAVE_RUNNING = "stop", "leave-running"
-
-YOUNGEST = 10_000
-"""New objects after which garbage is looked for; a look holds up what a key does."""
-
-DEMO_LINE = "demo"
-"""The LINE of the demo inside the panel; every other text is opened as it is written."""
 
 
-def run_panel(
-    start: str | None,
-    device: int | None,
-    *,
-    read_only: bool = False,
-    low_bandwidth: bool = False,
-    on_hangup: str = STOP,
-    mouse: bool = False,
-    bell: bool = True,
-    ascii: bool | None = None,
-) -> None:
-    """Run the panel until it is left."""
-    if trouble := _terminal_trouble():
+def run_panel(start: str | None, device: int | None, **how: Any) -> None:
+    """Run the panel until it is left; `how` as for `open_panel`."""
+    if trouble := terminal_trouble():
         raise Failure(trouble, USAGE)
-    gc.disable()  # until the first picture: what is imported and built for it stays
-    os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
-    from tui.app import DrivePanelApp
-    from tui.session.connect.open_line import open_line
-    from tui.terminal.abilities import abilities_of, fewer_colours, given_environment
-
-    abilities = abilities_of(
-        given_environment(os.environ), written_as=sys.stderr.encoding, ascii=ascii
-    )
-    app = DrivePanelApp(
-        open_line=_open_with_demo if start == DEMO_LINE else open_line,
-        start=start,
-        device=device,
-        read_only=read_only,
-        low_bandwidth=low_bandwidth,
-        leave_running=on_hangup == LEAVE_RUNNING,
-        mouse=mouse,
-        bell=bell,
-        abilities=fewer_colours(abilities) if low_bandwidth else abilities,
-        on_shown=_collect_garbage,
-    )
-    with ending_by_signal(app, stop=on_hangup == STOP):
-        app.run()
-    if app.return_code:
-        raise click.exceptions.Exit(app.return_code)  # the panel itself has said why
-
-
-def _open_with_demo(
-    text: str, *, read_only: bool = False, wait: float | None = None, program: str = ""
-) -> OpenLine:
-    """The demo's line, or any other that is chosen in the panel afterwards."""
-    from tui.session.connect.open_line import demo_line, open_line
-
-    if text == DEMO_LINE:
-        from tui.drive.profile.library import demo_drives
-
-        return demo_line({id: hertz for id, (_, hertz) in demo_drives().items()})
-    return open_line(text, read_only=read_only, wait=wait, program=program)
-
-
-def _collect_garbage() -> None:
-    """Collect garbage from now on, more seldom than usual, and not among what is there by now."""
-    gc.freeze()
-    gc.set_threshold(YOUNGEST, *gc.get_threshold()[1:])
-    gc.enable()
-
-
-def _terminal_trouble() -> str:
-    """Why the panel cannot be drawn here, or nothing."""
-    if not (sys.stdin.isatty() and sys.stdout.isatty()):
-        return "The panel needs a terminal. Without one, use read, watch or --help."
-    if not sys.stderr.isatty():
-        return "The panel is drawn on standard error: leave away what leads that elsewhere (2>)."
-    return ""
+    if status := open_panel(start, device, **how):
+        raise click.exceptions.Exit(status)  # the panel itself has said why
 
 
 on_hangup_option = click.option(
@@ -104,23 +28,23 @@ on_hangup_option = click.option(
     type=click.Choice([STOP, LEAVE_RUNNING]),
     default=STOP,
     show_default=True,
-    help="What becomes of motors commanded from here when the terminal goes away.",
+    help="What happens to motors started from here when the terminal is lost.",
 )
 low_bandwidth_option = click.option(
-    "--low-bandwidth", is_flag=True, help="Send as little as possible to a slow terminal."
+    "--low-bandwidth", is_flag=True, help="Send as little as possible, for a slow link."
 )
 mouse_option = click.option(
-    "--mouse", is_flag=True, help="Let the terminal report its mouse; the panel needs none."
+    "--mouse", is_flag=True, help="Let the terminal report the mouse; the keys do all without."
 )
 
 
 bell_option = click.option(
-    "--bell/--no-bell", default=True, show_default=True, help="Ring once for a new fault."
+    "--bell/--no-bell", default=True, show_default=True, help="Ring the bell once for a new fault."
 )
 ascii_option = click.option(
     "--ascii/--no-ascii",
     default=None,
-    help="Draw with plain signs only; what the locale says otherwise.",
+    help="Draw with ASCII characters only; unless given, as the locale says.",
 )
 
 
@@ -159,7 +83,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
     multiple=True,
     callback=one_device,
     metavar="ADDRESS",
-    help="Watch the drive at this slave address at once; without it, look for drives.",
+    help="Slave address of the drive to open; without it the line is searched.",
 )
 @read_only_option
 @low_bandwidth_option

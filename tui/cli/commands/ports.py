@@ -37,9 +37,11 @@ def ports(as_json: bool) -> None:
         say("No serial port found. Plug in the adapter, or use tcp:HOST or rtu-tcp:HOST:PORT.")
     for port, by in found:
         used = f"  in use by {by}" if by else ""
-        say(f"{port.path:<20} {port.description}{used}")
+        say(f"{port.path:<20} {port.description}{used}", indent=21)
         name = names[port.path]
         if name.lasting and name.path != port.path:
-            say(f"{'':<20} always {name.path}")
+            say(f"{'':<20} always {name.path}", indent=21)
         if name.shared:
-            say(f"{'':<20} without a serial number of its own: known by its socket alone")
+            say(
+                f"{'':<20} without a serial number of its own: known by its socket alone", indent=21
+            )

@@ -32,15 +32,15 @@ if TYPE_CHECKING:
     "file",
     type=click.Path(path_type=Path),
     metavar="FILE...",
-    help="Check profile files of your own: all faults, each with its line.",
+    help="Check profile files: every fault is told with its line.",
 )
-@click.option("--from", "origin", metavar="ID", help="With new: the profile that it begins as.")
+@click.option("--from", "origin", metavar="ID", help="With new: the profile to copy.")
 @click.option("--schema", is_flag=True, help="Print the JSON schema: every field, described.")
 @click.option(
     "--wiring",
     is_flag=True,
-    help="Of the profile: warnings, waiting time, pins, rules of the line, addresses, lamps,"
-    " command words, and where the manuals are wrong.",
+    help="Of the profile: safety warnings, discharge time, terminals, line rules, addresses,"
+    " LEDs, command words, and errata of the manuals.",
 )
 @json_option
 @told
@@ -53,9 +53,9 @@ def profiles(
     wiring: bool,
     as_json: bool,
 ) -> None:
-    """List the profiles, show one, check files, or begin one of your own.
+    """List the profiles, show one, check files, or create one of your own.
 
-    `path` tells the folder for profiles of your own, `new NEW-ID --from ID` begins one there.
+    `path` tells the folder for your own profiles, `new NEW-ID --from ID` creates one there.
     """
     if wiring and (profile_id in (None, "new", "path")):
         raise click.UsageError("--wiring is of one profile: name its ID.")
@@ -71,7 +71,7 @@ def profiles(
     elif words[:1] == ("new",):
         _begin(words[1:], origin, as_json)
     elif more or origin is not None:
-        raise click.UsageError("Say one ID, or: profiles new NEW-ID --from ID.")
+        raise click.UsageError("Name one ID, or: profiles new NEW-ID --from ID.")
     elif profile_id == "path":
         _tell_folder(as_json)
     elif profile_id is not None and wiring:
@@ -127,7 +127,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     from ..shared.output import print_json
 
     if len(words) != 1 or origin is None:
-        raise click.UsageError("Say what it is to be, and what it begins as: new NEW-ID --from ID.")
+        raise click.UsageError("Name the new id and the profile to copy: new NEW-ID --from ID.")
     known = {listing.id: listing for listing in library.listings()}
     library.load(origin)  # a broken one is told, and is no start
     new_id = words[0].strip()
@@ -147,7 +147,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
         print_json({"id": new_id, "from": source.id, "file": str(path)})
         return
     say(f"{path}")
-    say(f"It begins as {source.id}. Change it, then: drivepanel profiles --check {path}")
+    say(f"It is a copy of {source.id}. Change it, then: drivepanel profiles --check {path}")
 
 
 def _list(as_json: bool) -> None:
@@ -166,12 +166,13 @@ def _list(as_json: bool) -> None:
             ]
         )
         return
-    for listing in found:
+    rows = [(one.id, one.vendor, one.name) for one in found]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for listing, row in zip(found, rows, strict=True):
         remark = _remark(listing)
-        say(
-            f"{listing.id:<12} {listing.vendor:<20} {listing.name:<22}"
-            f" {listing.parameters:>4} parameters{f'  ({remark})' if remark else ''}"
-        )
+        cells = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
+        more = f"  ({remark})" if remark else ""
+        say(f"{cells}  {listing.parameters:>4} parameters{more}", indent=widths[0] + 2)
 
 
 def _remark(listing: Listing) -> str:

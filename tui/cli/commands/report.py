@@ -29,8 +29,8 @@ from ..shared.sets import (
 def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     """Write a report on a drive to FILE, as Markdown.
 
-    What it is, its line settings, settings changed from the factory, who commands it, scanner,
-    what it does on a silent line, its faults, and what was written to it from here.
+    Identification, line settings, settings changed from the factory, control source, scanner,
+    reaction to a loss of communication, faults, and what was written to it from here.
     """
     from tui.session.journal import Journal
     from tui.session.report import entries_of

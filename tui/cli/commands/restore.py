@@ -39,10 +39,12 @@ from .orders import arm_option, close_journal, need_arming, permit_of
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
-    from tui.drive.settings.restore_plan import Options, RestorePlan
+    from tui.drive.settings.restore_plan import Options, RestoreItem, RestorePlan
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
+ALIKE = 3
+"""More than so many that are left out for one reason are told without their values."""
 CODES_NAMED = 12
 """How many codes are named for one reason; --dry-run names all."""
 
@@ -52,7 +54,7 @@ CODES_NAMED = 12
 @file_argument
 @dry_run_option
 @arm_option
-@click.option("--line-settings", is_flag=True, help="Write address, baud and format too.")
+@click.option("--line-settings", is_flag=True, help="Write address, baud rate and format too.")
 @click.option("--rating", is_flag=True, help="Write rating and motor data to another model too.")
 @confirm_option
 @round_option
@@ -82,13 +84,13 @@ def restore(
     profile_id: str | None,
     devices: tuple[int, ...],
 ) -> None:
-    """Bring a parameter set back into a drive: what differs is written and read back.
+    """Write a parameter set back to a drive: what differs is written and read back.
 
     With several -d the set goes to each of these drives in turn; one that cannot take it does
     not keep it from the others.
 
-    --dry-run tells what would be written, what is left out, and why. An interrupted restoring
-    is resumed by the same command: the drive is read, and what is missing is written.
+    --dry-run tells what would be written, what is left out, and why. An interrupted restore is
+    resumed by the same command: the drive is read, and what is missing is written.
     """
     from tui.drive.settings.restore_plan import Options
 
@@ -127,7 +129,7 @@ def restore(
 
 def _either(*, dry_run: bool, arm: bool) -> None:
     if not dry_run:
-        need_arming(arm, "restoring writes settings of the drive")
+        need_arming(arm, "restore writes settings of the drive")
     elif arm:
         raise click.UsageError("Give either --dry-run or --arm.")
 
@@ -166,11 +168,19 @@ def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> No
     held = {edit.code: edit.old for edit in plan.edits if edit.old is not None}
     for edit in ordered(session.profile, plan.edits, held):
         item = items[edit.code]
-        messages.tell(f"write  {item.code}: {item.old} -> {item.new}  {item.text}".rstrip())
+        text = f"write  {item.code}: {item.old} -> {item.new}  {item.text}"
+        messages.tell(text.rstrip(), indent=7)
+    left: dict[str, list[RestoreItem]] = {}
     for item in plan.of_kind("skip"):
         if item.reason != "no setting":
-            value = f" {item.new}" if item.new else ""
-            messages.tell(f"leave  {item.code}{value}: {item.text}")
+            left.setdefault(item.text, []).append(item)
+    for text, same in left.items():
+        values = [f"{item.code} {item.new}".rstrip() for item in same]
+        if len(same) > ALIKE:
+            values = [f"{len(same)}", ", ".join(item.code for item in same)]
+        messages.tell(
+            f"leave  {' '.join(values) if len(same) > ALIKE else ', '.join(values)}: {text}"
+        )
     if plan.same_rating is False and not plan.across:
         messages.tell("The set is of another model or rating than this drive.")
     if plan.across:

@@ -33,45 +33,45 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
     metavar="PROFILE[@ADDRESS]...",
     shell_complete=complete_profile,
 )
-@click.option("--pty", "pty", metavar="PATH", help="A pseudo-terminal, with a link at PATH.")
-@click.option("--serial", "serial", metavar="PATH", help="A serial port.")
-@click.option("--tcp", metavar="HOST:PORT", help="Modbus TCP.")
-@click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="RTU over TCP.")
+@click.option("--pty", "pty", metavar="PATH", help="Serve a pseudo-terminal, linked at PATH.")
+@click.option("--serial", "serial", metavar="PATH", help="Serve a serial port.")
+@click.option("--tcp", metavar="HOST:PORT", help="Serve Modbus TCP.")
+@click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="Serve RTU over TCP.")
 @click.option(
-    "--baud", type=click.IntRange(min=300), help="Instead of what the first drive comes with."
+    "--baud", type=click.IntRange(min=300), help="Baud rate; by default that of the first drive."
 )
 @click.option(
     "--format",
     "form",
     metavar="8E1|8N2|...",
-    help="Instead of what the first drive comes with.",
+    help="Character format; by default that of the first drive.",
 )
 @click.option(
     "--any-settings",
     is_flag=True,
-    help="Answer whatever baud and stop bits a client sets on the pseudo-terminal.",
+    help="Answer whatever baud rate and stop bits a client sets on the pseudo-terminal.",
 )
-@click.option("--real-time", is_flag=True, help="Keep the time of the line's characters.")
+@click.option("--real-time", is_flag=True, help="Keep the transmission times of the line.")
 @click.option(
     "--set",
     "sets",
     multiple=True,
     metavar="[ADDRESS:]CODE=RAW",
-    help="A raw value in force from power-up; a monitored word stays at it.",
+    help="Raw value from power-up; a measured word keeps it.",
 )
 @click.option(
     "--protect",
     "protects",
     multiple=True,
     metavar="[ADDRESS:]CODE,...",
-    help="Parameters that the line cannot see.",
+    help="Parameters that the drive refuses over the line.",
 )
 @click.option(
     "--line-fault",
     "faults",
     multiple=True,
     metavar="KIND=RATE",
-    help=f"Share of replies with a fault: {', '.join(FAULT_KINDS)}.",
+    help=f"Share of replies with a line fault: {', '.join(FAULT_KINDS)}.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the line faults.")
 @click.option(
@@ -80,7 +80,7 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
     type=float,
     default=0.0,
     metavar="HZ",
-    help="Motors run at this frequency: by their inputs, or as another master left them.",
+    help="Motors run at this frequency, by terminals or as another master left them.",
 )
 @json_option
 @told

@@ -80,7 +80,7 @@ def reference(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Give a drive its reference: 30, 30.5Hz, 900rpm. Starts no motor."""
+    """Set a drive's reference: 30, 30.5Hz, 900rpm. Starts no motor."""
     need_arming(arm, "reference writes the drive's reference; a running motor follows it")
 
     async def work(console: DriveConsole, _: Messages) -> str:

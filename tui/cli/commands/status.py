@@ -24,7 +24,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.say import say
+from ..shared.say import say_row
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -45,6 +45,9 @@ CHANNEL_NAMES: dict[Quantity, str] = {
     "command_channel": "Commanded by",
     "reference_channel": "Reference from",
 }
+
+TITLES = 18
+"""Width of the column of titles, with its gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,7 +272,7 @@ def status(
         found = await status_of_drive(await connect_drive(opened, drive), opened)
         if not as_json:
             for title, text in status_table(found):
-                say(f"{title:<17} {plain(text) or '-----'}")
+                say_row(title, plain(text) or "-----", TITLES)
         return status_json(target.line_text, found), DONE
 
     async def work(opened: OpenLine) -> int:

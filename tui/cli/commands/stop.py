@@ -46,15 +46,15 @@ STOP_POLL_INTERVAL = 0.05
     help=f"With --all: where to look, like 1-10 or 1,2,31; {USUAL_ADDRESSES} unless told"
     " otherwise, or the drives of a simulated line.",
 )
-@click.option("--quick", is_flag=True, help="By the drive's quick stop.")
-@click.option("--freewheel", is_flag=True, help="Let the motor coast.")
+@click.option("--quick", is_flag=True, help="Stop by the drive's quick stop.")
+@click.option("--freewheel", is_flag=True, help="Stop by freewheel: the motor coasts.")
 @click.option(
     "--give-back",
     is_flag=True,
     help="Then give the control back to the terminals; a run command waiting there starts the"
-    " motor, so this part wants --arm.",
+    " motor, so this needs --arm.",
 )
-@click.option("--arm", is_flag=True, help="Let --give-back write to the drive; no stop needs it.")
+@click.option("--arm", is_flag=True, help="Arm the drive for --give-back; no stop needs it.")
 @read_only_option
 @json_option
 @told

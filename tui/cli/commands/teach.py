@@ -31,14 +31,14 @@ if TYPE_CHECKING:
 @click.argument("value", required=False)
 @click.argument("unit", required=False)
 @drive_options
-@click.option("--forget", is_flag=True, help="Teach CODE no longer: it is shown raw again.")
+@click.option("--forget", is_flag=True, help="Forget the scale of CODE: it is shown raw again.")
 @click.option(
     "--reference",
     is_flag=True,
     help="Confirm that CODE, once taught, takes the drive's reference.",
 )
 @click.option(
-    "--no-reference", is_flag=True, help="Give the reference by no taught parameter any more."
+    "--no-reference", is_flag=True, help="Set the reference by no taught parameter any more."
 )
 @json_option
 @never_forced
@@ -53,11 +53,11 @@ def teach(
     no_reference: bool,
     as_json: bool,
 ) -> None:
-    """Teach what a raw value is in its unit, by what the drive's display shows now.
+    """Teach the scale and unit of a raw value by what the drive's display shows now.
 
     VALUE is what the display shows while CODE is read: 50.3 Hz. Two looks at different values tell
-    scale and sign; a look that disagrees ends it. Without VALUE it is told what is taught. Writes
-    nothing to the drive.
+    scale and sign; one that contradicts them ends with 1. Without VALUE what was taught is shown.
+    Nothing is written to the drive.
     """
     wishes = sum((forget, reference, no_reference, value is not None))
     if wishes > 1:

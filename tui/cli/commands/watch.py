@@ -91,14 +91,14 @@ class CsvWish:
     metavar="FILE",
     help="Also write the engineering values to a CSV file.",
 )
-@click.option("--append", is_flag=True, help="Go on with a CSV file that is there.")
-@click.option("--force", is_flag=True, help="Replace a CSV file that is there.")
+@click.option("--append", is_flag=True, help="Continue a CSV file that exists.")
+@click.option("--force", is_flag=True, help="Replace a CSV file that exists.")
 @click.option(
     "--rotate",
     callback=rotation,
     metavar="SIZE|day",
-    help="Put the CSV file aside, with the time in its name, once it has this size (10MB), or when"
-    " the day ends.",
+    help="Rename the CSV file, with the time in its name, at this size (10MB) or when the day ends,"
+    " and begin a new one.",
 )
 @force_profile_option
 @read_only_option
@@ -118,9 +118,9 @@ def watch(
 ) -> None:
     """Watch parameters of drives, by default their monitoring set. Ctrl-C ends it.
 
-    Good is what was read in that very cycle; what was not keeps its last value with the quality
-    stale and the time at which it was read. State and direction are told where the words that
-    tell them are watched.
+    A value is good if it was read in that cycle; otherwise it is the last one, with the quality
+    stale and the time at which it was read. State and direction are told while the status word
+    is watched.
     """
     wish = CsvWish(csv_path, append, force, rotate)
     wish.check()
@@ -150,7 +150,7 @@ def watch(
     try:
         on_line(target, work, read_only=read_only)
     except KeyboardInterrupt:
-        raise Failure(seen.at_the_end(wish.file), INTERRUPTED) from None
+        raise Failure(seen.at_the_end(wish), INTERRUPTED) from None
     finally:
         if wish.file is not None:
             wish.file.close()
@@ -166,9 +166,10 @@ class CyclesSeen:
     silent: str = ""
     """Why a drive never answered; empty while all did."""
 
-    def at_the_end(self, file: CsvFile | None) -> str:
+    def at_the_end(self, wish: CsvWish) -> str:
         """What was told and written, in a sentence."""
-        rows = f"; {file.rows} rows written to {file.path}" if file is not None else ""
+        count = wish.file.rows if wish.file is not None else 0
+        rows = f"; {count} rows written to {wish.path}" if wish.path is not None else ""
         return f"Ended by Ctrl-C after {self.cycles} cycles{rows}."
 
 

@@ -72,7 +72,7 @@ def write(
     """Write settings of a drive, each read back: ACC=3.5s HSP=50 CHCF=Separate.
 
     A VALUE is a number, with or without a unit (3.5s, 3500ms), a name as the profile gives it, or
-    a word in hexadecimal (16#0021). What the drive can only hold as another value is refused
+    a word in hexadecimal (16#0021). A value that the drive would round to another one is refused
     without --round. Limits and scales are written before what depends on them.
     """
     from ..shared.output import drive_json, print_json

@@ -12,11 +12,11 @@ class Messages:
         self.as_json = as_json
         self.texts: list[str] = []
 
-    def tell(self, text: str) -> None:
-        """What is to be known."""
+    def tell(self, text: str, *, indent: int = 0) -> None:
+        """What is to be known; what does not fit a terminal goes on so far from the left."""
         self.texts.append(text)
         if not self.as_json:
-            say(text)
+            say(text, indent=indent)
 
     def complain(self, text: str) -> None:
         """What went wrong: on standard error in any case."""

@@ -5,8 +5,7 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
@@ -30,7 +29,7 @@ CONNECT_WITHIN = 5.0
 line_argument = takes_line
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
-read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
+read_only_option = click.option("--read-only", is_flag=True, help="Write nothing on this line.")
 
 profile_option = click.option(
     "-p",
@@ -38,19 +37,18 @@ profile_option = click.option(
     "profile_id",
     metavar="ID",
     shell_complete=complete_profile,
-    help="Profile of the drive; it has to fit what the drive says of itself.",
+    help="Profile of the drive; it must match the drive's identification.",
 )
 rated_current_option = click.option(
     "--rated-current",
     "rated_current",
     type=float,
     metavar="A",
-    help="Rated current of the drive in A, for families that give currents in %.",
+    help="Rated current of the drive in A, for families that tell currents in %.",
 )
 
 
-@dataclass(frozen=True, slots=True)
-class Target:
+class Target(NamedTuple):
     """What the shared options name."""
 
     line_text: str
@@ -65,7 +63,7 @@ class Target:
     def each(self) -> list[Target]:
         """A target for each drive, in the order in which they were named."""
         devices = dict.fromkeys((self.device, *self.others))
-        return [replace(self, device=device, others=()) for device in devices]
+        return [self._replace(device=device, others=()) for device in devices]
 
 
 FORCE_PROFILE = "--force-profile"
@@ -73,7 +71,7 @@ force_profile_option = click.option(
     FORCE_PROFILE,
     "force_profile",
     is_flag=True,
-    help="Go by the profile of -p though the drive says it is another.",
+    help="Use the profile of -p although the drive identifies as another.",
 )
 """For commands that read, watch or write; it reaches them in their Target."""
 
@@ -108,7 +106,7 @@ def _target_of(*options: Option) -> Option:
         ) -> Any:
             first, *more = device if isinstance(device, tuple) else (device,)
             target = Target(line_text, first, profile_id, rated_current, force_profile)
-            return command(target=replace(target, others=tuple(more)), **others)
+            return command(target=target._replace(others=tuple(more)), **others)
 
         decorated: CommandFunction = handed_over
         for option in reversed(options):

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import sys
 import time
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,32 +34,32 @@ if TYPE_CHECKING:
     from tui.session.read.upload import Upload
     from tui.session.settings.applied import Result
 
+_REGISTER = re.compile(r", register \d+")
 OUTAGE = 20.0
 """Seconds for which a read-out waits for a lost line to come back."""
 SET_POLL_INTERVAL = 0.1
 
 file_argument = click.argument("file", type=click.Path(path_type=Path))
-force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
+force_option = click.option("--force", is_flag=True, help="Replace FILE if it exists.")
 confirm_option = click.option(
     "--confirm",
     "confirmed",
     multiple=True,
     metavar="CODE",
     shell_complete=complete_code,
-    help="Write this unverified parameter too, after comparing it with the keypad.",
+    help="Write this unverified parameter too, once its value was compared with the keypad.",
 )
 save_option = click.option(
-    "--save", is_flag=True, help="Save the settings to the drive's EEPROM afterwards."
+    "--save", is_flag=True, help="Then save the settings to the drive's EEPROM."
 )
 round_option = click.option(
     "--round",
     "rounded",
     is_flag=True,
-    help="Write a value all the same that the drive can only hold as another: as 0, or half a"
-    " step away.",
+    help="Write also values that are rounded to another one: to 0, or by half a step.",
 )
 dry_run_option = click.option(
-    "--dry-run", is_flag=True, help="Tell what would be written, and write nothing."
+    "--dry-run", is_flag=True, help="Tell what would be written; write nothing."
 )
 
 
@@ -88,6 +89,18 @@ def write_down(file: Path, text: str, *, force: bool = False) -> None:
         write_file(file, text, force=force)
     except SetError as error:
         raise Failure(str(error), USAGE) from error
+
+
+def complain_absent(messages: Messages, absent: Mapping[str, str]) -> None:
+    """What could not be read, and why; what has one reason in one line."""
+    reasons: dict[str, list[str]] = {}
+    for code, why in absent.items():
+        reasons.setdefault(_REGISTER.sub("", why), []).append(code)
+    for reason, codes in reasons.items():
+        if len(codes) == 1:
+            messages.complain(f"{codes[0]} could not be read: {absent[codes[0]]}")
+        else:
+            messages.complain(f"{len(codes)} could not be read: {', '.join(codes)}. {reason}")
 
 
 def codes_of(session: DriveSession, names: Iterable[str]) -> frozenset[str]:

@@ -9,10 +9,10 @@ from __future__ import annotations
 import os
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from functools import lru_cache
 from pathlib import Path
-from typing import Any
+from types import MappingProxyType
+from typing import Any, NamedTuple
 
 from ..errors import ProfileError
 
@@ -23,11 +23,10 @@ _PARAMETER = re.compile(r"^\[\[parameters\]\]", re.MULTILINE)
 _CODE = re.compile(r"""^\[\[parameters\]\]\ncode = (["'])(.+)\1$""", re.MULTILINE)
 
 
-@dataclass(frozen=True, slots=True)
-class ProfileFileHead:
+class ProfileFileHead(NamedTuple):
     """The first table of a file as it stands there, unchecked."""
 
-    table: Mapping[str, Any] = field(default_factory=dict)
+    table: Mapping[str, Any] = MappingProxyType({})
     parameters: int = 0
     fault: str = ""
 
@@ -45,8 +44,7 @@ class ProfileFileHead:
             return None
 
 
-@dataclass(frozen=True, slots=True)
-class AskedOf:
+class AskedOf(NamedTuple):
     """How a drive of a family is found on a line."""
 
     prefixes: tuple[str, ...] = ()

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from ..errors import ProfileError, UnknownProfile
 from .heads import asked_of, file_head, quick_head
@@ -21,8 +20,7 @@ if TYPE_CHECKING:
     from .schema import HelpData
 
 
-@dataclass(frozen=True, slots=True)
-class Listing:
+class Listing(NamedTuple):
     """What a listing shows of a profile, read from the head of its file."""
 
     id: str
@@ -82,7 +80,7 @@ def all_files() -> list[Listing]:
     found = []
     for path, own in profile_files():
         listing = _listing(path, own)
-        found.append(replace(listing, hidden_by=first.get(listing.id)))
+        found.append(listing._replace(hidden_by=first.get(listing.id)))
         first.setdefault(listing.id, path)
     return sorted(found, key=lambda listing: listing.id)
 

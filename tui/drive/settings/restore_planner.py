@@ -198,7 +198,7 @@ class _Planner:
     def _reason_against(self, parameter: Parameter) -> tuple[SkipReason, str] | None:
         code, options = parameter.code, self.options
         if not is_setting(self.profile, parameter):
-            return "no setting", "it is measured, counted or ordered"
+            return "no setting", "it is a measurement, a counter or a command"
         if parameter.forbidden:
             return "forbidden", parameter.forbidden
         if not is_verified(parameter) and code not in options.confirmed:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from rich.style import Style
 from rich.text import Text
@@ -48,8 +47,7 @@ def simulated_lines() -> tuple[tuple[str, str], ...]:
     )
 
 
-@dataclass(frozen=True, slots=True)
-class LineChoice:
+class LineChoice(NamedTuple):
     """A line that can be opened; `path` where it is a serial port with settings of its own."""
 
     text: str
@@ -71,8 +69,7 @@ LINE_MARKS: dict[LineMark, tuple[str, Style]] = {
 """What stands before a line: open, shown, open below with a drive in fault."""
 
 
-@dataclass(frozen=True, slots=True)
-class Group:
+class Group(NamedTuple):
     """Choices under one heading."""
 
     title: str

@@ -16,6 +16,11 @@ class DriveList(OptionList):
     The cursor stays on its drive, whatever comes above it.
     """
 
+    def update_node_styles(self, animate: bool = True) -> None:
+        """Nothing is styled before it stands on a screen: then it is, as a whole."""
+        if self.is_attached:
+            super().update_node_styles(animate)
+
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True)
         self._drawn: dict[int, Text] = {}

@@ -2,35 +2,79 @@
 
 from __future__ import annotations
 
+from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
 from textual.widgets import Input
 
 from tui.session.connect.addresses import parse_addresses
 from tui.widgets.fields import NumberInput
+from tui.widgets.lines import Lines
 from tui.widgets.plain import Plain
 
+from .form_picture import drawn_field, form_lines
+
 BAUD, FORMAT, ADDRESSES = "19200", "8E1", "1-10"
+FIELD_ROWS = (
+    ("Serial", ("baud", "format")),
+    ("Profile", ("profile",)),
+    ("Addresses", ("addresses",)),
+)
+"""Names of the rows with the fields in each."""
 
 
 class LineForm(Vertical):
-    """Three rows of fields; an empty setting counts as the usual one."""
+    """Three rows of fields; an empty setting counts as the usual one.
+
+    Until `put_fields` they are a picture, though their values count from the start.
+    """
 
     typed = False
     """Whether a person has typed addresses since the last line was opened."""
 
+    def __init__(self) -> None:
+        super().__init__()
+        self._fields = {
+            "baud": NumberInput(BAUD, id="baud", type="integer", max_length=6),
+            "format": NumberInput(FORMAT, id="format", max_length=3),
+            "profile": NumberInput("", id="profile", placeholder="identify"),
+            "addresses": NumberInput(ADDRESSES, id="addresses"),
+        }
+        self._picture: Lines | None = Lines(fit=self._drawn)
+
     def compose(self) -> ComposeResult:
-        """The fields with their names."""
-        with Horizontal(classes="settings"):
-            yield Plain("Serial")
-            yield NumberInput(BAUD, id="baud", type="integer", max_length=6)
-            yield NumberInput(FORMAT, id="format", max_length=3)
-        with Horizontal(classes="settings"):
-            yield Plain("Profile")
-            yield NumberInput("", id="profile", placeholder="identify")
-        with Horizontal(classes="settings"):
-            yield Plain("Addresses")
-            yield NumberInput(ADDRESSES, id="addresses")
+        """The picture of the fields."""
+        if self._picture is not None:
+            yield self._picture
+
+    def _draw(self) -> None:
+        """Show the values as they are now, while there is a picture only."""
+        if self._picture is not None and (width := self.size.width):
+            self._picture.show(self._drawn(width))
+
+    def _drawn(self, width: int) -> list[Text]:
+        """The fields as they will look."""
+        return form_lines(
+            [(name, [self._drawn_field(one) for one in fields]) for name, fields in FIELD_ROWS],
+            width,
+        )
+
+    def _drawn_field(self, name: str) -> Text:
+        field = self._fields[name]
+        return drawn_field(field.value, field.placeholder, off=field.disabled)
+
+    async def put_fields(self) -> None:
+        """Put the fields where their picture stands; they are not seen below another screen."""
+        picture, self._picture = self._picture, None
+        if picture is None:
+            return
+        rows = (
+            Horizontal(Plain(name), *(self._fields[one] for one in fields), classes="settings")
+            for name, fields in FIELD_ROWS
+        )
+        with self.app.batch_update():
+            await self.mount(*rows)
+            await picture.remove()
 
     def line_at(self, path: str) -> str:
         """The LINE of a serial port with these settings."""
@@ -45,14 +89,15 @@ class LineForm(Vertical):
 
     def addresses(self) -> list[int]:
         """The addresses to ask; raises LinkSyntaxError where they are none."""
-        return parse_addresses(self._field("addresses").value)
+        return parse_addresses(self._fields["addresses"].value)
 
     def offer_addresses(self, text: str) -> None:
         """The addresses of a line that was opened, unless a person has just typed others."""
         if not self.typed:
-            field = self._field("addresses")
+            field = self._fields["addresses"]
             with field.prevent(Input.Changed):
                 field.value = text
+            self._draw()
         self.typed = False
 
     def on_input_changed(self, event: Input.Changed) -> None:
@@ -62,7 +107,7 @@ class LineForm(Vertical):
 
     def ask_for_addresses(self) -> None:
         """Into the field of the addresses, at once: what is typed next belongs there."""
-        self.screen.set_focus(self._field("addresses"))
+        self.screen.set_focus(self._fields["addresses"])
 
     @property
     def profile(self) -> str:
@@ -71,15 +116,13 @@ class LineForm(Vertical):
 
     def ask_for_profile(self) -> None:
         """Into the field of the profile, at once: what is typed next belongs there."""
-        self.screen.set_focus(self._field("profile"))
+        self.screen.set_focus(self._fields["profile"])
 
     def offer_settings(self, port: bool) -> None:
         """Only a serial port has settings that are chosen here."""
         for name in ("baud", "format"):
-            self._field(name).disabled = not port
-
-    def _field(self, name: str) -> Input:
-        return self.query_one(f"#{name}", Input)
+            self._fields[name].disabled = not port
+        self._draw()
 
     def _typed(self, name: str) -> str:
-        return self._field(name).value.strip()
+        return self._fields[name].value.strip()

@@ -20,6 +20,11 @@ from .choices import Group, LineChoice, LineMark, choice_line, groups
 class LineList(OptionList):
     """Lines under headings; drawn anew only when they or its width have changed."""
 
+    def update_node_styles(self, animate: bool = True) -> None:
+        """Nothing is styled before it stands on a screen: then it is, as a whole."""
+        if self.is_attached:
+            super().update_node_styles(animate)
+
     def __init__(self, *, id: str) -> None:
         super().__init__(id=id, compact=True)
         self._groups: list[Group] = []
@@ -82,7 +87,7 @@ class LineList(OptionList):
         self._fill()
 
     def _fill(self) -> None:
-        width = max(12, self.size.width - 1)
+        width = max(12, (self.size.width or list_width(self.app.size.width)) - 1)
         if self._shown == (width, self._groups, (self._here, self._open, self._faulty)):
             return
         self._shown = (width, self._groups, (self._here, self._open, self._faulty))
@@ -114,6 +119,11 @@ class LineList(OptionList):
         if line == self._here:
             return "shown"
         return "fault" if line in self._faulty else "open"
+
+
+def list_width(width: int) -> int:
+    """The width that the styles give the list on a terminal of so many columns."""
+    return max(22, min(32, width * 32 // 100))
 
 
 def _key(text: str) -> str:

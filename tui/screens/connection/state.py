@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from rich.text import Text
@@ -28,7 +29,7 @@ from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
 from .rows import rows_of
-from .wall import column_heads, columns_for, heading, in_order, wall_line
+from .wall import WallRow, column_heads, columns_for, heading, in_order, wall_line
 
 if TYPE_CHECKING:
     from tui.session.connect.search import Search
@@ -50,6 +51,7 @@ READ_ONLY = "Read-only: nothing is written to a drive, no stop either."
 SEARCH_LABEL = 11
 SEARCH_TEXT = 18
 """Cells that tell how far a search is."""
+NOBODY: Mapping[int, WallRow] = MappingProxyType({})
 
 
 class LineView(PanelScreen):
@@ -59,7 +61,11 @@ class LineView(PanelScreen):
         super().__init__()
         self.warned: set[int] = set()
         """Devices of which it was said that they trip when they are left alone."""
-        self._advice: tuple[str, str, str] = ("", "", "")
+        self._advice = (
+            "No line is open.",
+            "Choose a line and press Enter, or n to type one.",
+            "",
+        )
         self._looking: list[Timer] = []
         self._away = self._was_lost = False
         self._key_at = -math.inf
@@ -69,14 +75,14 @@ class LineView(PanelScreen):
         """Two columns and the lines below."""
         with Horizontal(id="body"):
             with Vertical(id="left"):
-                yield Lines(id="lines-title")
+                yield Lines(id="lines-title", fit=_lines_title)
                 yield LineList(id="lines")
                 yield LineForm()
-                yield Lines(id="search")
+                yield Lines(id="search", fit=self._how_far)
             with Vertical(id="right"):
-                yield Lines(id="drives-title")
+                yield Lines(id="drives-title", fit=self._drives_title)
                 yield Lines(id="columns")
-                yield Lines(id="message")
+                yield Lines(id="message", fit=self._advice_lines)
                 yield DriveList(id="drives")
         yield Lines(id="about")
 
@@ -107,10 +113,11 @@ class LineView(PanelScreen):
 
     def on_mount(self) -> None:
         """Show what there is."""
-        self.advise("No line is open.", "Choose a line and press Enter, or n to type one.")
         self.lines.look_for_lines()
         for fault in line_settings().faults:
             self.app.events.add(ALARM_KIND, fault)
+        self.lines.fill(self.app.line_text, self.app.open_texts)
+        self.form.offer_settings(bool(self.lines.chosen and self.lines.chosen.path))
         self._looking = [self.set_interval(SELDOM if self.app.low_bandwidth else STATES, self.look)]
 
     def on_resize(self, event: Resize) -> None:
@@ -135,6 +142,12 @@ class LineView(PanelScreen):
         for timer in self._looking:
             timer.resume()
         self.call_after_refresh(self._redraw)
+        self.call_after_refresh(self._put_fields)
+
+    async def _put_fields(self) -> None:
+        """Fields to type into: behind the first picture, and only where they are seen."""
+        if self.is_current:
+            await self.form.put_fields()
 
     def _redraw(self) -> None:
         self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
@@ -167,13 +180,15 @@ class LineView(PanelScreen):
         order = in_order(rows, list(dict.fromkeys(faults)))
         lines = {device: wall_line(row, columns) for device, row in rows.items()}
         self.drives.fill(lines, order, sort=self._hands_are_quiet())
-        asked = len({*rows, *(self.search.devices if self.search else ())})
-        title = self.app.line_label or "No line"
         width = self.query_one("#drives-title").size.width
-        self.put("drives-title", [heading(title, list(rows.values()), asked, width)])
+        self.put("drives-title", self._drives_title(width, rows))
         self.put("columns", [column_heads(columns)] if rows else [])
         self._show_advice()
         self.show_about()
+
+    def _drives_title(self, width: int, rows: Mapping[int, WallRow] = NOBODY) -> list[Text]:
+        asked = len({*rows, *(self.search.devices if self.search else ())})
+        return [heading(self.app.line_label or "No line", list(rows.values()), asked, width)]
 
     def show_about(self) -> None:
         """All that the drive under the cursor says of itself, and what to do about one that not."""
@@ -196,13 +211,16 @@ class LineView(PanelScreen):
         """The title of the lines, and how far the search is."""
         if not self.is_current:
             return
-        self.put("lines-title", [rule("Lines", self.query_one("#lines-title").size.width)])
+        for place, fit in (("lines-title", _lines_title), ("search", self._how_far)):
+            self.put(place, fit(self.query_one(f"#{place}").size.width))
+
+    def _how_far(self, width: int) -> list[Text]:
+        """How far the search is."""
         far = self.search.text if self.search else "no line"
         if self.app.fleet is not None and self.search is None:
             far = "s begins"
-        width = self.query_one("#search").size.width
         label = SEARCH_LABEL if width > SEARCH_LABEL + SEARCH_TEXT else len(" Search ")
-        self.put("search", [pair(" Search", far, PLAIN, label)])
+        return [pair(" Search", far, PLAIN, label)]
 
     # What happened
 
@@ -235,8 +253,13 @@ class LineView(PanelScreen):
     def _show_advice(self) -> None:
         if not self.is_current:
             return
+        width = self.query_one("#right").size.width
+        self.put("message", [] if self.found else self._advice_lines(width))
+
+    def _advice_lines(self, width: int) -> list[Text]:
+        """What happened, what to do next, in the column at the right."""
         now, next_step, kind = self._advice
-        width = max(10, self.query_one("#right").size.width - 3)
+        width = max(10, width - 3)
         style = {ERROR_KIND: FAULT, ALARM_KIND: ALARM}.get(kind, PLAIN)
         lines = [Text("")]
         lines += [Text(f"  {part}", style) for part in wrapped(now, width, ADVICE)]
@@ -246,7 +269,7 @@ class LineView(PanelScreen):
                 Text(""),
                 *(Text(f"  {part}", FAINT) for part in wrapped(READ_ONLY, width, 2)),
             ]
-        self.put("message", [] if self.found else lines)
+        return lines
 
     def _follow_line(self) -> None:
         """While no drive is found: a line that is lost, and that came back."""
@@ -279,3 +302,8 @@ class LineView(PanelScreen):
             f"Kept asking: {which}. Drives trip at the end of their communication time-out;"
             " it cannot run out while this line is open.",
         )
+
+
+def _lines_title(width: int) -> list[Text]:
+    """The title of the lines."""
+    return [rule("Lines", width)]

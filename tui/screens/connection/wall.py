@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import NamedTuple
 
 from rich.style import Style
 from rich.text import Text
@@ -40,8 +40,7 @@ WALL_SIGNS = {**STATE_SIGNS, "stop": "▼", "stop failed": "■", "none": " "}
 FULL = "━"
 
 
-@dataclass(frozen=True, slots=True)
-class WallRow:
+class WallRow(NamedTuple):
     """A drive at one moment, in words and figures; what is not known is empty."""
 
     device: int
@@ -61,8 +60,7 @@ class WallRow:
     """Whether that is too long ago to be the present."""
 
 
-@dataclass(frozen=True, slots=True)
-class WallColumns:
+class WallColumns(NamedTuple):
     """Widths of the columns; 0 for one that there is no room for."""
 
     drive: int
@@ -97,7 +95,7 @@ LAYOUTS = (
 def columns_for(width: int) -> WallColumns:
     """The columns that fit a width; what is left over widens the state, as faults have names."""
     found = next((one for one in LAYOUTS if one.taken <= width), LAYOUTS[-1])
-    return replace(found, state=min(WIDEST_STATE, found.state + max(0, width - found.taken)))
+    return found._replace(state=min(WIDEST_STATE, found.state + max(0, width - found.taken)))
 
 
 def in_order(devices: Iterable[int], faults: Sequence[int]) -> list[int]:

@@ -49,6 +49,13 @@ def monitor_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> 
     return parts | _side_by_side(view, room, words)
 
 
+def word_parts(view: View, room: Arrangement, words: Sequence[Parameter]) -> Parts:
+    """What another chosen word changes: the words side by side, or the place of the trend."""
+    if room.wide:
+        return _side_by_side(view, room, words)
+    return {"trend": _trend_or_word(view, room, words)}
+
+
 def _trend_or_word(view: View, room: Arrangement, words: Sequence[Parameter]) -> list[Text]:
     """The trend, or in its place the chosen word with all its bits."""
     if not room.trend:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from functools import lru_cache
+
 from rich.text import Text
 
 from tui.drive.profile.profile import Profile, is_verified, mark_of
@@ -44,9 +47,10 @@ NO_ROOM = "on 3"
 """Where what there is no room for is read."""
 
 
-def other_values(profile: Profile) -> list[MonitoringValue]:
+@lru_cache(maxsize=8)
+def other_values(profile: Profile) -> Sequence[MonitoringValue]:
     """The values beside the readouts, in the profile's order."""
-    return [value for value in profile.data.monitoring.values if _is_other(profile, value)]
+    return tuple(value for value in profile.data.monitoring.values if _is_other(profile, value))
 
 
 def _is_other(profile: Profile, value: MonitoringValue) -> bool:

@@ -21,7 +21,7 @@ from tui.widgets.strip import FrameView
 from ..frame import SELDOM
 from ..keys.table import MONITOR, bindings, keys_line
 from .arrange import Arrangement, arrange
-from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words
+from .assembly import WORDS_MOST, codes_beside, monitor_parts, pages_in, watched_words, word_parts
 from .commands import order_keys
 from .input_keys import InputKeys
 from .motor import other_values
@@ -205,7 +205,9 @@ class MonitorScreen(InputKeys):
         after = 0 if self._word is None and not room.wide else (self._word or 0) + 1
         pages = len(pages_in(room, self._words))
         self._word = None if not room.wide and after >= pages else after
-        self.look()
+        if self.is_current and self.size.width:
+            for place, lines in word_parts(self._view(), room, self._words).items():
+                self.put(place, lines)
 
     def action_rating(self) -> None:
         """Tell the rated current of a drive that gives its current in %."""

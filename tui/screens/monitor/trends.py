@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 
+from rich.style import Style
 from rich.text import Text
 
 from tui.drive.profile.schema import Parameter, Quantity
@@ -57,7 +59,7 @@ def one_trend(view: View, quantity: Quantity, width: int, height: int) -> list[T
     signed = any(value is not None and value < 0 for value in (*points, *wanted))
     high = _top(view, parameter, TREND_PLACES[quantity])
     style = BAR_REST if view.lost else BAR
-    rows = trend_rows(points, wanted, high or 1.0, height - 1, signed=signed, style=style)
+    rows = _drawn(tuple(points), tuple(wanted), high or 1.0, height - 1, signed, style)
     legend = _legend(view, quantity, parameter)
     lines = []
     for at, row in enumerate(rows):
@@ -68,6 +70,19 @@ def one_trend(view: View, quantity: Quantity, width: int, height: int) -> list[T
         line.append_text(legend[at] if at < len(legend) else Text(" " * LEGEND_CELLS))
         lines.append(line)
     return [*lines, _axis(view, columns)]
+
+
+@lru_cache(maxsize=8)
+def _drawn(
+    points: Sequence[float | None],
+    wanted: Sequence[float | None],
+    high: float,
+    height: int,
+    signed: bool,
+    style: Style,
+) -> list[Text]:
+    """The rows; they shift by a column now and then only, and whoever takes them copies them."""
+    return trend_rows(points, wanted, high, height, signed=signed, style=style)
 
 
 def _label(row: int, rows: int, high: float | None, *, signed: bool) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 from rich.style import Style
 from rich.text import Text
@@ -164,13 +165,17 @@ def _heading(view: View, page: WordPage, width: int) -> Text:
 
 
 def _bit_line(bit: Bit, raw: int | None, width: int) -> Text:
-    """A bit in exactly so many cells."""
+    """A bit in exactly so many cells; whoever takes it copies it before changing it."""
+    return _drawn_bit(bit, None if raw is None else bool(raw >> bit.bit & 1), width)
+
+
+@lru_cache(maxsize=1024)
+def _drawn_bit(bit: Bit, on: bool | None, width: int) -> Text:
     text = Text(no_wrap=True)
     text.append(f" {bit.bit:>2} ", LINE)
     room = width - 7
-    if raw is None:
+    if on is None:
         return text.append(f"  {cut(bit.name, room)} ", FAINT)
-    on = bool(raw >> bit.bit & 1)
     text.append("●" if on else "·", ALARM if on and bit.alarm else STRONG if on else FAINT)
     return text.append(f" {cut(_bit_words(bit, on, room), room)} ", PLAIN if on else FAINT)
 

@@ -6,7 +6,6 @@ import re
 from ipaddress import ip_address
 
 from tui.bus.errors import LinkSyntaxError
-from tui.bus.link import RtuTcpLink, SerialLink, TcpLink, parse_link
 
 SIMULATED_PREFIX = "sim:"
 _LABEL_SETTINGS = re.compile(r"\s\d+(\s8[NEO][12](\stimeout=\S+)?)?$", re.IGNORECASE)
@@ -21,6 +20,8 @@ def line_key(text: str) -> str:
     name of its own, else by its real path, as links lead now; names of hosts are not looked up. A
     text that is no line is its own key.
     """
+    from tui.bus.link import RtuTcpLink, SerialLink, TcpLink, parse_link
+
     text = text.strip()
     if text.casefold().startswith(SIMULATED_PREFIX):
         return _simulated(text)

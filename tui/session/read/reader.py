@@ -48,6 +48,8 @@ class Reader:
     _met: set[str] = field(default_factory=set)
     """Unconfirmed words that this drive has answered."""
     _plans: dict[tuple[Hashable, ...], ReadPlan] = field(default_factory=dict)
+    _planned_for: float = 0.0
+    """Turnaround in seconds that plans count with, while it is about that."""
     _slots: Slots = field(init=False)
 
     def __post_init__(self) -> None:
@@ -231,7 +233,9 @@ class Reader:
         measured = self.line.device_state(self.device).usual_turnaround
         if measured is None:
             return USUAL_TURNAROUND
-        return round(measured / TURNAROUND_STEP) * TURNAROUND_STEP
+        if abs(measured - self._planned_for) > max(TURNAROUND_STEP, self._planned_for / 3):
+            self._planned_for = round(measured / TURNAROUND_STEP) * TURNAROUND_STEP
+        return self._planned_for
 
     def _timing(self, turnaround: float) -> WireTiming:
         link = self.line.link

@@ -1,0 +1,61 @@
+"""The first picture is whole, and stays what it was when the fields to type into are there."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+from rich.color import ColorSystem
+from textual.widgets import Input
+
+from tui.app import DrivePanelApp
+from tui.terminal.lean import cells_of
+
+from .test_flows import until
+
+
+def picture(app: Any) -> list[list[tuple[str, str]]]:
+    """Every cell with its colours, but for the strip, which has the time of day."""
+    return [cells_of(strip, ColorSystem.TRUECOLOR) for strip in app._last_strips()[1:]]
+
+
+class FirstPicture(DrivePanelApp):
+    """Keeps the first picture that goes to the terminal."""
+
+    first: list[list[tuple[str, str]]] | None = None
+    fields_then = 0
+
+    def _last_strips(self) -> Any:
+        return self.screen._compositor.render_strips()
+
+    def _display(self, screen: Any, renderable: Any) -> None:
+        super()._display(screen, renderable)
+        if renderable is not None and not self._batch_count and self.first is None:
+            self.first = picture(self)
+            self.fields_then = len(self.screen.query(Input))
+
+
+@pytest.mark.parametrize("size", [(80, 24), (120, 40), (60, 20), (200, 60)])
+@pytest.mark.parametrize("ports", [[], [("/dev/ttyUSB0", "USB-RS485 adapter")]])
+async def test_nothing_is_seen_of_the_fields_that_come_behind_the_first_picture(
+    ports: list[tuple[str, str]], size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", lambda: list(ports))
+    app = FirstPicture()
+    async with app.run_test(size=size) as pilot:
+        await until(pilot, lambda: len(app.connection.form.query(Input)) == 4)
+        await pilot.pause()
+        assert app.first is not None
+        assert app.fields_then == 0, "the first picture waits for none of them"
+        assert app.first == picture(app)
+
+
+async def test_what_is_asked_of_the_fields_does_not_wait_for_them() -> None:
+    app = DrivePanelApp()
+    async with app.run_test() as pilot:
+        form = app.connection.form
+        form.offer_addresses("3, 5")
+        assert form.addresses() == [3, 5]
+        assert form.line_at("/dev/ttyUSB0") == "serial:/dev/ttyUSB0,19200,8E1"
+        await until(pilot, lambda: len(form.query(Input)) == 4)
+        assert form.query_one("#addresses", Input).value == "3, 5"

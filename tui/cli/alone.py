@@ -1,0 +1,37 @@
+"""`drivepanel` alone: there is no command line to take apart, so nothing is imported for that."""
+
+from __future__ import annotations
+
+import gc
+import sys
+
+from .opening import open_panel, terminal_trouble
+from .shared.logs import start_logging
+
+
+def alone() -> None:
+    """Open the panel; whatever goes wrong is told as by every command."""
+    gc.disable()  # until the first picture
+    try:
+        start_logging(0)
+        if not terminal_trouble():
+            sys.exit(open_panel(None, None))
+    except (Exception, KeyboardInterrupt) as error:
+        _tell(error)
+    from .main import main
+
+    main(prog_name="drivepanel")
+
+
+def _tell(error: BaseException) -> None:
+    """Tell an error and end with its status."""
+    import click
+
+    from .shared.errors import told
+
+    @click.command()
+    @told
+    def failed() -> None:
+        raise error
+
+    failed(args=[], prog_name="drivepanel")

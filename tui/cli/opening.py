@@ -1,0 +1,88 @@
+"""Opening the panel itself; what takes a command line apart is not needed here."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from typing import TYPE_CHECKING
+
+from .shared.signals import ending_by_signal
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+
+STOP, LEAVE_RUNNING = "stop", "leave-running"
+
+YOUNGEST = 10_000
+"""New objects after which garbage is looked for; a look holds up what a key does."""
+
+DEMO_LINE = "demo"
+"""The LINE of the demo inside the panel; every other text is opened as it is written."""
+
+
+def open_panel(
+    start: str | None,
+    device: int | None,
+    *,
+    read_only: bool = False,
+    low_bandwidth: bool = False,
+    on_hangup: str = STOP,
+    mouse: bool = False,
+    bell: bool = True,
+    ascii: bool | None = None,
+) -> int:
+    """Run the panel until it is left; the exit status."""
+    gc.disable()  # until the first picture: what is imported and built for it stays
+    os.environ.setdefault("TEXTUAL_ANIMATIONS", "none")  # read when textual is first imported
+    from tui.app import DrivePanelApp
+    from tui.session.connect.open_line import open_line
+    from tui.terminal.abilities import abilities_of, fewer_colours, given_environment
+
+    abilities = abilities_of(
+        given_environment(os.environ), written_as=sys.stderr.encoding, ascii=ascii
+    )
+    app = DrivePanelApp(
+        open_line=_open_with_demo if start == DEMO_LINE else open_line,
+        start=start,
+        device=device,
+        read_only=read_only,
+        low_bandwidth=low_bandwidth,
+        leave_running=on_hangup == LEAVE_RUNNING,
+        mouse=mouse,
+        bell=bell,
+        abilities=fewer_colours(abilities) if low_bandwidth else abilities,
+        on_shown=collect_garbage,
+    )
+    with ending_by_signal(app, stop=on_hangup == STOP):
+        app.run()
+    return app.return_code or 0
+
+
+def _open_with_demo(
+    text: str, *, read_only: bool = False, wait: float | None = None, program: str = ""
+) -> OpenLine:
+    """The demo's line, or any other that is chosen in the panel afterwards."""
+    from tui.session.connect.open_line import demo_line, open_line
+
+    if text == DEMO_LINE:
+        from tui.drive.profile.library import demo_drives
+
+        return demo_line({id: hertz for id, (_, hertz) in demo_drives().items()})
+    return open_line(text, read_only=read_only, wait=wait, program=program)
+
+
+def collect_garbage() -> None:
+    """Collect garbage from now on, more seldom than usual, and not among what is there by now."""
+    gc.freeze()
+    gc.set_threshold(YOUNGEST, *gc.get_threshold()[1:])
+    gc.enable()
+
+
+def terminal_trouble() -> str:
+    """Why the panel cannot be drawn here, or nothing."""
+    if not (sys.stdin.isatty() and sys.stdout.isatty()):
+        return "The panel needs a terminal. Without one, use read, watch or --help."
+    if not sys.stderr.isatty():
+        return "The panel is drawn on standard error: leave away what leads that elsewhere (2>)."
+    return ""
