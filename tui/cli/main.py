@@ -18,6 +18,7 @@ COMMANDS = {
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
     "demo": ("panel", "Open the panel on five simulated, running drives."),
     "identify": ("identify", "Ask a drive who it is."),
+    "journal": ("journal", "Show what was written to drives from here."),
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "read": ("read", "Read parameters of a drive."),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import json
 import os
 from pathlib import Path
@@ -11,13 +12,34 @@ ADDRESSES_LENGTH = 50
 """Lines whose addresses are remembered."""
 
 
+NOWHERE = Path(os.devnull) / "no home folder is known: name a folder in DRIVEPANEL_STATE"
+"""In place of the state folder where there is none: whatever is tried there fails, and says why."""
+FOLDER_MODE = 0o700
+
+
 def state_folder() -> Path:
     """The folder for what the panel keeps; `DRIVEPANEL_STATE` names another."""
     if configured := os.environ.get("DRIVEPANEL_STATE"):
         return Path(configured)
     from platformdirs import user_state_path
 
-    return user_state_path("drivepanel", appauthor=False)
+    try:
+        folder = user_state_path("drivepanel", appauthor=False)
+    except RuntimeError:
+        return NOWHERE
+    # without a home it would lie wherever the panel happens to be started
+    return folder if folder.is_absolute() else NOWHERE
+
+
+def make_folder(folder: Path) -> None:
+    """See that a folder is there; those that are made are their owner's alone. Raises OSError."""
+    if NOWHERE in (folder, *folder.parents):
+        raise OSError(errno.ENOENT, NOWHERE.name)
+    missing = [one for one in (folder, *folder.parents) if not one.exists()]
+    for one in reversed(missing):
+        one.mkdir(mode=FOLDER_MODE, exist_ok=True)
+    if not folder.is_dir():
+        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
 
 
 def recent_lines() -> list[str]:
@@ -58,7 +80,7 @@ def _all_addresses() -> dict[str, object]:
 
 def _keep(file: Path, what: object) -> None:
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(file.parent)
         part = file.with_suffix(".part")
         part.write_text(json.dumps(what, indent=1), encoding="utf-8")
         part.replace(file)

@@ -21,7 +21,7 @@ from ..shared.options import (
 )
 from ..shared.say import say
 from ..shared.sets import dry_run_option, write_down
-from .orders import arm_option, close_journal, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.blocks.assignment import Assignment
@@ -169,7 +169,6 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.drive.blocks.assignment import describe, slot_changes
     from tui.drive.blocks.slot_rules import assignment_problems, refusing
     from tui.session.blocks.write import AssignmentRefused, write_assignment
-    from tui.session.journal import Journal
     from tui.session.settings.write import NotTaken
 
     held, plans = await _plans(session, wanted)
@@ -189,7 +188,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
         raise Failure(" ".join(refused), REFUSED_HERE)
     if wanted.dry_run:
         return DONE
-    journal = Journal()
+    journal = told_journal()
     try:
         for plan in plans:
             done = await write_assignment(

@@ -62,6 +62,10 @@ def run_panel(
     )
     with ending_by_signal(app, stop=on_hangup == STOP):
         app.run()
+    if app.begun_journal is not None:
+        from .orders import close_journal
+
+        close_journal(app.begun_journal)
     if app.return_code:
         raise click.exceptions.Exit(app.return_code)  # the panel itself has said why
 

@@ -31,7 +31,7 @@ def report(target: Target, file: Path, force: bool) -> None:
     what it does on a silent line, its faults, and what was written to it from here.
     """
     from tui.session.journal import Journal
-    from tui.session.report import entries_of
+    from tui.session.journal_reading import entries_of
     from tui.session.report import report_text as text_of
 
     refuse_existing(file, force=force)

@@ -31,7 +31,7 @@ from ..shared.sets import (
     set_in,
     status_of_results,
 )
-from .orders import arm_option, close_journal, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
@@ -165,7 +165,6 @@ async def _restore(
     session: DriveSession, values: ParameterSet, options: Options, *, save: bool
 ) -> int:
     from tui.drive.profile import library
-    from tui.session.journal import Journal
     from tui.session.settings.eeprom import save_to_eeprom
     from tui.session.settings.restore import Mark
     from tui.session.settings.restore import restore_set as bring_back
@@ -173,7 +172,7 @@ async def _restore(
     source = library.load(values.head.profile)
     if told_before := Mark.of(session).interrupted:
         say(told_before)
-    journal, permit = Journal(), permit_of(session)
+    journal, permit = told_journal(), permit_of(session)
     try:
         done = await bring_back(
             session, journal, values, source, options, permit=permit,

@@ -21,7 +21,7 @@ from ..shared.options import (
     unidentified,
 )
 from ..shared.say import say
-from .orders import close_journal, complain
+from .orders import close_journal, complain, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -142,7 +142,6 @@ async def _wanted(opened: OpenLine, target: Target) -> StoppableDrive:
 
 async def _stop_one(opened: OpenLine, found: StoppableDrive, order: OrderId) -> int:
     from tui.session.command.stop import Stopper
-    from tui.session.journal import Journal
 
     if not has_order(found.session, order):
         raise Failure(
@@ -150,7 +149,7 @@ async def _stop_one(opened: OpenLine, found: StoppableDrive, order: OrderId) -> 
             " stop it without that option.",
             REFUSED_HERE,
         )
-    journal = Journal()
+    journal = told_journal()
     try:
         return await _seen_through(Stopper(opened.line, journal), found, order)
     finally:
@@ -197,9 +196,8 @@ async def _stop_all(
     seconds to rule out, and meanwhile motors turn.
     """
     from tui.session.command.stop import Stopper
-    from tui.session.journal import Journal
 
-    journal = Journal()
+    journal = told_journal()
     stopper = Stopper(opened.line, journal)
     stops: list[asyncio.Task[int]] = []
     left = list(devices)

@@ -25,7 +25,7 @@ from ..shared.sets import (
     say_result,
     status_of_results,
 )
-from .orders import arm_option, close_journal, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edits
@@ -131,13 +131,12 @@ async def _past_limits(session: DriveSession, edits: Edits) -> dict[str, str]:
 async def _write(
     session: DriveSession, edits: Edits, confirmed: tuple[str, ...], *, save: bool
 ) -> int:
-    from tui.session.journal import Journal
     from tui.session.settings.apply import apply_edits
     from tui.session.settings.eeprom import save_to_eeprom
 
     if not len(edits):
         say("The drive holds these values already.")
-    journal, permit = Journal(), permit_of(session)
+    journal, permit = told_journal(), permit_of(session)
     try:
         done = await apply_edits(
             session,

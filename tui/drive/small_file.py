@@ -1,0 +1,43 @@
+"""Files that a person names, or that lie where the panel keeps its own: read only as far as sane.
+
+A pipe would hold its reader up for good, a device such as /dev/zero would fill the memory.
+"""
+
+from __future__ import annotations
+
+import errno
+import os
+import stat
+from pathlib import Path
+
+LONGEST_TEXT = 4_000_000
+"""Bytes of a file that may be a profile, a parameter set, a block file, or one of the panel's."""
+
+
+def open_regular(path: Path) -> int:
+    """A handle that reads a file; raises OSError, also for what is no regular file."""
+    flags = os.O_RDONLY | getattr(os, "O_NONBLOCK", 0)
+    flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_BINARY", 0) | getattr(os, "O_NOCTTY", 0)
+    handle = os.open(path, flags)
+    mode = os.fstat(handle).st_mode
+    if stat.S_ISREG(mode):
+        return handle
+    os.close(handle)
+    if stat.S_ISDIR(mode):
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
+    raise OSError(errno.EINVAL, "it is no regular file", str(path))
+
+
+def read_small(path: Path, longest: int = LONGEST_TEXT) -> bytes:
+    """All of a file. Raises OSError, also where it is longer than `longest` bytes or no file."""
+    with os.fdopen(open_regular(path), "rb") as file:
+        data = file.read(longest + 1)
+    if len(data) > longest:
+        raise OSError(errno.EFBIG, f"it is longer than {longest // 1000} kB", str(path))
+    return data
+
+
+def read_small_text(path: Path, longest: int = LONGEST_TEXT) -> str:
+    """The text of a file, line ends as `\\n`. Raises OSError, and UnicodeDecodeError."""
+    text = read_small(path, longest).decode("utf-8")
+    return text.replace("\r\n", "\n").replace("\r", "\n")
