@@ -15,6 +15,7 @@ import click
 from .say import say
 
 DONE, DIFFERENT, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE = range(6)
+OUTPUT_LOST = 70
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -70,6 +71,17 @@ def status_of(error: Exception) -> int | None:
     return next((status for kind, status in table if isinstance(error, kind)), None)
 
 
+def _tell_lost_output(command: Callable[..., object]) -> None:
+    """Say that the output went nowhere; Failure where it is all that the command was for."""
+    from .standard_streams import acts, output_lost
+
+    if lost := output_lost():
+        text = f"What was printed is lost: standard output cannot be written: {lost}."
+        if not acts(command):
+            raise Failure(text, OUTPUT_LOST)
+        say(f"drivepanel: {text}", err=True)
+
+
 def told(command: Callable[P, R]) -> Callable[P, R]:
     """Turn what a command raises into a message and an exit status; never a traceback."""
 
@@ -78,6 +90,7 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
         try:
             result = command(*args, **kwargs)
             sys.stdout.flush()  # here, where a closed pipe can still be told from an error
+            _tell_lost_output(command)
             return result
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import atexit
 import logging
+import os
 from contextlib import suppress
+from io import TextIOWrapper
 from logging.handlers import QueueHandler, RotatingFileHandler
 from pathlib import Path
 from queue import Full, Queue
 from threading import Thread
 
-from tui.session.paths import state_folder
+from tui.session.paths import make_folder, state_folder
 
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""
@@ -51,6 +53,24 @@ class Later(QueueHandler):
         self._to.close()
 
 
+class LogFile(RotatingFileHandler):
+    """The file, for its owner alone; a disk that takes nothing is no error of the command."""
+
+    def _open(self) -> TextIOWrapper:
+        def opener(path: str, flags: int) -> int:
+            return os.open(path, flags, 0o600)
+
+        return open(self.baseFilename, self.mode, encoding=self.encoding, opener=opener)  # type: ignore[return-value]
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Lose the entry: logging's own way is a traceback on standard error."""
+
+    def close(self) -> None:
+        """Close the file, whatever of it the disk does not take."""
+        with suppress(OSError, ValueError):
+            super().close()
+
+
 def log_file() -> Path:
     """Where the log is."""
     return state_folder() / "drivepanel.log"
@@ -61,10 +81,8 @@ def start_logging(verbose: int) -> None:
     logger = logging.getLogger(PANEL)
     logger.setLevel(LEVELS[min(verbose, len(LEVELS) - 1)])
     try:
-        log_file().parent.mkdir(parents=True, exist_ok=True)
-        file = RotatingFileHandler(
-            log_file(), maxBytes=1_000_000, backupCount=3, encoding="utf-8", delay=True
-        )
+        make_folder(log_file().parent)
+        file = LogFile(log_file(), maxBytes=1_000_000, backupCount=3, encoding="utf-8", delay=True)
     except OSError:
         handler: logging.Handler = logging.NullHandler()
     else:
