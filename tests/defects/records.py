@@ -113,4 +113,50 @@ DEFECTS = (
         "The panel commands motors and nobody sees that nothing is on record.",
         ("tests/ui/test_strip.py",),
     ),
+    Defect(
+        "early-frame-taken-over-rtu",
+        "tui/bus/rtu/master.py",
+        "await self._transport.take_in()",
+        "await asyncio.sleep(0)",
+        "An answer that came before its question is shown as the present value.",
+        ("tests/bus/test_hostile_peers.py::test_what_came_before_a_request_is_not_its_answer",),
+    ),
+    Defect(
+        "early-frame-taken-over-tcp",
+        "tui/bus/tcp/master.py",
+        "await self._transport.take_in()",
+        "await asyncio.sleep(0)",
+        "A gateway that counts along answers before it is asked, and is believed.",
+        (
+            "tests/bus/test_hostile_peers.py"
+            "::test_what_came_before_a_request_is_not_its_answer_by_a_guessed_number",
+        ),
+    ),
+    Defect(
+        "loop-looks-once-only",
+        "tui/bus/transport/tcp.py",
+        "        await asyncio.sleep(0)\n        await asyncio.sleep(0)\n",
+        "        await asyncio.sleep(0)\n",
+        "An answer that came before its question is shown as the present value.",
+        ("tests/bus/test_hostile_peers.py::test_a_connection_hands_over_what_the_system_holds",),
+    ),
+    Defect(
+        "flood-is-kept",
+        "tui/bus/rtu/exchange.py",
+        "if len(self.buffer) > FLOOD:",
+        "if len(self.buffer) < 0:",
+        "A device server that sends noise holds every stop of its line up for minutes.",
+        (
+            "tests/bus/test_hostile_peers.py"
+            "::test_a_reply_is_found_behind_a_flood_and_the_flood_is_not_kept",
+        ),
+    ),
+    Defect(
+        "reply-behind-a-flood-overlooked",
+        "tui/bus/rtu/exchange.py",
+        "max(0, len(self.buffer) - MAX_FRAME)",
+        "max(0, len(self.buffer))",
+        "Drives behind a noisy adapter do not answer any more.",
+        ("tests/bus/test_rtu.py", "tests/bus/test_hostile_peers.py"),
+    ),
 )
