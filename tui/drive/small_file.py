@@ -10,7 +10,7 @@ import os
 import stat
 from pathlib import Path
 
-LONGEST_TEXT = 4_000_000
+LONGEST_TEXT = 2_000_000
 """Bytes of a file that may be a profile, a parameter set, a block file, or one of the panel's."""
 
 

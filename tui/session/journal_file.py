@@ -17,8 +17,8 @@ from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 
-from .paths import make_folder
 from .starts.files import sync_folder
+from .stored import make_folder
 
 try:
     import fcntl

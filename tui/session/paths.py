@@ -2,19 +2,15 @@
 
 from __future__ import annotations
 
-import errno
-import json
 import os
+from contextlib import suppress
 from pathlib import Path
+
+from .stored import NOWHERE, store_json, stored_json
 
 RECENT_LENGTH = 8
 ADDRESSES_LENGTH = 50
 """Lines whose addresses are remembered."""
-
-
-NOWHERE = Path(os.devnull) / "no home folder is known: name a folder in DRIVEPANEL_STATE"
-"""In place of the state folder where there is none: whatever is tried there fails, and says why."""
-FOLDER_MODE = 0o700
 
 
 def state_folder() -> Path:
@@ -31,23 +27,9 @@ def state_folder() -> Path:
     return folder if folder.is_absolute() else NOWHERE
 
 
-def make_folder(folder: Path) -> None:
-    """See that a folder is there; those that are made are their owner's alone. Raises OSError."""
-    if NOWHERE in (folder, *folder.parents):
-        raise OSError(errno.ENOENT, NOWHERE.name)
-    missing = [one for one in (folder, *folder.parents) if not one.exists()]
-    for one in reversed(missing):
-        one.mkdir(mode=FOLDER_MODE, exist_ok=True)
-    if not folder.is_dir():
-        raise NotADirectoryError(errno.ENOTDIR, os.strerror(errno.ENOTDIR), str(folder))
-
-
 def recent_lines() -> list[str]:
     """Lines used lately, the last one first; none where the file is missing or damaged."""
-    try:
-        stored = json.loads(_recent_file().read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return []
+    stored = stored_json(_recent_file())
     return [text for text in stored if isinstance(text, str)] if isinstance(stored, list) else []
 
 
@@ -71,21 +53,13 @@ def remember_addresses(key: str, text: str) -> None:
 
 
 def _all_addresses() -> dict[str, object]:
-    try:
-        stored = json.loads(_addresses_file().read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
+    stored = stored_json(_addresses_file())
     return stored if isinstance(stored, dict) else {}
 
 
 def _keep(file: Path, what: object) -> None:
-    try:
-        make_folder(file.parent)
-        part = file.with_suffix(".part")
-        part.write_text(json.dumps(what, indent=1), encoding="utf-8")
-        part.replace(file)
-    except OSError:
-        return
+    with suppress(OSError):
+        store_json(file, what)
 
 
 def _addresses_file() -> Path:

@@ -243,14 +243,17 @@ async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int],
 def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
     from tui.drive.blocks.assignment import MappingError
     from tui.drive.blocks.file import load_blocks
+    from tui.drive.small_file import read_small_text
 
     if wanted.action != "load":
         return {}
     file = wanted.words[0]
     try:
-        return load_blocks(Path(file).read_text(encoding="utf-8"), file, session.profile)
-    except (OSError, UnicodeDecodeError) as error:
-        raise Failure(f"{file} cannot be read: {error}.", USAGE) from error
+        return load_blocks(read_small_text(Path(file)), file, session.profile)
+    except OSError as error:
+        raise Failure(f"{file} cannot be read: {error.strerror}.", USAGE) from error
+    except UnicodeDecodeError as error:
+        raise Failure(f"{file}: byte {error.start} is not UTF-8 text.", USAGE) from error
     except MappingError as error:
         raise Failure(str(error), USAGE) from error
 

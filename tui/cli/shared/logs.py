@@ -12,7 +12,9 @@ from pathlib import Path
 from queue import Full, Queue
 from threading import Thread
 
-from tui.session.paths import make_folder, state_folder
+from tui.drive.plain import plain
+from tui.session.paths import state_folder
+from tui.session.stored import make_folder
 
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""
@@ -71,6 +73,14 @@ class LogFile(RotatingFileHandler):
             super().close()
 
 
+class PlainFormatter(logging.Formatter):
+    """Lines that command no terminal on which somebody reads the log."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The entry as text."""
+        return plain(super().format(record), lines=True)
+
+
 def log_file() -> Path:
     """Where the log is."""
     return state_folder() / "drivepanel.log"
@@ -86,7 +96,7 @@ def start_logging(verbose: int) -> None:
     except OSError:
         handler: logging.Handler = logging.NullHandler()
     else:
-        file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        file.setFormatter(PlainFormatter("%(asctime)s %(levelname)s %(message)s"))
         handler = Later(file)
     stop_logging()
     logger.addHandler(handler)

@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import ProfileError
+from ..small_file import open_regular, read_small_text
 
 HEAD_BYTES = 4096
 """Characters in which a head stands."""
@@ -63,7 +64,7 @@ def file_head(path: Path, own: bool, packaged: Path) -> ProfileFileHead:
 def quick_head(path: Path) -> ProfileFileHead:
     """The head of a file out of its first characters; empty where it is not there alone."""
     try:
-        with path.open(encoding="utf-8") as file:
+        with open(open_regular(path), encoding="utf-8") as file:
             text = file.read(HEAD_BYTES)
     except (OSError, UnicodeDecodeError):
         return ProfileFileHead()
@@ -87,7 +88,7 @@ def _stamp(path: Path) -> tuple[int, int]:
 @lru_cache(maxsize=256)
 def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> ProfileFileHead:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_small_text(path)
     except OSError as error:
         return ProfileFileHead(fault=f"cannot be read: {error.strerror}")
     except UnicodeDecodeError as error:
@@ -121,7 +122,7 @@ def _shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
     """The texts of a packaged file's shared rows; None where they are not there."""
     names = head.get("rows_from")
     try:
-        return [(packaged / name).read_text(encoding="utf-8") for name in names or ()]
+        return [read_small_text(packaged / name) for name in names or ()]
     except (OSError, UnicodeDecodeError, TypeError):
         return None
 
@@ -147,7 +148,7 @@ def _told(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
     """The tables identification and functions, among others."""
     if own:
         return _whole(path, packaged)
-    text = path.read_text(encoding="utf-8")
+    text = read_small_text(path)
     head = _section(text, "profile")
     shared = _shared_texts(head, packaged) if head is not None else None
     if shared is None or any(
@@ -169,6 +170,8 @@ def _section(text: str, name: str) -> Any:
     """A table of the top read by itself; None where that cannot be done."""
     import tomli
 
+    from ..toml_text import toml_tables
+
     headers = list(_HEADER.finditer(text))
     own = [n for n, header in enumerate(headers) if header[1] == name]
     if not own or own != list(range(own[0], own[-1] + 1)):
@@ -176,6 +179,6 @@ def _section(text: str, name: str) -> Any:
     last = own[-1] + 1
     end = headers[last].start() if last < len(headers) else len(text)
     try:
-        return tomli.loads(text[headers[own[0]].start() : end]).get(name)
+        return toml_tables(text[headers[own[0]].start() : end]).get(name)
     except tomli.TOMLDecodeError:
         return None
