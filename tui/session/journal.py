@@ -20,6 +20,8 @@ from datetime import datetime
 from pathlib import Path
 from typing import Literal
 
+from tui.drive.plain import escaped_json
+
 from .journal_file import JournalFile
 from .paths import state_folder
 
@@ -252,7 +254,7 @@ class Journal:
     def _trouble_with(self, entry: Entry) -> str:
         """Write an entry; what went wrong, or nothing."""
         try:
-            self._file.append(json.dumps(asdict(entry), ensure_ascii=False))
+            self._file.append(escaped_json(json.dumps(asdict(entry), ensure_ascii=False)))
         except OSError as error:
             return error.strerror or str(error)
         except Exception as error:

@@ -11,6 +11,7 @@ from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
 from tui.drive.hints import hint_markdown, reset_text
 from tui.drive.model import model_told
+from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
@@ -41,7 +42,7 @@ def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]
         maker.seen(),
         maker.journal(),
     )
-    return "\n".join(line for part in parts for line in (*part, ""))
+    return plain("\n".join(line for part in parts for line in (*part, "")), lines=True)
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from datetime import UTC, datetime
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal
 
-from tui.drive.plain import commands, plain
+from tui.drive.plain import escaped_json, plain
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -46,10 +46,7 @@ def print_json(data: object, *, compact: bool = False) -> None:
 
 def json_text(data: object, *, compact: bool = True) -> str:
     """JSON that a terminal may be given: every character that could command one is escaped."""
-    text = json.dumps(data, ensure_ascii=False, indent=None if compact else 2)
-    if text.replace("\n", "").isprintable():
-        return text
-    return "".join(json.dumps(c)[1:-1] if c != "\n" and commands(c) else c for c in text)
+    return escaped_json(json.dumps(data, ensure_ascii=False, indent=None if compact else 2))
 
 
 def readings_json(

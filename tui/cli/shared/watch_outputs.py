@@ -9,6 +9,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Protocol, TextIO
 
+from tui.drive.plain import plain_cells
+
 from .errors import USAGE, Failure
 from .output import console, iso_time, print_json, readings_json, readings_table
 from .say import say
@@ -80,12 +82,12 @@ class CsvOutput:
         taught = session.profile.taught
         marked = {c: f"{u}, taught" if c in taught and u else u for c, u in self._units.items()}
         titles = [f"{code} [{unit}]" if unit else code for code, unit in marked.items()]
-        self._rows.writerow(["time", *titles, "error"])
+        self._rows.writerow(plain_cells(["time", *titles, "error"]))
 
     def take(self, snapshot: Snapshot) -> None:
         """Write one cycle as a row."""
         cells = [self._cell(code, snapshot.readings[code]) for code in self._units]
-        self._rows.writerow([iso_time(snapshot.wall), *cells, snapshot.error])
+        self._rows.writerow(plain_cells([iso_time(snapshot.wall), *cells, snapshot.error]))
         self._file.flush()
 
     def _cell(self, code: str, reading: Reading) -> str:

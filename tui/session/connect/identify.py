@@ -10,6 +10,7 @@ from tui.bus.api import IdentificationObjects, Priority, Reply
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.bus.expectation import IDENTIFY
 from tui.drive.errors import DriveError
+from tui.drive.plain import plain
 from tui.drive.profile import library
 
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
@@ -72,7 +73,7 @@ async def identify_drive(
         return _nameless(device)
     except (NoAnswer, RequestRefused):
         return _nameless(device, await _nameless_families(line, device, priority))
-    return await asyncio.to_thread(_identity, device, answer)
+    return await asyncio.to_thread(identity_of, device, answer)
 
 
 async def _ask(line: Askable, device: int, priority: Priority) -> IdentificationObjects:
@@ -89,9 +90,10 @@ def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:
     return DriveIdentity(device, "", "", "", "", None, candidates)
 
 
-def _identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
+def identity_of(device: int, answer: IdentificationObjects) -> DriveIdentity:
+    """What a drive says of itself, as text that commands no terminal wherever it is shown."""
     texts = {
-        number: value.decode("ascii", errors="replace").strip("\0 ")
+        number: plain(value.decode("ascii", errors="replace").strip("\0 "))
         for number, value in answer.objects.items()
     }
     reference = texts.get(REFERENCE, "")
