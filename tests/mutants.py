@@ -29,7 +29,7 @@ from tests.defects import bus, commanding, drive, records, watching
 from tests.defects.defect import Defect
 
 ROOT = Path(__file__).resolve().parent.parent
-COPIED = ("tui", "tests", "profiles", "pyproject.toml", "README.md", "LICENSE")
+COPIED = ("tui", "tests", "benchmarks", "profiles", "pyproject.toml", "README.md", "LICENSE")
 DEFECTS: tuple[Defect, ...] = (
     *bus.DEFECTS,
     *drive.DEFECTS,
