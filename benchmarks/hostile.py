@@ -10,6 +10,7 @@ make the same case. Exit status 1 where one failed.
 from __future__ import annotations
 
 import argparse
+import json
 import logging
 import os
 import random
@@ -99,6 +100,7 @@ def main() -> int:
     state = Path(tempfile.mkdtemp(prefix="hostile-state-"))
     os.environ["DRIVEPANEL_STATE"] = os.environ["DRIVEPANEL_CONFIG"] = str(state)
     failed = 0
+    figures: dict[str, dict[str, float]] = {}
     print(f"{'kind':<10} {'cases':>6} {'s':>7} {'slowest':>9}  failed   (seed {given.seed})")
     for kind in kinds:
         begun = time.perf_counter()
@@ -109,7 +111,10 @@ def main() -> int:
         failed += len(tally.failures)
         for number, text in tally.failures[:10]:
             print(f"--- {kind} {number}\n{text}", file=sys.stderr)
+        figures[kind] = {"cases": tally.cases, "seconds": took, "slowest": tally.slowest}
+        figures[kind] |= {"slowest_case": tally.slowest_case, "failed": len(tally.failures)}
     shutil.rmtree(state, ignore_errors=True)
+    print(json.dumps({"seed": given.seed, **figures}))
     return int(failed > 0)
 
 

@@ -13,6 +13,8 @@ from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
 from .errors import ValueRefused
 from .profile.schema import Bit, Parameter
 
+LONGEST_NUMBER = 30
+"""Places before or behind the point of a number that anybody means."""
 NOT_AVAILABLE = "-----"
 
 
@@ -245,6 +247,9 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
         choice = ", ".join(list(names.values())[:4])
         wanted = f"one of {choice}" if choice else f"a number in {parameter.unit or 'counts'}"
         raise ValueRefused(f"{parameter.code}: {typed!r} is not {wanted}.")
+    if number and not -LONGEST_NUMBER <= number.adjusted() <= LONGEST_NUMBER:
+        # its digits alone would fill the screen, or the memory
+        raise ValueRefused(f"{parameter.code}: {typed[:40]!r} is out of range.")
     return number
 
 
