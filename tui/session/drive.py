@@ -60,6 +60,8 @@ class DriveSession:
         """What 100 % is, by code, where a person has told it from the nameplate."""
         self.commanded_at: float | None = None
         """When a command or reference was last sent to the drive from here (monotonic)."""
+        self.told_by_line = False
+        """Whether a command or reference word was written to it from here, a stop among them."""
         self.followed: tuple[str, ...] = ()
         """Codes of words that were written from here and are polled on."""
         self.starts: StartKeeper | None = None
@@ -87,6 +89,7 @@ class DriveSession:
 
     def note_command(self) -> None:
         """A command or reference was sent."""
+        self.told_by_line = True
         self.commanded_at = self.clock.monotonic()
 
     def stir(self) -> None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ..shared.block_output import show_blocks, show_neighbours
 from ..shared.errors import DIFFERENT, DONE, DRIVE_REFUSED, REFUSED_HERE, USAGE, Failure, told
+from ..shared.left_alone import timeout_told
 from ..shared.options import (
     Target,
     connect_drive,
@@ -109,15 +110,21 @@ async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> i
         if wanted.action != "show":
             raise MappingError(no_blocks(session.profile))
         await _measure_answer(session)
-        show_neighbours(session, line_text, as_json=wanted.as_json)
+        timeout = await _timeout(session, wanted)
+        show_neighbours(session, line_text, timeout, as_json=wanted.as_json)
         return DONE
     if wanted.action in WRITING:
         return await _write(session, line_text, wanted)
     views = await _looked_at(session, verify=wanted.action == "verify")
     if wanted.action == "save":
         return _save(session, views, Path(wanted.words[0]))
-    show_blocks(session, line_text, views, as_json=wanted.as_json)
+    timeout = await _timeout(session, wanted)
+    show_blocks(session, line_text, views, timeout, as_json=wanted.as_json)
     return _status(views) if wanted.action == "verify" else DONE
+
+
+async def _timeout(session: DriveSession, wanted: Wanted) -> dict[str, Any] | None:
+    return await timeout_told(session) if wanted.as_json else None
 
 
 async def _measure_answer(session: DriveSession) -> None:
@@ -206,7 +213,8 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     finally:
         close_journal(journal)
     if wanted.as_json:
-        show_blocks(session, line_text, await _looked_at(session, verify=False), as_json=True)
+        views, timeout = await _looked_at(session, verify=False), await timeout_told(session)
+        show_blocks(session, line_text, views, timeout, as_json=True)
     return DONE
 
 

@@ -10,36 +10,56 @@ import click
 
 from tui.drive.plain import plain
 
-from ..shared.errors import told
+from ..running.holding import hold_on, hold_option
+from ..shared.errors import REFUSED_HERE, Failure, told
+from ..shared.left_alone import look_after, timeout_json, timeout_of
 from ..shared.options import device_option, json_option, line_argument, on_line, read_only_option
 from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
 
 
 @click.command()
 @line_argument
 @device_option
+@hold_option
 @read_only_option
 @json_option
 @told
-def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> None:
+def identify(
+    line_text: str, device: int, hold: float | None, read_only: bool, as_json: bool
+) -> None:
     """Ask a drive who it is (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
     from ..shared.output import print_json
 
-    async def work(opened: OpenLine) -> tuple[DriveIdentity, Mapping[str, int]]:
-        identity = await ask(opened.line, device)
-        return identity, await _model_words(opened, identity)
+    async def work(opened: OpenLine) -> None:
+        found = await ask(opened.line, device)
+        session = await asyncio.to_thread(_session, opened, found)
+        words = await _model_words(session)
+        if as_json:
+            keys = ("device", "vendor", "reference", "version", "name", "profile")
+            told = {**{key: getattr(found, key) for key in keys}, "model": _model(found, words)}
+            timeout = timeout_json(await timeout_of(opened, session)) if session else None
+            print_json({**told, "timeout": timeout})
+        else:
+            _show(found, words)
+        if hold and session is None:
+            raise Failure(
+                f"Device {device} does not say what it is, so nothing is known to ask it on by."
+                " 'drivepanel hold' with -p does.",
+                REFUSED_HERE,
+            )
+        await hold_on(opened, [session] if session else [], hold)
 
-    found, words = on_line(line_text, work, read_only=read_only)
-    if as_json:
-        keys = ("device", "vendor", "reference", "version", "name", "profile")
-        print_json({**{key: getattr(found, key) for key in keys}, "model": _model(found, words)})
-        return
+    on_line(line_text, work, read_only=read_only)
+
+
+def _show(found: DriveIdentity, words: Mapping[str, int]) -> None:
     say(f"Device     {found.device}")
     for title, text in (
         ("Vendor", found.vendor),
@@ -52,22 +72,36 @@ def identify(line_text: str, device: int, read_only: bool, as_json: bool) -> Non
         say(f"{title:<10} {plain(text) or '-----'}")
 
 
-async def _model_words(opened: OpenLine, identity: DriveIdentity) -> Mapping[str, int]:
+def _session(opened: OpenLine, identity: DriveIdentity) -> DriveSession | None:
+    """A session with the drive, looked after; by the likeliest family of several alike."""
+    from tui.drive.errors import DriveError
+    from tui.drive.profile import library
+    from tui.session.drive import DriveSession
+
+    named = identity.profile or next(iter(identity.candidates), None)
+    if named is None:
+        return None
+    try:
+        session = DriveSession(opened.line, identity.device, library.load(named), identity)
+    except DriveError:
+        return None  # who it is was asked for and is known
+    look_after(opened, session, opened.text)
+    return session
+
+
+async def _model_words(session: DriveSession | None) -> Mapping[str, int]:
     """Raw values of the words that tell the model, where its family has them."""
-    if identity.profile is None:
-        return {}
     from tui.bus.errors import LineError
     from tui.drive.errors import DriveError
     from tui.drive.model import model_codes
-    from tui.drive.profile import library
-    from tui.session.drive import DriveSession
     from tui.session.read.reader import Reader
 
+    if session is None or session.known_identity.profile is None:
+        return {}
+    if not (codes := model_codes(session.profile)):
+        return {}
     try:
-        profile = await asyncio.to_thread(library.load, identity.profile)
-        if not (codes := model_codes(profile)):
-            return {}
-        found = await Reader(DriveSession(opened.line, identity.device, profile)).read(codes)
+        found = await Reader(session).read(codes)
     except (DriveError, LineError):
         return {}  # who it is was asked for and is known; its model is more than that
     return {code: one.raw for code, one in found.items() if one.raw is not None}

@@ -14,6 +14,7 @@ from tui.drive.orders import OrderRefused, chart_in_force, follows_from
 from tui.session.work import Outcome, OutcomeKind
 
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
+from ..shared.left_alone import left_alone_of
 from ..shared.options import (
     Target,
     connect_drive,
@@ -100,6 +101,7 @@ async def watched(
         await _first_look(console)
         yield fleet, console
     finally:
+        left_alone_of(opened, session).found = fleet.line_watch.timeout(session.device)
         fleet.forget()
         close_journal(journal)
         if starts is not None:
@@ -206,12 +208,12 @@ def _ordered(
 ) -> None:
     """Do the work at the armed drive and print what it came to."""
 
-    async def at_console(opened: OpenLine) -> str:
+    async def at_console(opened: OpenLine) -> None:
         async with watched(opened, target) as (_, console):
             arm_drive(console)
-            return await work(console)
+            say(await work(console))
 
-    say(on_line(target, at_console, read_only=read_only))
+    on_line(target, at_console, read_only=read_only)
 
 
 @click.command()

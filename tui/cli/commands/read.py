@@ -6,7 +6,9 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..running.holding import hold_on, hold_option
 from ..shared.errors import DRIVE_REFUSED, told
+from ..shared.left_alone import timeout_json, timeout_of
 from ..shared.options import (
     Target,
     connect_drive,
@@ -21,8 +23,6 @@ from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
-    from tui.session.drive import DriveSession
-    from tui.session.reading import Reading
 
 
 @click.command()
@@ -30,12 +30,14 @@ if TYPE_CHECKING:
 @click.argument("codes", nargs=-1, required=True, metavar="CODE...")
 @drive_options
 @force_profile_option
+@hold_option
 @read_only_option
 @json_option
 @told
 def read(
     target: Target,
     codes: tuple[str, ...],
+    hold: float | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
@@ -48,18 +50,20 @@ def read(
 
     from ..shared.output import print_json, print_readings, readings_json
 
-    async def work(opened: OpenLine) -> tuple[DriveSession, dict[str, Reading]]:
+    async def work(opened: OpenLine) -> bool:
         session = await connect_drive(opened, target)
         wanted = [session.profile.find(code).code for code in codes]
-        return session, await Reader(session).read(wanted)
+        readings = await Reader(session).read(wanted)
+        if as_json:
+            timeout = timeout_json(await timeout_of(opened, session))
+            print_json({**readings_json(target.line_text, session, readings), "timeout": timeout})
+        else:
+            print_readings(readings)
+        refused = [reading for reading in readings.values() if reading.raw is None]
+        for reading in refused:
+            say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
+        await hold_on(opened, [session], hold)
+        return bool(refused)
 
-    session, readings = on_line(target, work, read_only=read_only)
-    if as_json:
-        print_json(readings_json(target.line_text, session, readings))
-    else:
-        print_readings(readings)
-    refused = [reading for reading in readings.values() if reading.raw is None]
-    for reading in refused:
-        say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
-    if refused:
+    if on_line(target, work, read_only=read_only):
         raise click.exceptions.Exit(DRIVE_REFUSED)

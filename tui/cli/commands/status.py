@@ -10,9 +10,11 @@ import click
 
 from tui.drive.plain import plain
 
+from ..running.holding import hold_on, hold_option
 from ..shared.control import control_json, control_row
 from ..shared.errors import told
 from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
+from ..shared.left_alone import left_alone_of, timeout_json
 from ..shared.options import (
     Target,
     connect_drive,
@@ -109,6 +111,7 @@ async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
     try:
         readings = await console.read(_codes(profile))
         watch = await watch_of(fleet, console)
+        left_alone_of(opened, session).found = fleet.line_watch.timeout(session.device)
         state = drive_state(profile, readings)
         finding = await find_out(console, state, readings)
     finally:
@@ -170,6 +173,8 @@ def _refused(session: DriveSession) -> str:
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
     """The object that `status --json` prints."""
+    from tui.session.monitor.timeout import Timeout
+
     state, watch = status.state, status.watch
     return {
         "line": line_text,
@@ -186,6 +191,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
         "why_not": status.refused or None,
         "control": control_json(status.session),
         "watch": watch_json(watch),
+        "timeout": timeout_json(Timeout(True, watch)),
         "values": values_json(status.session.profile, status.readings),
     }
 
@@ -254,23 +260,27 @@ def _watch_text(status: Status) -> str:
 @line_argument
 @drive_options
 @force_profile_option
+@hold_option
 @read_only_option
 @json_option
 @told
 def status(
     target: Target,
+    hold: float | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
     """Tell what a drive does, who commands it, and what it does when the line falls silent."""
     from ..shared.output import print_json
 
-    async def work(opened: OpenLine) -> Status:
-        return await status_of_drive(await connect_drive(opened, target), opened)
+    async def work(opened: OpenLine) -> None:
+        session = await connect_drive(opened, target)
+        found = await status_of_drive(session, opened)
+        if as_json:
+            print_json(status_json(target.line_text, found))
+        else:
+            for title, text in status_table(found):
+                say(f"{title:<17} {plain(text) or '-----'}")
+        await hold_on(opened, [session], hold)
 
-    found = on_line(target, work, read_only=read_only)
-    if as_json:
-        print_json(status_json(target.line_text, found))
-        return
-    for title, text in status_table(found):
-        say(f"{title:<17} {plain(text) or '-----'}")
+    on_line(target, work, read_only=read_only)

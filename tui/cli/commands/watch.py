@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ..shared.errors import LINE_TROUBLE, Failure, told
+from ..shared.left_alone import timeout_json, timeout_of
 from ..shared.options import (
     Target,
     connect_drive,
@@ -78,9 +79,10 @@ def watch(
         session = await connect_drive(opened, target)
         wanted = [session.profile.find(code).code for code in codes] or None
         shown = wanted or monitoring_codes(session.profile)
+        timeout = timeout_json(await timeout_of(opened, session)) if as_json else None
         with ExitStack() as stack:
             outputs = [
-                JsonOutput(target.line_text, session)
+                JsonOutput(target.line_text, session, timeout)
                 if as_json
                 else stack.enter_context(text_output())
             ]

@@ -6,6 +6,7 @@ import asyncio
 import time
 from contextlib import suppress
 from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineError
@@ -257,6 +258,7 @@ async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
         try:
             async with watched(opened, target, starts) as (fleet, console):
                 telling = RunTelling(console.session, voice.say, as_json=wish.as_json)
+                telling.timeout = partial(fleet.line_watch.timeout, console.device)
                 await Run(fleet, console, wish, telling, ending).carry_out()
         finally:
             voice.finish()

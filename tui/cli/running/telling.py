@@ -8,10 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 from ..commands.orders import complain
 from ..commands.status import shown_values, values_json
+from ..shared.left_alone import timeout_json
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.monitor.snapshot import Snapshot
+    from tui.session.monitor.timeout import Timeout
 
 TOLD_EVERY = 1.0
 """Seconds between two lines about the motor."""
@@ -27,6 +29,8 @@ class RunTelling:
         self._trouble = 0.0
         """When the last cycle failed, time.monotonic()."""
         self._told = 0.0
+        self.timeout: Callable[[], Timeout | None] = lambda: None
+        """What the drive has told of its communication time-out by now."""
 
     def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
         """A line about the motor once a second; trouble on the line when it begins and ends.
@@ -60,7 +64,9 @@ class RunTelling:
             self._say(f"{time.strftime('%H:%M:%S', time.localtime(now))}  {text}")
             return
         data: dict[str, Any] = {"time": iso_time(now), "device": self._session.device}
+        found = self.timeout()
         data |= {"event": event, "text": text}
+        data["timeout"] = timeout_json(found) if found is not None else None
         if latest is not None:
             state = latest.state
             data |= {

@@ -21,7 +21,12 @@ AFTER_RESET = (
 
 
 def show_blocks(
-    session: DriveSession, line_text: str, views: list[BlockView], *, as_json: bool
+    session: DriveSession,
+    line_text: str,
+    views: list[BlockView],
+    timeout: Mapping[str, Any] | None,
+    *,
+    as_json: bool,
 ) -> None:
     """Print the blocks of a drive, what they bring, and what they spare on the line."""
     from .output import console, print_json
@@ -30,7 +35,7 @@ def show_blocks(
     if as_json:
         print_json(
             {
-                **_head(session, line_text),
+                **_head(session, line_text, timeout),
                 "blocks": [view_json(session, view) for view in views],
                 "monitoring_us": {"direct": costs[0], "with_blocks": costs[1]},
             }
@@ -52,8 +57,11 @@ def show_blocks(
     )
 
 
-def _head(session: DriveSession, line_text: str) -> dict[str, Any]:
-    return {"line": line_text, "device": session.device, "profile": session.profile.id}
+def _head(
+    session: DriveSession, line_text: str, timeout: Mapping[str, Any] | None
+) -> dict[str, Any]:
+    about = {"line": line_text, "device": session.device, "profile": session.profile.id}
+    return {**about, "timeout": timeout}
 
 
 def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
@@ -154,7 +162,9 @@ def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...
 # Families without blocks
 
 
-def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> None:
+def show_neighbours(
+    session: DriveSession, line_text: str, timeout: Mapping[str, Any] | None, *, as_json: bool
+) -> None:
     """Print that there is no block, and which neighbours are worth reading in one request."""
     from tui.drive.blocks.assignment import no_blocks
     from tui.drive.blocks.wire_cost import stretches
@@ -168,7 +178,9 @@ def show_neighbours(session: DriveSession, line_text: str, *, as_json: bool) -> 
     text = no_blocks(session.profile)
     if as_json:
         reads = [stretch_json(stretch) for stretch in found]
-        print_json({**_head(session, line_text), "blocks": [], "why": text, "reads": reads})
+        print_json(
+            {**_head(session, line_text, timeout), "blocks": [], "why": text, "reads": reads}
+        )
         return
     say(text)
     for stretch in found:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import csv
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TextIO
+from typing import TYPE_CHECKING, Any, Protocol, TextIO
 
 from .errors import USAGE, Failure
 from .output import console, iso_time, print_json, readings_json, readings_table
@@ -31,7 +31,10 @@ class Output(Protocol):
 class JsonOutput:
     """One object a line on standard output; trouble goes to standard error when it begins."""
 
-    def __init__(self, line_text: str, session: DriveSession) -> None:
+    def __init__(
+        self, line_text: str, session: DriveSession, timeout: Mapping[str, Any] | None
+    ) -> None:
+        self._timeout = timeout
         self._line_text = line_text
         self._session = session
         self._trouble = False
@@ -39,7 +42,8 @@ class JsonOutput:
     def take(self, snapshot: Snapshot) -> None:
         """Print one cycle as an object."""
         data = readings_json(self._line_text, self._session, snapshot.readings)
-        print_json({"time": iso_time(snapshot.wall), **data}, compact=True)
+        told = {"time": iso_time(snapshot.wall), **data, "timeout": self._timeout}
+        print_json(told, compact=True)
         if snapshot.error and not self._trouble:
             say(f"drivepanel: {snapshot.error}", err=True)
         self._trouble = bool(snapshot.error)
