@@ -10,10 +10,16 @@ import click
 
 from tui.drive.plain import plain
 
-from ..running.holding import hold_on, hold_option
 from ..shared.errors import REFUSED_HERE, Failure, told
 from ..shared.left_alone import look_after, timeout_json, timeout_of
-from ..shared.options import device_option, json_option, line_argument, on_line, read_only_option
+from ..shared.options import (
+    device_option,
+    hold_option,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+)
 from ..shared.say import say
 
 if TYPE_CHECKING:
@@ -35,6 +41,7 @@ def identify(
     """Ask a drive who it is (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
+    from ..running.holding import hold_on
     from ..shared.output import print_json
 
     async def work(opened: OpenLine) -> None:

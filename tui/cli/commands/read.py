@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..running.holding import hold_on, hold_option
 from ..shared.errors import DRIVE_REFUSED, told
 from ..shared.left_alone import timeout_json, timeout_of
 from ..shared.options import (
@@ -14,6 +13,7 @@ from ..shared.options import (
     connect_drive,
     drive_options,
     force_profile_option,
+    hold_option,
     json_option,
     line_argument,
     on_line,
@@ -48,6 +48,7 @@ def read(
     """
     from tui.session.read.reader import Reader
 
+    from ..running.holding import hold_on
     from ..shared.output import print_json, print_readings, readings_json
 
     async def work(opened: OpenLine) -> bool:

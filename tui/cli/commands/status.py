@@ -10,7 +10,6 @@ import click
 
 from tui.drive.plain import plain
 
-from ..running.holding import hold_on, hold_option
 from ..shared.control import control_json, control_row
 from ..shared.errors import told
 from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
@@ -20,6 +19,7 @@ from ..shared.options import (
     connect_drive,
     drive_options,
     force_profile_option,
+    hold_option,
     json_option,
     line_argument,
     on_line,
@@ -271,6 +271,7 @@ def status(
     as_json: bool,
 ) -> None:
     """Tell what a drive does, who commands it, and what it does when the line falls silent."""
+    from ..running.holding import hold_on
     from ..shared.output import print_json
 
     async def work(opened: OpenLine) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import math
 import signal
+import sys
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager, suppress
 from dataclasses import dataclass, field
@@ -28,14 +29,6 @@ Tell = Callable[[str, int, str], None]
 HOLD_POLL_INTERVAL = 0.2
 BY_SIGNAL = 128
 """The exit status of a command that a signal ended, less the signal's number."""
-
-hold_option = click.option(
-    "--hold",
-    type=click.FloatRange(min=0, min_open=True),
-    metavar="S",
-    help="Then ask the drive on for S seconds, so that its communication time-out does not run"
-    " out; its own protection against a lost line is off meanwhile.",
-)
 
 
 @dataclass(slots=True)
@@ -95,6 +88,7 @@ async def hold_on(
     """
     if seconds is None:
         return
+    sys.stdout.flush()  # what was printed is for now, whoever reads it
     async with kept_asked(opened, _complain) as (holding, ending):
         for session in sessions:
             holding.take(session)

@@ -89,6 +89,14 @@ force_profile_option = click.option(
 )
 """For commands that read, watch or write; it reaches them in their Target."""
 
+hold_option = click.option(
+    "--hold",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Then ask the drive on for S seconds, so that its communication time-out does not run"
+    " out; its own protection against a lost line is off meanwhile.",
+)
+
 
 def never_forced(command: CommandFunction) -> CommandFunction:
     """The same option, refused: for commands after which a wrong profile moves a motor."""
