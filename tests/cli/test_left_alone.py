@@ -150,9 +150,10 @@ def in_fault(line: str) -> bool:
 def test_hold_prints_at_once_asks_on_and_tells_what_follows() -> None:
     with tcp_line("atv21@1", "--set", "F803=2") as line:
         hold = (*DRIVEPANEL, "read", line, "FD01", "--hold", "6")
-        with served(hold, ready="FD01") as program:
+        with served(hold, ready="Code") as program:
             assert program.process.poll() is None, "the value comes before the end"
-            _, said = program.process.communicate(timeout=PATIENCE)
+            told, said = program.process.communicate(timeout=PATIENCE)
+            assert "FD01" in told
         assert program.process.returncode == 0
         assert "After 2 s without a request" in said
         assert "is in fault" not in said

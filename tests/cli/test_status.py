@@ -121,7 +121,7 @@ def test_an_unforeseen_error_goes_to_the_log() -> None:
 
     start_logging(0)
     result = CliRunner().invoke(command)
-    assert result.exit_code == 1
+    assert result.exit_code == 70
     assert "Traceback" not in result.output
     assert str(log_file()) in result.stderr
     stop_logging()

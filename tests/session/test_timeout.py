@@ -10,8 +10,9 @@ from tui.bus.api import Priority, Reply
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.drive.profile import library
 from tui.session.drive import DriveSession
-from tui.session.monitor.timeout import Timeout, has_begun, read_timeout
+from tui.session.monitor.timeout import has_begun, read_timeout
 from tui.session.read.reader import Reader
+from tui.session.timeout_told import Timeout
 
 from .fakes import OneDrive, parameter, profile_of
 

@@ -1,8 +1,8 @@
 """Which word stops a drive of which it is not known for sure what it is; pure functions.
 
-A word that stops one family may start another at the same address (16#0007 ramps an Altivar down
-and, in the I/O profile of another, runs the motor): only a word that stops in every chart that
-the drive may have is sent before it has said what it is.
+A word that stops one family may start another at the same address (what ramps one down in its
+state chart is a run command in the other's): only a word that stops in every chart that the
+drive may have is sent before it has said what it is.
 """
 
 from __future__ import annotations

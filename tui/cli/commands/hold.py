@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Protocol
 import click
 
 from ..running.holding import Holding, kept_asked
+from ..shared.devices import several_devices_option
 from ..shared.errors import LINE_TROUBLE, Failure, status_of, told
-from ..shared.left_alone import timeout_json, timeout_of
+from ..shared.left_alone import timeout_json
 from ..shared.options import (
     Target,
     connect_drive,
-    devices_option,
     force_profile_option,
     json_option,
     line_argument,
@@ -29,7 +29,7 @@ from .orders import complain
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.monitor.timeout import Timeout
+    from tui.session.timeout_told import Timeout
 
 DISARMS = (
     "While this runs, the communication time-out protects nobody: if whoever commands the drive"
@@ -47,11 +47,7 @@ class HeldTeller(Protocol):
 
 @click.command()
 @line_argument
-@devices_option(
-    "Slave address of the drive; several times for several drives.",
-    default=(1,),
-    show_default=True,
-)
+@several_devices_option
 @profile_option
 @force_profile_option
 @read_only_option
@@ -59,7 +55,7 @@ class HeldTeller(Protocol):
 @told
 def hold(
     line_text: str,
-    devices: tuple[int, ...],
+    device: tuple[int, ...],
     profile_id: str | None,
     force_profile: bool,
     read_only: bool,
@@ -70,7 +66,7 @@ def hold(
     It reads, and writes nothing. A drive that is asked cannot tell that its controller is lost:
     its own protection is off meanwhile. At the end it is told what each drive does then, and when.
     """
-    wanted = list(dict.fromkeys(devices))
+    wanted = list(dict.fromkeys(device))
     targets = [Target(line_text, d, profile_id, force_profile=force_profile) for d in wanted]
     tell = _json_teller(line_text) if as_json else _teller
 
@@ -95,10 +91,12 @@ async def _take_all(
     opened: OpenLine, targets: Sequence[Target], holding: Holding, tell: HeldTeller
 ) -> None:
     """Ask each drive on as soon as it has answered; raises where none does."""
+    from tui.session.monitor.timeout import timeout_now
+
     failure: Exception | None = None
     for target in targets:
         try:
-            session, found = await _connected(opened, target)
+            session = await _connected(opened, target)
         except Exception as error:
             known = isinstance(error, click.ClickException) or status_of(error) is not None
             if len(targets) == 1 or not known:
@@ -109,18 +107,18 @@ async def _take_all(
         if not holding.fleet.found:
             complain(DISARMS)
         holding.take(session)
+        found = timeout_now(session)
         tell("holding", target.device, held_text(session, found), found)
     if failure is not None and not holding.fleet.found:
         raise failure
 
 
-async def _connected(opened: OpenLine, target: Target) -> tuple[DriveSession, Timeout]:
+async def _connected(opened: OpenLine, target: Target) -> DriveSession:
     """A drive that answers, with what it tells of its time-out."""
     session = await connect_drive(opened, target)
-    found = await timeout_of(opened, session)
     if opened.line.device_state(target.device).heard is None:
         raise Failure(f"Device {target.device} does not answer.", LINE_TROUBLE)
-    return session, found
+    return session
 
 
 def held_text(session: DriveSession, found: Timeout) -> str:

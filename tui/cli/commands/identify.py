@@ -10,77 +10,85 @@ import click
 
 from tui.drive.plain import plain
 
-from ..shared.errors import REFUSED_HERE, Failure, told
-from ..shared.left_alone import look_after, timeout_json, timeout_of
+from ..shared.devices import several_devices_option
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, REFUSED_HERE, Failure, told
+from ..shared.left_alone import look_after
 from ..shared.options import (
-    device_option,
+    Target,
     hold_option,
     json_option,
     line_argument,
     on_line,
     read_only_option,
 )
-from ..shared.say import say
+from ..shared.say import say_row
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
+IDENTITY_KEYS = ("device", "vendor", "reference", "version", "name", "profile")
+"""What JSON tells of an identity, by its own names."""
+TITLES = 11
+"""Width of the column of titles, with its gap."""
+
 
 @click.command()
 @line_argument
-@device_option
+@several_devices_option
 @hold_option
 @read_only_option
 @json_option
 @told
 def identify(
-    line_text: str, device: int, hold: float | None, read_only: bool, as_json: bool
+    line_text: str,
+    device: tuple[int, ...],
+    hold: float | None,
+    read_only: bool,
+    as_json: bool,
 ) -> None:
     """Ask a drive who it is (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
     from ..running.holding import hold_on
-    from ..shared.output import print_json
+    from ..shared.output import drive_json
 
-    async def work(opened: OpenLine) -> None:
-        found = await ask(opened.line, device)
-        session = await asyncio.to_thread(_session, opened, found)
+    target = Target(line_text, device[0], None, others=device[1:])
+    sessions: list[DriveSession] = []
+
+    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+        identity = await ask(opened.line, drive.device)
+        session = await asyncio.to_thread(_session, opened, identity)
         words = await _model_words(session)
-        if as_json:
-            keys = ("device", "vendor", "reference", "version", "name", "profile")
-            told = {**{key: getattr(found, key) for key in keys}, "model": _model(found, words)}
-            timeout = timeout_json(await timeout_of(opened, session)) if session else None
-            print_json({**told, "timeout": timeout})
-        else:
-            _show(found, words)
-        if hold and session is None:
+        if not as_json:
+            _say_identity(identity, words)
+        told = {"line": line_text, "timeout": None}
+        if session is not None:
+            sessions.append(session)
+            await look_after(opened, session, line_text).learn()
+            told = drive_json(line_text, session)
+        elif hold:
             raise Failure(
-                f"Device {device} does not say what it is, so nothing is known to ask it on by."
-                " 'drivepanel hold' with -p does.",
+                f"Device {drive.device} does not say what it is, so nothing is known to ask it on"
+                " by. 'drivepanel hold' with -p does.",
                 REFUSED_HERE,
             )
-        await hold_on(opened, [session] if session else [], hold)
+        told |= {key: getattr(identity, key) for key in IDENTITY_KEYS}
+        return {**told, "model": _model(identity, words)}, DONE
 
-    on_line(line_text, work, read_only=read_only)
+    async def work(opened: OpenLine) -> int:
+        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        await hold_on(opened, sessions, hold)
+        return status
 
-
-def _show(found: DriveIdentity, words: Mapping[str, int]) -> None:
-    say(f"Device     {found.device}")
-    for title, text in (
-        ("Vendor", found.vendor),
-        ("Reference", found.reference),
-        ("Version", found.version_text),
-        ("Name", found.name),
-        ("Profile", found.profile or _choices(found)),
-        *_model_row(found, words),
-    ):
-        say(f"{title:<10} {plain(text) or '-----'}")
+    if status := on_line(line_text, work, read_only=read_only):
+        raise click.exceptions.Exit(status)
 
 
 def _session(opened: OpenLine, identity: DriveIdentity) -> DriveSession | None:
-    """A session with the drive, looked after; by the likeliest family of several alike."""
+    """A session with the drive, by the likeliest family of several alike; None where none fits."""
     from tui.drive.errors import DriveError
     from tui.drive.profile import library
     from tui.session.drive import DriveSession
@@ -89,11 +97,22 @@ def _session(opened: OpenLine, identity: DriveIdentity) -> DriveSession | None:
     if named is None:
         return None
     try:
-        session = DriveSession(opened.line, identity.device, library.load(named), identity)
+        return DriveSession(opened.line, identity.device, library.load(named), identity)
     except DriveError:
         return None  # who it is was asked for and is known
-    look_after(opened, session, opened.text)
-    return session
+
+
+def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
+    for title, text in (
+        ("Device", str(found.device)),
+        ("Vendor", found.vendor),
+        ("Reference", found.reference),
+        ("Version", found.version_text),
+        ("Name", found.name),
+        ("Profile", found.profile or _choices(found)),
+        *_model_row(found, words),
+    ):
+        say_row(title, plain(text) or "-----", TITLES)
 
 
 async def _model_words(session: DriveSession | None) -> Mapping[str, int]:

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import DRIVE_REFUSED, told
-from ..shared.left_alone import timeout_json, timeout_of
+from ..shared.completion import complete_code
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, DRIVE_REFUSED, told
 from ..shared.options import (
     Target,
     connect_drive,
-    drive_options,
+    drives_options,
     force_profile_option,
     hold_option,
     json_option,
@@ -23,12 +24,13 @@ from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
 
 
 @click.command()
 @line_argument
-@click.argument("codes", nargs=-1, required=True, metavar="CODE...")
-@drive_options
+@click.argument("codes", nargs=-1, required=True, metavar="CODE...", shell_complete=complete_code)
+@drives_options
 @force_profile_option
 @hold_option
 @read_only_option
@@ -49,22 +51,27 @@ def read(
     from tui.session.read.reader import Reader
 
     from ..running.holding import hold_on
-    from ..shared.output import print_json, print_readings, readings_json
+    from ..shared.output import print_readings, readings_json
 
-    async def work(opened: OpenLine) -> bool:
-        session = await connect_drive(opened, target)
+    sessions: list[DriveSession] = []
+
+    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+        session = await connect_drive(opened, drive)
+        sessions.append(session)
         wanted = [session.profile.find(code).code for code in codes]
         readings = await Reader(session).read(wanted)
-        if as_json:
-            timeout = timeout_json(await timeout_of(opened, session))
-            print_json({**readings_json(target.line_text, session, readings), "timeout": timeout})
-        else:
+        if not as_json:
             print_readings(readings)
         refused = [reading for reading in readings.values() if reading.raw is None]
         for reading in refused:
             say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
-        await hold_on(opened, [session], hold)
-        return bool(refused)
+        told = readings_json(target.line_text, session, readings)
+        return told, DRIVE_REFUSED if refused else DONE
 
-    if on_line(target, work, read_only=read_only):
-        raise click.exceptions.Exit(DRIVE_REFUSED)
+    async def work(opened: OpenLine) -> int:
+        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        await hold_on(opened, sessions, hold)
+        return status
+
+    if status := on_line(target, work, read_only=read_only):
+        raise click.exceptions.Exit(status)

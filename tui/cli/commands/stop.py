@@ -8,23 +8,20 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..running.stop_targets import (
-    StoppableDrive,
-    first_stopped,
-    found_at,
-    remembered,
-    tell_stop,
-)
+from ..running.stop_targets import StoppableDrive, first_stopped, found_at, remembered
+from ..running.stop_telling import StopTelling
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
 from ..shared.left_alone import look_after
 from ..shared.options import (
     Target,
-    drive_options,
+    drives_options,
+    json_option,
     line_argument,
     on_line,
     read_only_option,
 )
-from .orders import close_journal, complain
+from ..shared.output import print_json
+from .orders import close_journal
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -39,7 +36,7 @@ STOP_POLL_INTERVAL = 0.05
 
 @click.command()
 @line_argument
-@drive_options
+@drives_options
 @click.option("--all", "every", is_flag=True, help="Stop every drive found on the line.")
 @click.option(
     "--addresses",
@@ -47,16 +44,17 @@ STOP_POLL_INTERVAL = 0.05
     help=f"With --all: where to look, like 1-10 or 1,2,31; {USUAL_ADDRESSES} unless told"
     " otherwise, or the drives of a simulated line.",
 )
-@click.option("--quick", is_flag=True, help="By the drive's quick stop.")
-@click.option("--freewheel", is_flag=True, help="Let the motor coast.")
+@click.option("--quick", is_flag=True, help="Stop by the drive's quick stop.")
+@click.option("--freewheel", is_flag=True, help="Stop by freewheel: the motor coasts.")
 @click.option(
     "--give-back",
     is_flag=True,
     help="Then give the control back to the terminals; a run command waiting there starts the"
-    " motor, so this part wants --arm.",
+    " motor, so this needs --arm.",
 )
-@click.option("--arm", is_flag=True, help="Let --give-back write to the drive; no stop needs it.")
+@click.option("--arm", is_flag=True, help="Arm the drive for --give-back; no stop needs it.")
 @read_only_option
+@json_option
 @told
 def stop(
     target: Target,
@@ -67,30 +65,36 @@ def stop(
     give_back: bool,
     arm: bool,
     read_only: bool,
+    as_json: bool,
 ) -> None:
     """Stop a motor on its ramp and wait until it stands. Needs no arming."""
     if quick and freewheel:
         raise click.UsageError("Either --quick or --freewheel.")
     if addresses and not every:
         raise click.UsageError("--addresses goes with --all.")
-    if give_back and every:
-        raise click.UsageError("--give-back is for one drive, not for --all.")
+    if give_back and (every or target.others):
+        raise click.UsageError("--give-back is for one drive, not for several.")
     if read_only:
         raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
-    devices = _devices(addresses)
+    devices = _devices(addresses) if every else [one.device for one in target.each()]
+    telling = StopTelling(target.line_text, as_json=as_json)
 
     async def work(opened: OpenLine) -> int:
-        if every:
-            return await _stop_all(opened, devices, order, target.profile_id)
-        status, session = await _stop_one(opened, target, order)
+        if every or target.others:
+            return await _stop_all(opened, devices, order, target.profile_id, telling)
+        status, session = await _stop_one(opened, target, order, telling)
         if give_back and not status:
             from ..running.giving_back import give_control_back
 
-            await give_control_back(session, arm=arm)
+            telling.gave_back(await give_control_back(session, arm=arm))
         return status
 
-    if worst := on_line(target, work):
+    worst = on_line(target, work)
+    if as_json:
+        several = every or len(target.each()) > 1
+        print_json(telling.documents if several else telling.documents[0])
+    if worst:
         raise click.exceptions.Exit(worst)
 
 
@@ -117,7 +121,9 @@ async def ended(stopper: Stopper, device: int) -> StopReport:
         await asyncio.sleep(STOP_POLL_INTERVAL)
 
 
-async def _stop_one(opened: OpenLine, target: Target, order: OrderId) -> tuple[int, DriveSession]:
+async def _stop_one(
+    opened: OpenLine, target: Target, order: OrderId, telling: StopTelling
+) -> tuple[int, DriveSession]:
     """Stop one drive: first by the word that stops whatever it may be, then by its own.
 
     Returns the exit status, and the session with it. Raises UsageError where it is not known what
@@ -128,30 +134,34 @@ async def _stop_one(opened: OpenLine, target: Target, order: OrderId) -> tuple[i
 
     journal = Journal()
     try:
-        found = await first_stopped(opened, target, order, journal)
+        found = await first_stopped(opened, target, order, journal, telling)
         look_after(opened, found.session, target.line_text)
-        return await _seen_through(Stopper(opened.line, journal), found, order), found.session
+        stopper = Stopper(opened.line, journal)
+        return await _seen_through(stopper, found, order, telling), found.session
     finally:
         close_journal(journal)
 
 
-async def _seen_through(stopper: Stopper, found: StoppableDrive, order: OrderId) -> int:
+async def _seen_through(
+    stopper: Stopper, found: StoppableDrive, order: OrderId, telling: StopTelling
+) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
     from tui.drive.orders import INSTEAD
     from tui.session.command.stop_report import Phase
 
     session = found.session
-    # a drive without the wished way is stopped all the same; the report says by which
+    # a drive without the wished way is stopped all the same; it is told by which
     way: OrderId = order if order in INSTEAD or has_order(session, order) else "stop"
     stopper.stop([session], way, by="drivepanel stop")
     report = await ended(stopper, session.device)
     who = f"Device {session.device}, {found.name}"
     if report.phase is Phase.STOPPED:
         lacks = "" if way == order else f" (it has no {order}: ramp stop)"
-        tell_stop(f"{who}: {report.text}{lacks}.")
+        telling.stopped(session.device, session.profile.id, f"{who}: {report.text}{lacks}.")
         return 0
-    complain(f"{who}: {report.text}")
-    return await _why(session)
+    status = await _why(session)
+    telling.failed(session.device, session.profile.id, f"{who}: {report.text}", status)
+    return status
 
 
 async def _why(session: DriveSession) -> int:
@@ -170,16 +180,19 @@ async def _why(session: DriveSession) -> int:
 
 
 async def _stop_all(
-    opened: OpenLine, named: Sequence[int], order: OrderId, profile_id: str | None
+    opened: OpenLine,
+    named: Sequence[int],
+    order: OrderId,
+    profile_id: str | None,
+    telling: StopTelling,
 ) -> int:
     """Stop each drive as soon as it is found; what one does holds up no other.
 
-    Every address is asked once in haste before any is asked with patience: a silent one takes
-    seconds to rule out, and meanwhile motors turn. A silent address is a failure where a drive is
-    known to be there: named, simulated, or started from here.
+    Every address is first asked once, shortly, before any is asked with patience: a silent one
+    takes seconds to rule out, and meanwhile motors turn. A silent address is a failure where a
+    drive is known to be there: named, simulated, or started from here.
     """
     from tui.session.command.stop import Stopper
-    from tui.session.connect.addresses import addresses_text
     from tui.session.journal import Journal
 
     journal = Journal()
@@ -187,7 +200,7 @@ async def _stop_all(
     stops: list[asyncio.Task[int]] = []
     started = await remembered(opened)
     devices = named or sorted({*(opened.devices or _devices(USUAL_ADDRESSES)), *started})
-    expected = {*(named or opened.devices), *(set(started) if not named else ())}
+    expected = set(named) or {*opened.devices, *started}
     # motors that were started from here turn most likely
     left = sorted(devices, key=lambda device: device not in started)
     worst = 0
@@ -198,21 +211,21 @@ async def _stop_all(
                 try:
                     found = await found_at(opened, device, profile_id, patient=patient)
                 except Failure as failure:
-                    complain(failure.format_message())
-                    worst = max(worst, failure.exit_code)
+                    telling.failed(device, None, failure.message, failure.status)
+                    worst = max(worst, failure.status)
                     continue
                 if found is None:
                     left.append(device)
                     continue
                 look_after(opened, found.session, opened.text)
-                stops.append(asyncio.create_task(_seen_through(stopper, found, order)))
+                stops.append(asyncio.create_task(_seen_through(stopper, found, order, telling)))
     finally:
         # whatever went wrong with the search: stops that were begun are seen through
         worst = max([worst, *await asyncio.gather(*stops)])
         close_journal(journal)
     if missing := sorted(expected.intersection(left)):
-        complain(f"NOT STOPPED: no answer at {', '.join(map(str, missing))}.")
+        telling.silent(missing, LINE_TROUBLE)
         worst = max(worst, LINE_TROUBLE)
     if empty := sorted(set(left) - expected):
-        complain(f"Nobody answers at {addresses_text(empty)}.")
+        telling.silent(empty, 0)
     return worst or (0 if stops else LINE_TROUBLE)

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 import click
 
 from ..commands.orders import complain
-from ..shared.left_alone import left_alone_of
 from .ending import Ending
 
 if TYPE_CHECKING:
@@ -109,9 +108,6 @@ async def kept_asked(opened: OpenLine, tell: Tell) -> AsyncIterator[tuple[Holdin
         try:
             yield Holding(fleet, tell), ending
         finally:
-            for session in fleet.sessions:
-                if (known := fleet.line_watch.timeout(session.device)) is not None:
-                    left_alone_of(opened, session).found = known
             fleet.forget()
     name = ending.why.removeprefix("ended by ")
     if name in signal.Signals.__members__:

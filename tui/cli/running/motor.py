@@ -6,7 +6,6 @@ import asyncio
 import time
 from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING
 
 from tui.bus.errors import LineError
@@ -36,7 +35,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.monitor.timeout import TimeoutWatch
+    from tui.session.timeout_told import TimeoutWatch
 
 RUN_POLL_INTERVAL = 0.05
 CYCLES_AT_REST = 2
@@ -258,7 +257,6 @@ async def run_motor(opened: OpenLine, target: Target, wish: Wish) -> None:
         try:
             async with watched(opened, target, starts) as (fleet, console):
                 telling = RunTelling(console.session, voice.say, as_json=wish.as_json)
-                telling.timeout = partial(fleet.line_watch.timeout, console.device)
                 await Run(fleet, console, wish, telling, ending).carry_out()
         finally:
             voice.finish()

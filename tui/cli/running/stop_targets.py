@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING
 from ..commands.orders import complain
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
 from ..shared.options import Target, unidentified
-from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -22,6 +21,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.journal import Journal
+
+    from .stop_telling import StopTelling
 
 BLIND_TRIES = 3
 """How often the first word goes to a drive that answers nothing."""
@@ -37,14 +38,8 @@ class StoppableDrive:
     name: str
 
 
-def tell_stop(text: str) -> None:
-    """Print a line; a reader that went away must not end a stop."""
-    with suppress(OSError):
-        say(text)
-
-
 async def first_stopped(
-    opened: OpenLine, target: Target, order: OrderId, journal: Journal
+    opened: OpenLine, target: Target, order: OrderId, journal: Journal, telling: StopTelling
 ) -> StoppableDrive:
     """Send the first word, then find out what the drive is; both are told."""
     from tui.bus.errors import ExchangeError, NoAnswer
@@ -70,8 +65,7 @@ async def first_stopped(
         says = f"it says it is {identity.reference}" if identity.reference else "it names nothing"
     except ExchangeError as error:
         silent, says = error, "it does not say what it is"
-    for one in first.sent:
-        tell_stop(f"Device {device}: sent first {one.text}; {says}.")
+    telling.sent_first(device, first.sent, says)
     if silent is not None and not first.answered:
         hint = "" if typed else " -p sends a stop word blind."
         text = f"NOT STOPPED: Device {device} did not answer. Stop it at the machine.{hint}"

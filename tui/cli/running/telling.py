@@ -13,7 +13,6 @@ from ..shared.left_alone import timeout_json
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.monitor.timeout import Timeout
 
 TOLD_EVERY = 1.0
 """Seconds between two lines about the motor."""
@@ -29,8 +28,6 @@ class RunTelling:
         self._trouble = 0.0
         """When the last cycle failed, time.monotonic()."""
         self._told = 0.0
-        self.timeout: Callable[[], Timeout | None] = lambda: None
-        """What the drive has told of its communication time-out by now."""
 
     def show(self, latest: Snapshot, left_alone: Callable[[], str]) -> None:
         """A line about the motor once a second; trouble on the line when it begins and ends.
@@ -57,16 +54,17 @@ class RunTelling:
 
     def tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
         """One line, or one JSON object a line, about an event."""
-        from ..shared.output import iso_time, json_text
+        from tui.session.monitor.timeout import timeout_now
+
+        from ..shared.output import document, iso_time, json_text
 
         now = time.time()
         if not self._as_json:
             self._say(f"{time.strftime('%H:%M:%S', time.localtime(now))}  {text}")
             return
         data: dict[str, Any] = {"time": iso_time(now), "device": self._session.device}
-        found = self.timeout()
         data |= {"event": event, "text": text}
-        data["timeout"] = timeout_json(found) if found is not None else None
+        data["timeout"] = timeout_json(timeout_now(self._session))
         if latest is not None:
             state = latest.state
             data |= {
@@ -76,4 +74,4 @@ class RunTelling:
                 "values": values_json(self._session.profile, latest.readings),
                 "error": latest.error or None,
             }
-        self._say(json_text(data))
+        self._say(json_text(document(data)))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import shlex
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from .say import say
@@ -13,7 +13,7 @@ from .say import say
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.monitor.timeout import Timeout, TimeoutWatch
+    from tui.session.timeout_told import Timeout, TimeoutWatch
 
 TOLD_WITHIN = 3.0
 """Seconds in which a drive tells its time-out at the end of a command."""
@@ -27,33 +27,36 @@ class LeftAlone:
     line_text: str
     goes_on: bool
     """Whether the drive is there afterwards: a simulated one ends with its line."""
-    found: Timeout | None = field(default=None, init=False)
-    """What it told of its time-out, as soon as that was read."""
 
-    async def learn(self) -> Timeout:
-        """What the drive tells of its time-out, asked until it has; not known where it does not."""
+    async def learn(self) -> None:
+        """Have the drive tell its time-out, unless it has; no answer fails nothing."""
         from tui.bus.api import Priority
         from tui.bus.errors import LineError
-        from tui.session.monitor.timeout import Timeout, has_begun, read_timeout
+        from tui.session.monitor.timeout import read_timeout
         from tui.session.read.reader import Reader
+        from tui.session.timeout_told import Timeout
 
         session = self.session
-        if self.found is None or not self.found.known:
-            self.found = Timeout(known=False)
-            with suppress(LineError, TimeoutError):
-                reading = read_timeout(Reader(session), Priority.OPERATOR_READ)
-                self.found = await asyncio.wait_for(reading, TOLD_WITHIN)
-        if (watch := self.found.watch) is not None and has_begun(session):
-            self.found = replace(self.found, watch=replace(watch, active=True))
-        return self.found
+        heard = session.line.device_state(session.device).heard is not None
+        if not heard or (session.timeout is not None and session.timeout.known):
+            return
+        session.timeout = Timeout(known=False)
+        with suppress(LineError, TimeoutError):
+            reading = read_timeout(Reader(session), Priority.OPERATOR_READ)
+            session.timeout = await asyncio.wait_for(reading, TOLD_WITHIN)
 
     async def tell(self) -> None:
         """Say on standard error that its time-out runs, and what follows."""
+        from tui.session.monitor.timeout import timeout_now
+
         session = self.session
         heard = session.line.device_state(session.device).heard is not None
         if not heard or not self.goes_on or session.profile.data.communication_fault is None:
             return
-        if text := left_alone(session, await self.learn(), self.line_text):
+        if session.arming.times:
+            session.timeout = None  # it may have been written
+        await self.learn()
+        if text := left_alone(session, timeout_now(session), self.line_text):
             with suppress(OSError):
                 say(f"drivepanel: {text}", err=True)
 
@@ -113,24 +116,6 @@ def look_after(opened: OpenLine, session: DriveSession, line_text: str) -> LeftA
     found = LeftAlone(session, line_text, goes_on=opened.simulation is None)
     opened.farewells[session.device] = found
     return found
-
-
-def left_alone_of(opened: OpenLine, session: DriveSession) -> LeftAlone:
-    """What is known of a drive that is looked after: `connect_drive` does so for every one."""
-    found = opened.farewells.get(session.device)
-    if isinstance(found, LeftAlone) and found.session is session:
-        return found
-    return look_after(opened, session, opened.text)
-
-
-async def timeout_of(opened: OpenLine, session: DriveSession) -> Timeout:
-    """What a drive tells of its time-out, asked once."""
-    return await left_alone_of(opened, session).learn()
-
-
-async def timeout_told(session: DriveSession) -> dict[str, Any] | None:
-    """The object `timeout` of a drive, read now."""
-    return timeout_json(await LeftAlone(session, "", goes_on=True).learn())
 
 
 async def say_farewells(opened: OpenLine) -> None:

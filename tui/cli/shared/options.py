@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from .completion import complete_line, complete_profile
+from .devices import CommandFunction, Option, device_option, several_devices_option
 
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
@@ -17,55 +20,30 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 T = TypeVar("T")
-CommandFunction = Callable[..., Any]
-Option = Callable[[CommandFunction], CommandFunction]
 
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
 
-line_argument = click.argument("line_text", metavar="LINE")
+line_argument = click.argument("line_text", metavar="LINE", shell_complete=complete_line)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
-read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
+read_only_option = click.option("--read-only", is_flag=True, help="Write nothing on this line.")
 
-SLAVE_ADDRESS = click.IntRange(1, 247)
-device_option = click.option(
-    "-d",
-    "--device",
-    type=SLAVE_ADDRESS,
-    default=1,
-    show_default=True,
-    metavar="ADDRESS",
-    help="Slave address of the drive.",
-)
 profile_option = click.option(
     "-p",
     "--profile",
     "profile_id",
     metavar="ID",
-    help="Profile of the drive; it has to fit what the drive says of itself.",
+    shell_complete=complete_profile,
+    help="Profile of the drive; it must match the drive's identification.",
 )
 rated_current_option = click.option(
     "--rated-current",
     "rated_current",
     type=float,
     metavar="A",
-    help="Rated current of the drive in A, for families that give currents in %.",
+    help="Rated current of the drive in A, for families that tell currents in %.",
 )
-
-
-def devices_option(help_text: str, **more: Any) -> Option:
-    """The option -d of a command that takes several drives; `more` goes to click."""
-    return click.option(
-        "-d",
-        "--device",
-        "devices",
-        type=SLAVE_ADDRESS,
-        multiple=True,
-        metavar="ADDRESS",
-        help=help_text,
-        **more,
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +56,13 @@ class Target:
     rated_current: float | None = None
     force_profile: bool = False
     """Whether a profile counts that the drive contradicts; never for what moves a motor."""
+    others: tuple[int, ...] = ()
+    """Further addresses on the same line, where a command takes several."""
+
+    def each(self) -> list[Target]:
+        """A target for each drive, in the order in which they were named."""
+        devices = dict.fromkeys((self.device, *self.others))
+        return [replace(self, device=device, others=()) for device in devices]
 
 
 FORCE_PROFILE = "--force-profile"
@@ -85,7 +70,7 @@ force_profile_option = click.option(
     FORCE_PROFILE,
     "force_profile",
     is_flag=True,
-    help="Go by the profile of -p though the drive says it is another.",
+    help="Use the profile of -p although the drive identifies as another.",
 )
 """For commands that read, watch or write; it reaches them in their Target."""
 
@@ -120,14 +105,15 @@ def _target_of(*options: Option) -> Option:
         @functools.wraps(command)
         def handed_over(
             line_text: str,
-            device: int,
+            device: int | tuple[int, ...],
             profile_id: str | None,
             rated_current: float | None = None,
             force_profile: bool = False,
             **others: Any,
         ) -> Any:
-            target = Target(line_text, device, profile_id, rated_current, force_profile)
-            return command(target=target, **others)
+            first, *more = device if isinstance(device, tuple) else (device,)
+            target = Target(line_text, first, profile_id, rated_current, force_profile)
+            return command(target=replace(target, others=tuple(more)), **others)
 
         decorated: CommandFunction = handed_over
         for option in reversed(options):
@@ -139,6 +125,8 @@ def _target_of(*options: Option) -> Option:
 
 drive_options = _target_of(device_option, profile_option, rated_current_option)
 """Which drive on the line, and by which profile, for commands that show values."""
+drives_options = _target_of(several_devices_option, profile_option, rated_current_option)
+"""The same for commands that take several drives."""
 settings_options = _target_of(profile_option, device_option)
 """The same for commands about settings, where a current is a word like any other."""
 
@@ -246,7 +234,7 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     session = DriveSession(opened.line, target.device, profile, told)
     if session.contradiction:
         _believe_the_person(session, target)
-    look_after(opened, session, target.line_text)
+    await look_after(opened, session, target.line_text).learn()
     await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session

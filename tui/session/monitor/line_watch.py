@@ -23,10 +23,11 @@ from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.reader import Reader
 from ..reading import Reading
+from ..timeout_told import TimeoutWatch
 from .load import unread_limit
 from .monitor import Monitor
 from .rates import monitoring_codes
-from .timeout import TOLD_SHARE, Timeout, TimeoutWarning, TimeoutWatch, has_begun, read_timeout
+from .timeout import TOLD_SHARE, TimeoutWarning, has_begun, read_timeout
 
 log = logging.getLogger(__name__)
 
@@ -94,13 +95,6 @@ class LineWatch:
         """A drive's watch over the line, once it is known and not off."""
         kept = self._kept.get(device)
         return self._watch(kept) if kept else None
-
-    def timeout(self, device: int) -> Timeout | None:
-        """What a drive has told of its time-out; None where it was not asked yet."""
-        kept = self._kept.get(device)
-        if kept is None or kept.learned is None:
-            return None
-        return Timeout(not kept.unknown, self._watch(kept))
 
     def _watch(self, kept: _Kept) -> TimeoutWatch | None:
         rules, watch = kept.session.profile.data.communication_fault, kept.watch
@@ -283,6 +277,7 @@ class LineWatch:
         """Read the drive's time-out and its reaction."""
         deciding = deciding_codes(kept.session.profile)
         found = await read_timeout(kept.reader, Priority.POLL, deciding)
+        kept.session.timeout = found
         kept.watch, kept.unknown = found.watch, not found.known
         kept.learned = kept.session.clock.monotonic()
 

@@ -3,50 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import CommunicationFault, Reaction
+from tui.drive.profile.schema import CommunicationFault
 
 from ..drive import DriveSession
 from ..read.reader import Reader
 from ..reading import Reading
+from ..timeout_told import Timeout, TimeoutWatch
 
 TOLD_SHARE = 0.5
 """Share of its time-out after which a drive that was not heard is told of."""
-
-
-@dataclass(frozen=True, slots=True)
-class TimeoutWatch:
-    """A drive's watch over the line: seconds to its time-out, and what it does then."""
-
-    timeout: float
-    reaction: Reaction | None
-    active: bool = True
-    """False where it begins only with a first command, and none was sent from here."""
-    code: str = ""
-    """The parameter that sets the time-out."""
-    fault: str = ""
-    """The fault in which its reaction ends; empty where it ends in none, or it is not known."""
-    sure: bool = True
-    """Whether a document says when it begins; it is taken to have begun where none does."""
-
-    @property
-    def trips(self) -> bool:
-        """Whether the drive may end in a fault; a reaction that is not known may be one."""
-        return self.reaction is None or self.reaction.trips
-
-
-@dataclass(frozen=True, slots=True)
-class Timeout:
-    """What is known of a drive's communication time-out."""
-
-    known: bool
-    """Whether the drive has told it."""
-    watch: TimeoutWatch | None = None
-    """None where there is none, where it is off, or where it is not known."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,6 +101,14 @@ def _told_with_it(session: DriveSession, rules: CommunicationFault) -> list[str]
     if rules.needs_write and not session.told_by_line:
         codes += [chart.command for chart in session.profile.data.charts if chart.command]
     return list(dict.fromkeys(codes))
+
+
+def timeout_now(session: DriveSession) -> Timeout:
+    """What a drive has told of its time-out, and whether that has begun by now."""
+    found = session.timeout or Timeout(known=False)
+    if found.watch is not None and has_begun(session):
+        return replace(found, watch=replace(found.watch, active=True))
+    return found
 
 
 def has_begun(session: DriveSession) -> bool:
