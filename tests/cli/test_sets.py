@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 import re
 import signal
@@ -16,8 +17,9 @@ import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE
 
-from .commands import invoked, motor, refused, run, tcp_line
+from .commands import held, invoked, motor, refused, run, tcp_line
 
+SP2 = 11410
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 
 
@@ -93,6 +95,31 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
         assert "did not come to its end" in told
         run(0, "compare", file, line)
         assert "did not come" not in run(0, "restore", line, file, "--arm")
+
+
+def test_130_a_restore_ended_by_ctrl_c_tells_what_was_written(tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    settings = [part for n in range(2, 9) for part in ("--set", f"SP{n}={100 + n}")]
+    with tcp_line("atv312", *settings) as line:
+        run(0, "backup", line, file)
+    with tcp_line("atv312") as line:
+        restore = [*DRIVEPANEL, "restore", line, str(file), "--arm", "--json"]
+        process = subprocess.Popen(
+            restore, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )  # fmt: skip
+        end = time.monotonic() + PATIENCE
+        while held(line, SP2) == 100:
+            assert time.monotonic() < end
+        process.send_signal(signal.SIGINT)
+        out, said = process.communicate(timeout=PATIENCE)
+        if process.returncode == 0:
+            pytest.skip("the restore was done before the signal came")
+        assert process.returncode == 130
+        told = json.loads(out)
+        assert told["status"] == 130
+        assert re.search(r"Ended by Ctrl-C: \d of 7 written: SP2|may have been written", said)
+        assert said.endswith(f"{told['error']}\n")
 
 
 def _unbuffered() -> dict[str, str]:
