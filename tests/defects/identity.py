@@ -7,6 +7,7 @@ from .defect import Defect
 CONTRADICTION = "tests/session/test_contradiction.py"
 FIRST = "tests/drive/test_first_stop.py"
 TIMEOUT = "tests/session/test_timeout.py"
+IDENTITY = "tests/cli/test_identity.py"
 LEFT = "tests/cli/test_left_alone.py"
 
 DEFECTS = (
@@ -40,10 +41,7 @@ DEFECTS = (
         "    if session.contradiction:\n",
         "    if False:\n",
         "A setting of one family is written into another.",
-        (
-            "tests/cli/test_identity.py::"
-            "test_5_a_drive_that_is_another_is_told_and_not_written[write]",
-        ),
+        (f"{IDENTITY}::test_5_a_drive_that_is_another_is_told_and_not_written",),
     ),
     Defect(
         "first-word-of-one-family-only",

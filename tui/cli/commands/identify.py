@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 IDENTITY_KEYS = ("device", "vendor", "reference", "version", "name", "profile")
 """What JSON tells of an identity, by its own names."""
-TITLES = 11
+IDENTITY_TITLES = 11
 """Width of the column of titles, with its gap."""
 
 
@@ -112,7 +112,7 @@ def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
         ("Profile", found.profile or _choices(found)),
         *_model_row(found, words),
     ):
-        say_row(title, plain(text) or "-----", TITLES)
+        say_row(title, plain(text) or "-----", IDENTITY_TITLES)
 
 
 async def _model_words(session: DriveSession | None) -> Mapping[str, int]:

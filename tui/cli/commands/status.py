@@ -47,7 +47,7 @@ CHANNEL_NAMES: dict[Quantity, str] = {
     "reference_channel": "Reference from",
 }
 
-TITLES = 18
+STATUS_TITLES = 18
 """Width of the column of titles, with its gap."""
 
 
@@ -281,7 +281,7 @@ def status(
         found = await status_of_drive(session, opened)
         if not as_json:
             for title, text in status_table(found):
-                say_row(title, plain(text) or "-----", TITLES)
+                say_row(title, plain(text) or "-----", STATUS_TITLES)
         return status_json(target.line_text, found), DONE
 
     async def work(opened: OpenLine) -> int:
