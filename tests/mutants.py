@@ -25,7 +25,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
 
-from tests.defects import bus, commanding, drive, records, watching
+from tests.defects import bus, commanding, drive, identity, records, scripts, watching
 from tests.defects.defect import Defect
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -36,6 +36,8 @@ DEFECTS: tuple[Defect, ...] = (
     *commanding.DEFECTS,
     *watching.DEFECTS,
     *records.DEFECTS,
+    *scripts.DEFECTS,
+    *identity.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
 """What became of each defect when it was planted last; `--table` tells it."""

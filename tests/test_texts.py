@@ -34,8 +34,11 @@ PRINTING = {
     "print", "echo", "secho", "click.echo", "click.secho",
     "sys.stdout.write", "sys.stderr.write", "sys.stdout.writelines", "sys.stderr.writelines",
 }  # fmt: skip
-PRINTS_ITSELF = PACKAGE / "drive" / "profile" / "json_schema.py"
-"""Prints what it has made itself, for a redirection."""
+PRINTS_THEMSELVES = (
+    PACKAGE / "drive" / "profile" / "json_schema.py",
+    PACKAGE / "cli" / "documents" / "json_schema.py",
+)
+"""Print what they have made themselves, for a redirection."""
 READS_ITSELF = {
     PACKAGE / "terminal" / "abilities.py",
     PACKAGE / "session" / "starts" / "processes.py",
@@ -67,7 +70,7 @@ def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
         yield f"{name}: take {MADE_ELSEWHERE[name]}"
     if name == "Console" and not off:
         yield "a console with markup"
-    if ast.unparse(call.func) in PRINTING and path not in (*PRINTS, PRINTS_ITSELF):
+    if ast.unparse(call.func) in PRINTING and path not in (*PRINTS, *PRINTS_THEMSELVES):
         yield f"{name}: take say"
     if name in ("read_text", "read_bytes") and path not in READS_ITSELF:
         yield f"{name} waits for a pipe, and takes files of any length: take read_small_text"

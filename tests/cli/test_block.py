@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -41,7 +42,8 @@ def slots(text: str) -> dict[str, Any]:
 def test_set_show_verify_save_load_factory(line: str, tmp_path: Path) -> None:
     drive, file = ("-d", "2"), tmp_path / "scanner.toml"
     shown = run(0, line, *drive)
-    assert "NMA1  ETA" in shown
+    assert re.search(r"NMA1 +ETA", shown)
+    assert re.search(r"NMA3 to NMA8 +unused", shown)
     assert "W8604" in shown
     assert "8604 (16#219C)" in shown
     assert "Request: 02 03 31 C5 00 02" in shown

@@ -15,6 +15,7 @@ from tui.session.monitor.rates import monitoring_codes
 from .commands import tcp_line
 
 LINE = ("sim:atv71@2", "-d", "2")
+HEAD = {"schema", "command"}
 VALUE_KEYS = {"address", "raw", "value", "unit", "text", "taught", "quality"}
 
 
@@ -29,7 +30,7 @@ def told(*arguments: str, status: int = 0) -> Any:
 
 def test_read() -> None:
     read = told("read", *LINE, "ETA", "ACC", "LFT")
-    assert set(read) == {"line", "device", "profile", "values"}
+    assert set(read) == {*HEAD, "line", "device", "profile", "timeout", "values"}
     assert (read["line"], read["device"], read["profile"]) == ("sim:atv71@2", 2, "atv71")
     assert list(read["values"]) == ["ETA", "ACC", "LFT"]
     for value in read["values"].values():
@@ -63,9 +64,12 @@ def test_watch_prints_one_object_a_cycle() -> None:
     cycles = [json.loads(line) for line in done.stdout.splitlines()]
     assert len(cycles) == 3
     for cycle in cycles:
-        assert set(cycle) == {"time", "line", "device", "profile", "values"}
+        keys = {"time", "line", "device", "profile", "values", "state", "direction", "error"}
+        assert set(cycle) == HEAD | keys | {"timeout"}
         assert list(cycle["values"]) == ["RFR", "ETA"]
-        assert all(set(value) == VALUE_KEYS for value in cycle["values"].values())
+        assert all(
+            set(value) == VALUE_KEYS | {"time", "error"} for value in cycle["values"].values()
+        )
     times = [datetime.fromisoformat(cycle["time"]) for cycle in cycles]
     assert all(time.tzinfo is not None for time in times)
     assert times == sorted(times)
@@ -81,7 +85,8 @@ def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
 
 def test_identify() -> None:
     who = told("identify", *LINE)
-    assert set(who) == {"device", "vendor", "reference", "version", "name", "profile", "model"}
+    keys = {"line", "device", "vendor", "reference", "version", "name", "profile", "model"}
+    assert set(who) == HEAD | keys | {"timeout"}
     assert (who["device"], who["profile"]) == (2, "atv71")
     assert who["reference"].startswith("ATV71")
 
@@ -89,7 +94,7 @@ def test_identify() -> None:
 def test_profiles() -> None:
     listed = told("profiles")
     assert [set(one) for one in listed] == [
-        {"id", "name", "vendor", "parameters", "own", "file", "remark"}
+        {*HEAD, "id", "name", "vendor", "parameters", "own", "file", "remark"}
     ] * len(listed)
     packaged = {path.stem for path in library.packaged_folder().glob("*.toml")}
     assert {one["id"] for one in listed} == packaged

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+import json
 import os
 import re
 import signal
@@ -16,8 +17,9 @@ import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE
 
-from .commands import invoked, refused, run, tcp_line
+from .commands import held, invoked, motor, refused, run, tcp_line
 
+SP2 = 11410
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
 
 
@@ -32,7 +34,7 @@ def line() -> Iterator[str]:
 def test_a_drive_equals_its_own_backup(family: str, tmp_path: Path) -> None:
     file = tmp_path / "set.toml"
     drive = (f"sim:{family}@3", "-d", "3", "-p", family)
-    assert "parameters of" in run(0, "backup", drive[0], file, *drive[1:])
+    assert "settings of" in run(0, "backup", drive[0], file, *drive[1:])
     run(0, "compare", file, *drive)
     assert "0 to write" in run(0, "restore", drive[0], file, "--dry-run", *drive[1:])
 
@@ -95,8 +97,114 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
         assert "did not come" not in run(0, "restore", line, file, "--arm")
 
 
+def test_130_a_restore_ended_by_ctrl_c_tells_what_was_written(tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    settings = [part for n in range(2, 9) for part in ("--set", f"SP{n}={100 + n}")]
+    with tcp_line("atv312", *settings) as line:
+        run(0, "backup", line, file)
+    with tcp_line("atv312") as line:
+        restore = [*DRIVEPANEL, "restore", line, str(file), "--arm", "--json"]
+        process = subprocess.Popen(
+            restore, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+            text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+        )  # fmt: skip
+        end = time.monotonic() + PATIENCE
+        while held(line, SP2) == 100:
+            assert time.monotonic() < end
+        process.send_signal(signal.SIGINT)
+        out, said = process.communicate(timeout=PATIENCE)
+        if process.returncode == 0:
+            pytest.skip("the restore was done before the signal came")
+        assert process.returncode == 130
+        told = json.loads(out)
+        assert told["status"] == 130
+        assert re.search(r"Ended by Ctrl-C: \d of 7 written: SP2|may have been written", said)
+        assert said.endswith(f"{told['error']}\n")
+
+
 def _unbuffered() -> dict[str, str]:
     return {**os.environ, "PYTHONUNBUFFERED": "1"}
+
+
+def test_two_backups_around_a_run_are_the_same_but_for_their_time(tmp_path: Path) -> None:
+    with tcp_line("atv71@2", "--set", "DEC=1") as line:
+        run(0, "backup", line, tmp_path / "a", "-d", "2")
+        run(0, "backup", line, tmp_path / "all-a", "-d", "2", "--all")
+        motor(0, line, "-d", "2", "--reference", "20Hz", "--arm", "--for", "1")
+        run(0, "backup", line, tmp_path / "b", "-d", "2")
+        run(0, "backup", line, tmp_path / "all-b", "-d", "2", "--all")
+    a, b = ((tmp_path / name).read_text("utf-8").splitlines() for name in "ab")
+    assert [one for one, two in zip(a, b, strict=True) if one != two and "time" not in one] == []
+    a, b = ((tmp_path / f"all-{name}").read_text("utf-8").splitlines() for name in "ab")
+    assert [one for one, two in zip(a, b, strict=True) if one != two and "time" not in one]
+
+
+def test_a_backup_on_standard_output(line: str, tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    file.write_text(run(0, "backup", line, "-", "-d", "2"), encoding="utf-8")
+    assert not Path("-").exists()
+    run(0, "compare", file, line, "-d", "2")
+    assert "standard output" in refused(2, "backup", line, "-", "-d", "2", "--json")
+
+
+def test_4_a_backup_that_is_not_whole(tmp_path: Path) -> None:
+    with tcp_line("atv71@2", "--protect", "ACC") as line:
+        said = refused(4, "backup", line, tmp_path / "set.toml", "-d", "2")
+    assert "ACC could not be read" in said
+    assert "[absent]" in (tmp_path / "set.toml").read_text("utf-8")
+
+
+def test_line_settings_are_not_compared_with_the_factory() -> None:
+    with tcp_line("atv31@5", "--set", "ACC=99") as line:
+        told = run(1, "compare", line, "factory", "-d", "5")
+        codes = {row.split()[1] for row in told.splitlines()[1:]}
+        assert "ACC" in codes
+        assert "Add" not in codes
+        every = run(1, "compare", line, "factory", "-d", "5", "--all")
+        assert re.search(r"Add .* 5 .*line setting", every)
+
+
+ROUNDED = [("LSP=0.04", "LSP: 0.04 would be held as 0.0 Hz"), ("ACC=3.55s", "3.55s would be held")]
+
+
+@pytest.mark.parametrize(("wanted", "text"), ROUNDED)
+def test_5_a_value_that_rounding_makes_another_of(line: str, wanted: str, text: str) -> None:
+    drive = (line, "-d", "2")
+    for how in ("--arm", "--dry-run"):
+        said = refused(5, "write", *drive, wanted, how)
+        assert text in said
+        assert "--round" in said
+    code = wanted.partition("=")[0]
+    assert code in run(0, "write", *drive, wanted, "--arm", "--round")
+
+
+def test_what_is_a_little_rounded_is_written_and_told(line: str) -> None:
+    told = run(0, "write", line, "-d", "2", "ACC=3.56", "--arm")
+    assert "3.56 is held as 3.6 s" in told
+
+
+def test_2_a_code_that_is_given_twice(line: str) -> None:
+    assert "ACC: given more than once" in refused(
+        2, "write", line, "-d", "2", "ACC=3", "W9001=4", "--arm"
+    )
+    assert re.search(r"ACC .* 3\.0 +s ", run(0, "read", line, "ACC", "-d", "2"))
+
+
+def test_a_set_does_not_round_in_silence(line: str, tmp_path: Path) -> None:
+    file = tmp_path / "set.toml"
+    run(0, "backup", line, file, "-d", "2")
+    text = file.read_text("utf-8")
+    text = text.replace('LSP = { raw = 0, value = "0.0 Hz"', 'LSP = { value = "0.04 Hz"')
+    text = text.replace('ACC = { raw = 30, value = "3.0 s"', 'ACC = { value = "3.55 s"')
+    text = text.replace('dEC = { raw = 30, value = "3.0 s"', 'dEC = { value = "3.56 s"')
+    file.write_text(text, encoding="utf-8")
+    planned = run(0, "restore", line, file, "-d", "2", "--dry-run")
+    assert "leave  ACC" in planned
+    told = run(0, "restore", line, file, "-d", "2", "--arm")
+    assert "3.55 s is held as 3.6 s. --round writes that all the same" in told
+    assert "3.56 s is held as 3.6 s" in told
+    assert "1 written and read back" in told
+    assert "write  ACC" in run(0, "restore", line, file, "-d", "2", "--dry-run", "--round")
 
 
 USAGE: dict[str, tuple[str, ...]] = {
@@ -153,7 +261,7 @@ WRITES_REFUSED_HERE = [
     (("ACC=100000", "--arm"), "out of range"),
     (("ACC=soon", "--arm"), "'soon'"),
     (("RFR=5", "--arm"), "only be read"),
-    (("CMD=6", "--arm"), "order"),
+    (("CMD=6", "--arm"), "is a command"),
     (("LSP=60", "HSP=40", "--arm"), "above HSP"),
     (("BIR=1", "--arm"), "unverified"),
     (("FRY=1", "--arm"), "not written from here"),

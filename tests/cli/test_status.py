@@ -79,7 +79,7 @@ def test_3_nothing_was_ever_watched(extra: tuple[str, ...]) -> None:
     watch = ("watch", SIM, "ETA", "-d", "9", "-p", "atv71", "--count", "2", "--every", "0.1")
     done = drivepanel(*watch, *extra)
     assert done.returncode == 3, done.stdout
-    assert done.stderr.startswith("drivepanel: Device 9 did not answer")
+    assert done.stderr.startswith("drivepanel: Device 9 does not answer")
 
 
 def test_3_nothing_listens() -> None:
@@ -121,7 +121,7 @@ def test_an_unforeseen_error_goes_to_the_log() -> None:
 
     start_logging(0)
     result = CliRunner().invoke(command)
-    assert result.exit_code == 1
+    assert result.exit_code == 70
     assert "Traceback" not in result.output
     assert str(log_file()) in result.stderr
     stop_logging()

@@ -9,6 +9,7 @@ import os
 import signal
 import socket
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -75,10 +76,56 @@ def test_ctrl_c_ends_watch_after_a_whole_line() -> None:
         assert set(json.loads(watching.ready)["values"]) == {"ETA"}
         watching.process.send_signal(signal.SIGINT)
         rest, said = watching.process.communicate(timeout=PATIENCE)
-    assert (watching.process.returncode, said) == (0, "")
-    assert rest == "" or rest.endswith("\n")
-    for line in rest.splitlines():
-        json.loads(line)
+    assert watching.process.returncode == 130
+    assert said.startswith("drivepanel: Ended by Ctrl-C after ")
+    assert rest.endswith("\n")
+    told = [json.loads(line) for line in rest.splitlines()]
+    assert told[-1]["status"] == 130
+    assert all("values" in one for one in told[:-1])
+
+
+@pytest.fixture
+def silent_line() -> Iterator[tuple[socket.socket, str]]:
+    """A TCP port that is connected to and never answers, and the LINE to it."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        server.settimeout(PATIENCE)
+        yield server, f"tcp:127.0.0.1:{server.getsockname()[1]},timeout=30"
+
+
+INTERRUPTED = {
+    "read": (("ETA",), "Ended by Ctrl-C."),
+    "backup": (("FILE",), "nothing was written"),
+    "report": (("FILE",), "nothing was written"),
+    "watch": (("ETA", "--csv", "FILE"), "after 0 cycles; 0 rows"),
+    "compare": (("factory",), "Ended by Ctrl-C."),
+    "write": (("ACC=5", "--arm"), "may have been written: read it"),
+}
+
+
+@pytest.mark.parametrize("command", INTERRUPTED)
+def test_130_ctrl_c_with_what_was_written(
+    command: str, silent_line: tuple[socket.socket, str], tmp_path: Path
+) -> None:
+    server, line = silent_line
+    words, text = INTERRUPTED[command]
+    file = tmp_path / "out"
+    typed = [str(file) if word == "FILE" else word for word in words]
+    arguments = [*DRIVEPANEL, command, line, *typed, "-p", "atv71"]
+    process = subprocess.Popen(
+        arguments, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        text=True, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
+    connection, _ = server.accept()
+    with connection:
+        connection.settimeout(PATIENCE)
+        assert connection.recv(1)  # it asks, so it is at work
+        process.send_signal(signal.SIGINT)
+        out, said = process.communicate(timeout=PATIENCE)
+    assert (process.returncode, out) == (130, "")
+    assert said.startswith("drivepanel: Ended by Ctrl-C")
+    assert text in said
+    if command in ("backup", "report"):
+        assert not file.exists()
 
 
 @pytest.mark.parametrize("command", [WATCH, ("profiles", "atv71"), ("profiles", "atv71", "--json")])
@@ -112,7 +159,7 @@ def test_watch_writes_a_csv_file_beside(tmp_path: Path) -> None:
     assert done.returncode == 0, done.stderr
     with path.open(newline="", encoding="utf-8") as file:
         titles, *rows = csv.reader(file)
-    assert titles == ["time", "RFR [Hz]", "ETA", "error"]
+    assert titles == ["time", "RFR [Hz]", "ETA", "error", "state", "direction"]
     printed = [json.loads(line) for line in done.stdout.splitlines()]
     assert [row[0] for row in rows] == [cycle["time"] for cycle in printed]
     assert [row[1] for row in rows] == [cycle["values"]["RFR"]["text"] for cycle in printed]

@@ -95,7 +95,7 @@ async def test_eight_inputs_and_six_outputs_in_one_exchange() -> None:
 @pytest.mark.parametrize(
     ("wanted", "error", "says"),
     [
-        ({"LCR": 1}, AssignmentRefused, "No output slot stands for LCR"),
+        ({"LCR": 1}, AssignmentRefused, "No output slot is mapped to LCR"),
         ({"ACC": 70000}, ValueRefused, "does not fit|out of range"),
     ],
 )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 
 import pytest
 
@@ -104,3 +105,19 @@ async def test_damaged_lines_of_the_journal_are_left_out() -> None:
             file.write("cut short\n")
         entries = entries_of(made.journal, made.session.line_text, 1)
         assert [entry.code for entry in entries] == ["ACC"]
+
+
+async def test_all_times_are_in_the_zone_in_which_the_drive_was_read() -> None:
+    with bench("atv312") as made:
+        await made.apply(SP2="7", ttO="5")
+        upload = Upload(made.session, ["SP2"])
+        await upload.run()
+        values = upload.parameter_set()
+        entries = entries_of(made.journal, made.session.line_text, 1)
+    times = ("2026-10-25T02:30:00.000+02:00", "2026-10-25T02:30:00.000+01:00")
+    entries = [replace(one, time=time) for one, time in zip(entries, times, strict=True)]
+    values = replace(values, head=replace(values.head, time="2026-11-22T08:00:00+01:00"))
+    text = report_text(made.profile, values, entries)
+    assert "- Read: 2026-11-22 08:00:00; times here are UTC+01:00" in text
+    written = text.partition("## Written from here")[2]
+    assert written.index("2026-10-25 01:30:00") < written.index("2026-10-25 02:30:00")

@@ -36,9 +36,9 @@ from tui.session.journal import Journal
 from tui.session.monitor.line_watch import LineWatch, Look
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
-from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import Trend, TrendPoint
 from tui.session.reading import Quality, Reading
+from tui.session.timeout_told import TimeoutWatch
 from tui.terminal.abilities import EVERYTHING, Abilities
 
 NOW = 1000.0
@@ -250,7 +250,8 @@ def console_of(
     armed: float | None = None,
 ) -> DriveConsole:
     """A drive whose monitor has brought this snapshot, with a trend of a start and a run."""
-    session = DriveSession(StillLine(line), device, library.load(family), ATV71)
+    identity = ATV71 if family == "atv71" else None
+    session = DriveSession(StillLine(line), device, library.load(family), identity)
     session.arming = session.work.arming = StillArming(session.line, armed)
     way = -1.0 if snapshot and snapshot.state.direction == "reverse" else 1.0
     trend = tuple(

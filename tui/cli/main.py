@@ -3,57 +3,105 @@
 from __future__ import annotations
 
 import importlib
-from typing import Any
+import os
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import tui
 
-from .shared.errors import plain_usage
+from .shared.errors import plain_errors
+from .shared.lines import is_line
 from .shared.logs import start_logging
 
+if TYPE_CHECKING:
+    from click.shell_completion import CompletionItem
+
 COMMANDS = {
-    "backup": ("backup", "Write every parameter of a drive to a file."),
-    "block": ("block", "Show or change a drive's indirect blocks or scanner."),
+    "backup": ("backup", "Write the settings of a drive to a file."),
+    "block": ("block", "Show or change a drive's blocks or scanner."),
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
-    "demo": ("panel", "Open the panel on five simulated, running drives."),
+    "demo": ("panel", "Open the panel on five simulated drives that run."),
+    "hold": ("hold", "Ask drives on, against their communication time-out."),
     "identify": ("identify", "Ask a drive who it is."),
     "journal": ("journal", "Show what was written to drives from here."),
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "read": ("read", "Read parameters of a drive."),
-    "reference": ("orders", "Give a drive its reference."),
+    "reference": ("single_orders", "Set a drive's reference."),
     "report": ("report", "Write a report on a drive to a file."),
-    "reset": ("orders", "Reset a drive's fault."),
-    "restore": ("restore", "Bring a parameter set back into a drive."),
-    "run": ("run", "Run a motor until this command is ended."),
-    "simulate": ("simulate", "Serve simulated drives."),
-    "status": ("status", "Tell what a drive does and who commands it."),
+    "reset": ("single_orders", "Reset a drive's fault."),
+    "restore": ("restore", "Write a parameter set back to a drive."),
+    "run": ("run", "Run a motor until this command ends."),
+    "simulate": ("simulate", "Serve simulated drives to any Modbus client."),
+    "status": ("status", "Tell a drive's state, control source and fault."),
     "stop": ("stop", "Stop a drive, or every drive of a line."),
-    "teach": ("teach", "Teach a raw value's scale by the drive's display."),
-    "watch": ("watch", "Watch parameters of a drive."),
+    "teach": ("teach", "Teach a raw value's scale from the drive's display."),
+    "watch": ("watch", "Watch parameters of drives, cycle by cycle."),
     "write": ("write", "Write settings of a drive."),
 }
 
 LINE_HELP = """
-LINE is serial:PATH[,BAUD[,FORMAT]] or a device path, tcp:HOST[:PORT], rtu-tcp:HOST:PORT, or
-sim:PROFILE[@ADDRESS][,...] for simulated drives. Formats are written 8E1, 8N2.
+\b
+LINE is one of
+  /dev/ttyUSB0  serial:PATH[,BAUD[,FORMAT]]  a serial port; formats 8E1, 8N2
+  tcp:HOST[:PORT]                            Modbus TCP
+  rtu-tcp:HOST:PORT                          RTU frames over TCP
+  sim:PROFILE[@ADDRESS][,...]                simulated drives
 
-Exit status: 0 done, 2 usage, 3 no answer or line trouble, 4 the drive refused, 5 refused here.
+-v may stand anywhere. With --json errors are printed as JSON on standard output too.
+
+\b
+Exit status:
+    0  done
+    1  different: compare, block verify, a contradicting teach
+    2  usage: options, files, codes, profiles
+    3  no answer, or trouble on the line
+    4  the drive refused
+    5  refused here: nothing was sent
+   70  an error of drivepanel itself; its log has more
+  130  ended by Ctrl-C
 """
+AS_JSON = "drivepanel.json"
+"""Where the context keeps whether JSON was asked for."""
+COMPLETE = "_DRIVEPANEL_COMPLETE"
+"""The environment variable by which a shell asks what may be typed."""
+VERBOSE = frozenset({"-v", "-vv", "-vvv", "--verbose"})
 
 
 class Commands(click.Group):
-    """Subcommands by name; anything else is the LINE on which the panel opens."""
+    """Subcommands by name; a LINE in place of one opens the panel on it."""
 
-    def make_context(self, *args: Any, **kwargs: Any) -> click.Context:
-        """Take the arguments apart; usage errors in two lines."""
-        with plain_usage():
-            return super().make_context(*args, **kwargs)
+    def main(self, *args: Any, **extra: Any) -> Any:
+        """Run the command line, or answer a shell that completes."""
+        if os.environ.get(COMPLETE):
+            from .shared.shells import prepare_completion
+
+            prepare_completion()
+        return super().main(*args, **extra)
+
+    def make_context(
+        self,
+        info_name: str | None,
+        args: list[str],
+        parent: click.Context | None = None,
+        **extra: Any,
+    ) -> click.Context:
+        """Take the arguments apart; `-v` may stand among them anywhere."""
+        end = args.index("--") if "--" in args else len(args)
+        as_json = "--json" in args[:end]
+        verbose = [one for one in args[:end] if one in VERBOSE]
+        rest = [one for one in args[:end] if one not in VERBOSE]
+        with plain_errors(as_json=as_json):
+            context = super().make_context(
+                info_name, [*verbose, *rest, *args[end:]], parent, **extra
+            )
+        context.meta[AS_JSON] = as_json
+        return context
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run the command; usage errors in two lines."""
-        with plain_usage():
+        """Run the command; whatever ends it is told in a line or two."""
+        with plain_errors(as_json=ctx.meta[AS_JSON]):
             return super().invoke(ctx)
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -75,22 +123,53 @@ class Commands(click.Group):
         """The subcommand of the arguments, or the panel on the LINE they begin with."""
         if args[0] in COMMANDS:
             return super().resolve_command(ctx, args)
+        if args[0] != "panel" and not is_line(args[0]):
+            if ctx.resilient_parsing:
+                return None, None, []
+            raise click.UsageError(no_such_command(args[0]))
         rest = args[1:] if args[0] == "panel" else args
         return "panel", self.get_command(ctx, "panel"), rest
 
     def parse_args(self, ctx: click.Context, args: list[str]) -> list[str]:
         """Send the panel's own options, given without a LINE, to the panel."""
-        own = {"-h", "--help", "--version", "-v", "-vv", "--verbose"}
+        if ctx.resilient_parsing and VERBOSE.issuperset(args):
+            return super().parse_args(ctx, args)
+        own = {"-h", "--help", "--version", *VERBOSE}
         first = next((a for a in args if a not in own or a in ("-h", "--help", "--version")), None)
         if first is None or (first.startswith("-") and first not in own):
             split = args.index(first) if first is not None else len(args)
             args = [*args[:split], "panel", *args[split:]]
         return super().parse_args(ctx, args)
 
+    def shell_complete(self, ctx: click.Context, incomplete: str) -> list[CompletionItem[str]]:
+        """Commands, kinds of LINE, and options of the panel, without importing the commands."""
+        from click.shell_completion import CompletionItem
+
+        panel = self.get_command(ctx, "panel")
+        assert panel is not None
+        if incomplete.startswith("-"):
+            own = click.Command.shell_complete(self, ctx, incomplete)
+            more = panel.shell_complete(click.Context(panel, parent=ctx), incomplete)
+            return list({item.value: item for item in (*own, *more)}.values())
+        from .shared.completion import complete_line
+
+        names = [CompletionItem(name, help=told) for name, (_, told) in sorted(COMMANDS.items())]
+        lines = complete_line(ctx, panel.params[0], incomplete)
+        return [*(item for item in names if item.value.startswith(incomplete)), *lines]
+
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """List the subcommands without importing them."""
         with formatter.section("Commands"):
             formatter.write_dl([(name, COMMANDS[name][1]) for name in self.list_commands(ctx)])
+
+
+def no_such_command(name: str) -> str:
+    """What is wrong with a word that is neither a command nor a LINE."""
+    from difflib import get_close_matches
+
+    near = get_close_matches(name.lower(), COMMANDS, n=1)
+    meant = f", did you mean {near[0]}?" if near else ", and no LINE."
+    return f"{name}: no such command{meant}"
 
 
 @click.group(

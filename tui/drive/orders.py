@@ -43,7 +43,7 @@ def choose(chart: Chart, id: OrderId, raws: Mapping[str, int], state: State | No
     """The order that holds in a state, by default that of the status word; raises OrderRefused."""
     same = [order for order in chart.orders if order.id == id]
     if not same:
-        raise OrderRefused(f"The {chart.name} has no order {id.replace('-', ' ')!r}.")
+        raise OrderRefused(f"The {chart.name} has no command {id.replace('-', ' ')!r}.")
     word = raws.get(chart.status)
     if state is None and word is not None:
         state = state_of(chart, word)

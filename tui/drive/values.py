@@ -1,21 +1,25 @@
 """Raw words and engineering values, both ways, without floats.
 
 A typed value is rounded half away from zero to what the drive can hold; a conversion says
-whether it was.
+whether it was, and whether that made another value of it.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from decimal import ROUND_HALF_UP, Decimal, InvalidOperation
 
 from .errors import ValueRefused
 from .profile.schema import Bit, Parameter
+from .units import factor_between
 
 LONGEST_NUMBER = 30
 """Places before or behind the point of a number that anybody means."""
 NOT_AVAILABLE = "-----"
+HALF_A_STEP = Decimal("0.5")
+_WITH_UNIT = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,].*)", re.DOTALL)
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +48,8 @@ class Conversion:
 
     raw: int
     rounded: bool
+    lossy: bool = False
+    """Whether rounding made another value of it: 0, or either of two that are as near."""
 
 
 def word_count(parameter: Parameter) -> int:
@@ -165,7 +171,7 @@ def encode(
     if parameter.sure_up_to is not None:
         typed = typed.replace("?", "")  # the mark of such a value, as it is shown
     raw = _named(typed, names)
-    rounded = False
+    rounded = lossy = False
     if raw is None and typed.lower().startswith(("16#", "0x")):
         raw = _hexadecimal(parameter, typed)
     if raw is None:
@@ -178,8 +184,9 @@ def encode(
         counts = number / scale
         raw = int(counts.to_integral_value(ROUND_HALF_UP))
         rounded = counts != raw
+        lossy = rounded and (raw == 0 or abs(counts - raw) >= HALF_A_STEP)
     check_raw(parameter, raw, names, scale)
-    return Conversion(raw, rounded)
+    return Conversion(raw, rounded, lossy)
 
 
 def check_raw(
@@ -236,11 +243,17 @@ def _hexadecimal(parameter: Parameter, typed: str) -> int:
 
 
 def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decimal:
-    bare = typed
-    if parameter.unit and bare.casefold().endswith(parameter.unit.casefold()):
-        bare = bare[: -len(parameter.unit)].rstrip()
+    """What was typed in the parameter's unit: `3.5`, `3.5 s`, `3500ms`; raises ValueRefused."""
+    bare, factor = typed, Decimal(1)
+    if match := _WITH_UNIT.fullmatch(typed):
+        bare, unit = match[1], match[2].strip()
+        known = factor_between(unit, parameter.unit) if parameter.unit else None
+        if known is None:
+            bare = typed  # told below, or a number such as 1e3
+        else:
+            factor = known
     try:
-        number = Decimal(bare.replace(",", ".").replace(" ", "").replace("_", ""))
+        number = factor * Decimal(bare.replace(",", ".").replace(" ", "").replace("_", ""))
     except InvalidOperation:
         number = Decimal("NaN")
     if not number.is_finite():

@@ -16,7 +16,7 @@ from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.monitor.timeout import TimeoutWatch
+    from tui.session.timeout_told import TimeoutWatch
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""
@@ -76,7 +76,7 @@ class Leaving(Panel):
                 alike.setdefault((console.session.profile.id, watch), []).append(console.session)
         found = [left_alone_text(*same, watch=watch) for (_, watch), same in alike.items()]
         found += [
-            f"{names_of([one])}: what it does left alone was not read yet."
+            f"{names_of([one])}: what it does on loss of communication was not read yet."
             for one in line_watch.unread()
             if one.device not in told
         ]

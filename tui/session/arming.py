@@ -31,15 +31,19 @@ class Arming:
         self._why = ""
         self.times = 0
         """How often it was armed."""
+        self.barred = ""
+        """Why the drive is not to be armed at all, for a person; empty where it may be."""
 
     def arm(self, *, seconds: float = ARMED_FOR) -> None:
         """Let writes through from now on.
 
         `seconds` is how long without a key; math.inf for a command that ends by itself. Raises
-        OrderRefused on a read-only line.
+        OrderRefused on a read-only line, and where it is barred.
         """
         if self._line.read_only:
             raise OrderRefused("The line is read-only: nothing is written.")
+        if self.barred:
+            raise OrderRefused(self.barred)
         self._span, self._why = seconds, ""
         self.times += 1
         self._until = self._clock.monotonic() + seconds

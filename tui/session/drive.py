@@ -11,12 +11,16 @@ from tui.drive.profile.profile import Profile
 
 from .arming import Arming
 from .clock import REAL_CLOCK, Clock
+from .connect.contradiction import contradiction
 from .connect.identify import DriveIdentity
 from .connect.limits import limits_of
 from .image import RegisterImage
 from .reading import Rating
 from .starts.keeper import StartKeeper
+from .timeout_told import Timeout
 from .work import WorkQueue
+
+OWN_PROFILE = "Nothing is written by a profile that is not the drive's own."
 
 
 class DriveSession:
@@ -46,6 +50,10 @@ class DriveSession:
         """What is known of its registers."""
         self.arming = Arming(line, clock)
         """Whether it may be written to from here."""
+        self.contradiction = contradiction(identity, profile)
+        """How the drive contradicts its profile by what it says of itself; empty if it does not."""
+        if self.contradiction:
+            self.arming.barred = f"Not armed: {self.contradiction} {OWN_PROFILE}"
         self.work = WorkQueue(line, device, self.arming, clock)
         """What is being done to it; a stop ends it."""
         self.work.on_change = self.stir
@@ -53,6 +61,10 @@ class DriveSession:
         """What 100 % is, by code, where a person has told it from the nameplate."""
         self.commanded_at: float | None = None
         """When a command or reference was last sent to the drive from here (monotonic)."""
+        self.timeout: Timeout | None = None
+        """What it has told of its communication time-out; None while it was not asked."""
+        self.told_by_line = False
+        """Whether a command or reference word was written to it from here, a stop among them."""
         self.followed: tuple[str, ...] = ()
         """Codes of words that were written from here and are polled on."""
         self.starts: StartKeeper | None = None
@@ -80,6 +92,7 @@ class DriveSession:
 
     def note_command(self) -> None:
         """A command or reference was sent."""
+        self.told_by_line = True
         self.commanded_at = self.clock.monotonic()
 
     def stir(self) -> None:

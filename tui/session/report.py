@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from datetime import UTC, datetime, tzinfo
 
 from tui.drive.blocks.assignment import slot_target
 from tui.drive.channel import switch_texts
@@ -52,6 +53,15 @@ class _Report:
     entries: Sequence[Entry]
     trips: Sequence[Entry]
 
+    @property
+    def zone(self) -> tzinfo:
+        """The one zone of all times here: that in which the drive was read."""
+        return _zone_of(self.values.head.time)
+
+    def _zone_text(self) -> str:
+        offset = datetime.now(self.zone).strftime("%z")
+        return f"UTC{offset[:3]}:{offset[3:5]}"
+
     def head(self) -> list[str]:
         """What the drive is, and when and where it was read."""
         head = self.values.head
@@ -61,7 +71,7 @@ class _Report:
         return [
             f"# {self.profile.name} at {head.line}, address {head.device}",
             "",
-            f"- Read: {head.time}",
+            f"- Read: {_when(head.time, self.zone)}; times here are {self._zone_text()}",
             f"- Profile: {self.profile.id}, version {head.profile_version}; panel {head.panel}",
             *(known or ["- The drive does not say who it is."]),
             f"- Parameters: {len(self.values.raws)} read, {len(self.values.absent)} not",
@@ -122,7 +132,7 @@ class _Report:
             return [*lines, "This family has none."]
         for block in self.profile.data.blocks:
             rows = [(slot, self._target(block, slot)) for slot in block.slots]
-            lines += [f"{block.name}:", "", *_table(("place", "stands for"), rows), ""]
+            lines += [f"{block.name}:", "", *_table(("place", "mapped to"), rows), ""]
         return lines[:-1]
 
     def _target(self, block: Block, slot: str) -> str:
@@ -190,8 +200,7 @@ class _Report:
     def seen(self) -> list[str]:
         """The trips of this drive that were seen from this machine."""
         rows = [
-            (e.time[:19].replace("T", " "), e.code, e.new, e.answer)
-            for e in self.trips[-ENTRIES_SHOWN:]
+            (_when(e.time, self.zone), e.code, e.new, e.answer) for e in self.trips[-ENTRIES_SHOWN:]
         ]
         head = ("time", "fault", "name", "")
         return ["## Trips seen from here", "", *_table(head, rows)] if rows else []
@@ -200,9 +209,7 @@ class _Report:
         """What was written to this drive from this machine."""
         last = self.entries[-ENTRIES_SHOWN:]
         left = len(self.entries) - len(last)
-        rows = [
-            (e.time[:19].replace("T", " "), e.code, e.old, e.new, e.answer, e.why) for e in last
-        ]
+        rows = [(_when(e.time, self.zone), e.code, e.old, e.new, e.answer, e.why) for e in last]
         head = ("time", "code", "old", "new", "answer", "why")
         earlier = [f"{left} earlier ones are in the journal.", ""] if left else []
         return ["## Written from here", "", *earlier, *_table(head, rows)]
@@ -215,6 +222,22 @@ class _Report:
         raws = self.values.raws
         parameter = self.profile[code]
         return shown(self.profile, parameter, raw, raws, lacking(self.profile, raws)).display
+
+
+def _when(text: str, zone: tzinfo | None) -> str:
+    """A time in a zone, to the second; what is no time as it is."""
+    try:
+        return f"{datetime.fromisoformat(text).astimezone(zone):%Y-%m-%d %H:%M:%S}"
+    except ValueError:
+        return text
+
+
+def _zone_of(text: str) -> tzinfo:
+    """The zone in which a time is told; UTC where it names none."""
+    try:
+        return datetime.fromisoformat(text).tzinfo or UTC
+    except ValueError:
+        return UTC
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:

@@ -1,4 +1,4 @@
-"""`drivepanel backup`: every readable parameter of a drive into a file."""
+"""`drivepanel backup`: the settings of a drive into a file."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from pathlib import Path
 
 import click
 
-from ..shared.errors import told
-from ..shared.options import Target, line_argument, settings_options
+from ..shared.errors import DRIVE_REFUSED, INTERRUPTED, Failure, told
+from ..shared.messages import Messages
+from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.say import say
 from ..shared.sets import (
+    complain_absent,
     file_argument,
     force_option,
     refuse_existing,
@@ -17,24 +19,57 @@ from ..shared.sets import (
     write_down,
 )
 
+STANDARD_OUTPUT = Path("-")
+
 
 @click.command()
 @line_argument
 @file_argument
 @force_option
+@click.option(
+    "--all", "everything", is_flag=True, help="Add measurements, counters and command words."
+)
+@json_option
 @settings_options
+@never_forced
 @told
-def backup(target: Target, file: Path, force: bool) -> None:
-    """Write every readable parameter of a drive to FILE, one line a parameter.
+def backup(target: Target, file: Path, force: bool, everything: bool, as_json: bool) -> None:
+    """Write the settings of a drive to FILE, one line a parameter; `-` is standard output.
 
-    The file is TOML, made for a diff. To change a value by hand, write it into `value` and take
-    `raw` out of that line.
+    The file is TOML, made for a diff: two backups of a drive that nobody set up in between differ
+    in their time only. To change a value by hand, write it into `value` and take `raw` out of that
+    line.
     """
     from tui.drive.settings.parameter_set import dump_set
 
-    refuse_existing(file, force=force)
-    session, values = set_of_drive(target)
-    write_down(file, dump_set(session.profile, values), force=force)
-    say(f"{file}: {len(values.raws)} parameters of {session.profile.name}")
-    for code, why in values.absent.items():
-        say(f"drivepanel: {code} could not be read: {why}", err=True)
+    from ..shared.output import drive_json, print_json
+
+    to_output = file == STANDARD_OUTPUT
+    if to_output and as_json:
+        raise click.UsageError("Either - or --json: both write to standard output.")
+    if not to_output:
+        refuse_existing(file, force=force)
+    try:
+        session, values = set_of_drive(target, settings_only=not everything)
+    except KeyboardInterrupt:
+        raise Failure("Ended by Ctrl-C: nothing was written.", INTERRUPTED) from None
+    text = dump_set(session.profile, values)
+    messages = Messages(as_json=as_json)
+    if to_output:
+        say(text.removesuffix("\n"))
+    else:
+        write_down(file, text, force=force)
+        what = "parameters" if everything else "settings"
+        messages.tell(f"{file}: {len(values.raws)} {what} of {session.profile.name}")
+    complain_absent(messages, values.absent)
+    if as_json:
+        found = {
+            "file": str(file),
+            "parameters": len(values.raws),
+            "all": everything,
+            "absent": dict(values.absent),
+        }
+        head = drive_json(target.line_text, session)
+        print_json({**head, **found, "messages": messages.texts})
+    if values.absent:
+        raise click.exceptions.Exit(DRIVE_REFUSED)

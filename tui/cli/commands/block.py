@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -15,6 +15,7 @@ from ..shared.options import (
     connect_drive,
     json_option,
     line_argument,
+    never_forced,
     on_line,
     read_only_option,
     settings_options,
@@ -51,6 +52,7 @@ class Wanted:
 @arm_option
 @json_option
 @read_only_option
+@never_forced
 @settings_options
 @told
 def block(
@@ -62,24 +64,24 @@ def block(
     as_json: bool,
     read_only: bool,
 ) -> None:
-    """Show, compare or change what a drive's indirect blocks or communication scanner bring.
+    """Show, compare or change the mapping of a drive's indirect blocks or communication scanner.
 
     \b
-    show              the slots, what they bring, the same read directly
+    show              the slots, the values that they bring, the same read directly
     verify            the same, compared several times; ends with 1 where a slot differs
-    set NMA3=LCR ...  what slots stand for: a code, a number, an address, or none
+    set NMA3=LCR ...  what slots are mapped to: a code, a number, an address, or none
     factory           every slot as it left the factory
     load FILE         the slots as a file has them
     save FILE         the slots of now into a file, one line each
 
-    Slots are written with the motor at rest, one after another, each read back. Another master
-    on the line may rely on today's assignment.
+    Slots are written at standstill, one after another, each read back. Another master on the line
+    may rely on the present assignment.
     """
     wanted = Wanted(action, words, dry_run, as_json)
     _check_usage(wanted)
     writes = action in WRITING and not dry_run
     if writes:
-        need_arming(arm, "this changes what the drive's blocks stand for")
+        need_arming(arm, "this changes what the drive's slots are mapped to")
 
     async def work(opened: OpenLine) -> int:
         session = await connect_drive(opened, target)
@@ -113,7 +115,7 @@ async def _carry_out(session: DriveSession, line_text: str, wanted: Wanted) -> i
         return await _write(session, line_text, wanted)
     views = await _looked_at(session, verify=wanted.action == "verify")
     if wanted.action == "save":
-        return _save(session, views, Path(wanted.words[0]))
+        return _save(session, line_text, views, wanted)
     show_blocks(session, line_text, views, as_json=wanted.as_json)
     return _status(views) if wanted.action == "verify" else DONE
 
@@ -136,7 +138,7 @@ async def _looked_at(session: DriveSession, *, verify: bool) -> list[BlockView]:
 
 
 def _status(views: list[BlockView]) -> int:
-    """0 where every slot in use that can be compared brings what it stands for."""
+    """0 where every slot in use that can be compared brings what it is mapped to."""
     from tui.session.read.verdict import SlotMatch
 
     wrong = (SlotMatch.DIFFERS, SlotMatch.CHANGED, SlotMatch.NONE)
@@ -149,15 +151,22 @@ def _status(views: list[BlockView]) -> int:
     return DONE
 
 
-def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
+def _save(session: DriveSession, line_text: str, views: list[BlockView], wanted: Wanted) -> int:
     from tui.drive.blocks.file import dump_blocks
 
+    from ..shared.output import drive_json, print_json
+
+    file = Path(wanted.words[0])
     plans = [plan for view in views if (plan := view.plan) is not None]
     if len(plans) != len(views):
         raise Failure("Not every slot could be read; nothing was saved.", DRIVE_REFUSED)
     note = f"{session.profile.name}, device {session.device}, {session.line_text}"
     write_down(file, dump_blocks(session.profile, plans, note))
-    say(f"{file}: {sum(len(plan.raws) for plan in plans)} slots of {session.profile.name}")
+    count = sum(len(plan.raws) for plan in plans)
+    if wanted.as_json:
+        print_json({**drive_json(line_text, session), "file": str(file), "slots": count})
+    else:
+        say(f"{file}: {count} slots of {session.profile.name}")
     return DONE
 
 
@@ -166,27 +175,17 @@ def _save(session: DriveSession, views: list[BlockView], file: Path) -> int:
 
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.bus.errors import DeviceException
-    from tui.drive.blocks.assignment import describe, slot_changes
-    from tui.drive.blocks.slot_rules import assignment_problems, refusing
     from tui.session.blocks.write import AssignmentRefused, write_assignment
     from tui.session.settings.write import NotTaken
 
+    from ..shared.output import drive_json, print_json
+
     held, plans = await _plans(session, wanted)
-    refused: list[str] = []
-    for plan in plans:
-        found = assignment_problems(session.profile, plan)
-        refused += [problem.text for problem in refusing(found)]
-        for problem in found:
-            if not problem.refuses:
-                say(problem.text, err=wanted.as_json)
-        if not wanted.dry_run:
-            continue
-        for change in slot_changes(held, plan):
-            was, will = (describe(session.profile, plan.block, r) for r in (change.old, change.new))
-            say(f"write  {change.slot}: {was} -> {will}")
-    if refused:
-        raise Failure(" ".join(refused), REFUSED_HERE)
+    changes = _judged(session, held, plans, wanted)
     if wanted.dry_run:
+        if wanted.as_json:
+            head = drive_json(line_text, session)
+            print_json({**head, "dry_run": True, "changes": changes})
         return DONE
     journal = told_journal()
     try:
@@ -207,6 +206,31 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     return DONE
 
 
+def _judged(
+    session: DriveSession, held: dict[str, int], plans: list[Assignment], wanted: Wanted
+) -> list[dict[str, Any]]:
+    """What changes, told in a dry run; raises Failure where something of it is refused."""
+    from tui.drive.blocks.assignment import describe, slot_changes
+    from tui.drive.blocks.slot_rules import assignment_problems, refusing
+
+    refused: list[str] = []
+    changes: list[dict[str, Any]] = []
+    for plan in plans:
+        found = assignment_problems(session.profile, plan)
+        refused += [problem.text for problem in refusing(found)]
+        for problem in found:
+            if not problem.refuses:
+                say(problem.text, err=wanted.as_json)
+        for change in slot_changes(held, plan):
+            was, will = (describe(session.profile, plan.block, r) for r in (change.old, change.new))
+            changes.append({"slot": change.slot, "old": was, "new": will})
+            if wanted.dry_run and not wanted.as_json:
+                say(f"write  {change.slot}: {was} -> {will}")
+    if refused:
+        raise Failure(" ".join(refused), REFUSED_HERE)
+    return changes
+
+
 async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int], list[Assignment]]:
     """What the slots hold, and the assignments that are wanted in their place."""
     from tui.drive.blocks.assignment import MappingError, assignment, factory, place_of
@@ -215,6 +239,7 @@ async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int],
 
     profile = session.profile
     named = [_pair(text) for text in wanted.words] if wanted.action == "set" else []
+    _check_once([slot for slot, _ in named])
     # told before anything is asked: a slot that is not there
     places = [(*place_of(profile, slot), code) for slot, code in named]
     loaded = _loaded(session, wanted)
@@ -256,6 +281,12 @@ def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
         raise Failure(f"{file}: byte {error.start} is not UTF-8 text.", USAGE) from error
     except MappingError as error:
         raise Failure(str(error), USAGE) from error
+
+
+def _check_once(slots: list[str]) -> None:
+    folded = [slot.casefold() for slot in slots]
+    if twice := ", ".join(slot for slot in slots if folded.count(slot.casefold()) > 1):
+        raise click.UsageError(f"{twice}: given more than once. Which code is meant?")
 
 
 def _pair(text: str) -> tuple[str, str]:

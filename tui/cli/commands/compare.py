@@ -4,54 +4,68 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.completion import complete_profile, complete_side
+from ..shared.devices import devices_option
 from ..shared.errors import DIFFERENT, USAGE, Failure, told
-from ..shared.options import Target, devices_option
+from ..shared.options import Target, json_option, never_forced
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
 
 if TYPE_CHECKING:
-    from tui.drive.settings.compare import TableFormat
+    from tui.drive.settings.compare import ComparedRow, TableFormat
     from tui.drive.settings.parameter_set import ParameterSet
 
 FACTORY = "factory"
 
 
 @click.command()
-@click.argument("a")
-@click.argument("b")
-@click.option("--all", "all_rows", is_flag=True, help="Show equal and measured ones too.")
+@click.argument("a", shell_complete=complete_side)
+@click.argument("b", shell_complete=complete_side)
+@click.option("--all", "all_rows", is_flag=True, help="Show equal settings and measurements too.")
 @click.option(
     "--format",
     "format_",
     type=click.Choice(["text", "markdown", "csv"]),
     default="text",
     show_default=True,
-    help="Form of the table.",
+    help="Format of the table.",
 )
-@click.option("-p", "--profile", "profile_id", metavar="ID", help="Profile of the drives.")
+@json_option
+@click.option(
+    "-p",
+    "--profile",
+    "profile_id",
+    metavar="ID",
+    shell_complete=complete_profile,
+    help="Profile of the drives.",
+)
 @devices_option("Slave address of the drive; twice where A and B are two drives.")
+@never_forced
 @told
 def compare(
     a: str,
     b: str,
     all_rows: bool,
     format_: TableFormat,
+    as_json: bool,
     profile_id: str | None,
     devices: tuple[int, ...],
 ) -> None:
     """Compare the settings of A and B: each a FILE, a LINE, or `factory`.
 
-    Measurements, counters and orders are no settings. Ends with 0 where all are equal and with 1
-    where some differ.
+    Measurements, counters and command words are no settings; address, baud and format of a drive
+    are not compared with the factory. Ends with 0 where all are equal and with 1 where some differ.
     """
     from tui.drive.profile import library
     from tui.drive.settings.compare import compare_settings as rows_of
     from tui.drive.settings.compare import factory_side, side_of
     from tui.drive.settings.compare import rows_text as table
+
+    from ..shared.output import print_json
 
     if len(devices) > 2:
         raise click.UsageError("-d is given once, or once for A and once for B.")
@@ -70,15 +84,35 @@ def compare(
             USAGE,
         )
     profile = library.load(ids.pop())
+    names = (f"{a} -d {places[0]}", f"{b} -d {places[-1]}") if a == b else (a, b)
     drive = next(found for found in sets if found is not None)
     sides = [
         factory_side(profile, drive) if found is None else side_of(text, found)
-        for text, found in zip((a, b), sets, strict=True)
+        for text, found in zip(names, sets, strict=True)
     ]
     rows = rows_of(profile, *sides, all_rows=all_rows)
-    say(table(rows, (a, b), format_).removesuffix("\n"))
+    if as_json:
+        equal = not any(row.differs for row in rows)
+        told = {"a": names[0], "b": names[1], "profile": profile.id, "equal": equal}
+        print_json({**told, "rows": [_row_json(row) for row in rows]})
+    else:
+        say(table(rows, names, format_).removesuffix("\n"), indent=3)
     if any(row.differs for row in rows):
         raise click.exceptions.Exit(DIFFERENT)
+
+
+def _row_json(row: ComparedRow) -> dict[str, Any]:
+    return {
+        "code": row.code,
+        "name": row.name,
+        "group": row.group,
+        "a": row.a,
+        "b": row.b,
+        "raw_a": row.a_raw,
+        "raw_b": row.b_raw,
+        "differs": row.differs,
+        "remark": row.note or None,
+    }
 
 
 def _set_of(text: str, target: Target) -> ParameterSet:

@@ -1,26 +1,22 @@
-"""`drivepanel reference` and `reset`, and what every command that gives orders needs."""
+"""What every command that commands a drive needs: arming, watching, what became of it."""
 
 from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import AsyncIterator, Callable, Coroutine
+from collections.abc import AsyncIterator, Callable
 from contextlib import asynccontextmanager, suppress
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from tui.drive.orders import OrderRefused, chart_in_force, follows_from
+from tui.drive.orders import OrderRefused
 from tui.session.work import Outcome, OutcomeKind
 
-from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, status_of, told
+from ..shared.errors import LINE_TROUBLE, REFUSED_HERE, Failure, status_of
 from ..shared.options import (
     Target,
     connect_drive,
-    drive_options,
-    line_argument,
-    on_line,
-    read_only_option,
 )
 from ..shared.say import say
 
@@ -32,23 +28,21 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.monitor.timeout import TimeoutWatch
     from tui.session.starts.keeper import StartKeeper
+    from tui.session.timeout_told import TimeoutWatch
     from tui.session.work import Permit
 
 COMMAND_POLL_INTERVAL = 0.02
 """Seconds between two looks at what the line's thread has come to."""
 PERIOD = 0.25
-"""Wished time of a cycle of the monitor in seconds."""
+"""Target cycle time of the monitor in seconds."""
 FIRST_TRIES = 3
 """Cycles that may fail before the drive counts as silent."""
 LEARNT_WITHIN = 3.0
-"""Seconds in which a drive's watch over the line is read."""
-FAULT_GONE_WITHIN = 3.0
-"""Seconds that a drive may take to leave its fault after a reset."""
+"""Seconds in which a drive's communication time-out is read."""
 
 arm_option = click.option(
-    "--arm", is_flag=True, help="Let this command write to the drive; without it nothing is."
+    "--arm", is_flag=True, help="Arm the drive for this command; without it nothing is written."
 )
 
 
@@ -116,9 +110,10 @@ async def watched(
 async def _first_look(console: DriveConsole) -> None:
     while True:
         latest = console.latest
-        if latest is not None and not latest.error:
-            return
-        if latest is not None and latest.cycle >= FIRST_TRIES:
+        tried = latest is not None and latest.cycle >= FIRST_TRIES
+        if latest is not None and not latest.error and (latest.state.kind != "unknown" or tried):
+            return  # what decides about its chart may come a cycle later
+        if latest is not None and tried:
             raise Failure(latest.error, LINE_TROUBLE)
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
 
@@ -152,7 +147,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
     await _until(lambda: work.outcome is not before or not work.busy_for(commander))
     outcome = work.outcome if work.outcome is not before else None
     if outcome is None:
-        raise Failure("The order was not sent: a newer one took its place.", REFUSED_HERE)
+        raise Failure("The command was not sent: a newer one took its place.", REFUSED_HERE)
     if outcome.kind is OutcomeKind.REFUSED:
         raise Failure(outcome.text + _way_on(outcome.error), _status(outcome.error))
     return outcome
@@ -206,89 +201,3 @@ async def watch_of(fleet: Fleet, console: DriveConsole) -> TimeoutWatch | None:
             raise Failure(f"{rules.timeout} is set and could not be learnt.", LINE_TROUBLE)
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
     return watch
-
-
-def _ordered(
-    target: Target, read_only: bool, work: Callable[[DriveConsole], Coroutine[Any, Any, str]]
-) -> None:
-    """Do the work at the armed drive and print what it came to."""
-
-    async def at_console(opened: OpenLine) -> str:
-        async with watched(opened, target) as (_, console):
-            arm_drive(console)
-            return await work(console)
-
-    say(on_line(target, at_console, read_only=read_only))
-
-
-@click.command()
-@line_argument
-@click.argument("text", metavar="REFERENCE")
-@drive_options
-@arm_option
-@read_only_option
-@told
-def reference(
-    target: Target,
-    text: str,
-    arm: bool,
-    read_only: bool,
-) -> None:
-    """Give a drive its reference: 30, 30.5Hz, 900rpm. Starts no motor."""
-    need_arming(arm, "reference writes the drive's reference; a running motor follows it")
-
-    async def work(console: DriveConsole) -> str:
-        commander = console.commander
-        return (await carried_out(commander, lambda: commander.refer(text))).text
-
-    _ordered(target, read_only, work)
-
-
-@click.command()
-@line_argument
-@drive_options
-@arm_option
-@read_only_option
-@told
-def reset(
-    target: Target,
-    arm: bool,
-    read_only: bool,
-) -> None:
-    """Reset a drive's fault. Its cause must be gone.
-
-    It commands no run; a run command that waits at the terminals may start the motor.
-    """
-    need_arming(arm, "reset writes the drive's command word and ends its fault")
-
-    async def work(console: DriveConsole) -> str:
-        session = console.session
-        chart = chart_in_force(session.profile, session.image.raws)
-        if chart is not None and (besides := follows_from(chart, "reset")):
-            say(besides)
-        outcome = await carried_out(console.commander, lambda: console.commander.order("reset"))
-        await _out_of_fault(console, outcome)
-        name, _, came = outcome.text.partition(":")
-        now = came.partition(";")[2]
-        return f"{name}: {latest_of(console).state.headline}{';' * bool(now)}{now}"
-
-    _ordered(target, read_only, work)
-
-
-async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
-    """Wait until the drive shows no fault any more; raises Failure where it stays in it."""
-    end = outcome.time + FAULT_GONE_WITHIN
-    while True:
-        latest = latest_of(console)
-        fresh = latest.time > outcome.time and not latest.error
-        if fresh and latest.state.kind not in ("fault", "unknown", "starting"):
-            return
-        if latest.time > end:
-            break
-        await asyncio.sleep(COMMAND_POLL_INTERVAL)
-    if latest.error:
-        raise Failure(latest.error, LINE_TROUBLE)
-    raise Failure(
-        f"The drive stays in {latest.state.headline}: its cause is not gone. Look at the machine.",
-        DRIVE_REFUSED,
-    )

@@ -9,8 +9,11 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.completion import complete_line
+from ..shared.devices import SLAVE_ADDRESS, one_device
 from ..shared.errors import USAGE, Failure, told
-from ..shared.options import SLAVE_ADDRESS, read_only_option
+from ..shared.lines import is_line
+from ..shared.options import read_only_option
 from ..shared.signals import ending_by_signal
 
 if TYPE_CHECKING:
@@ -102,23 +105,23 @@ on_hangup_option = click.option(
     type=click.Choice([STOP, LEAVE_RUNNING]),
     default=STOP,
     show_default=True,
-    help="What becomes of motors commanded from here when the terminal goes away.",
+    help="What happens to motors started from here when the terminal is lost.",
 )
 low_bandwidth_option = click.option(
-    "--low-bandwidth", is_flag=True, help="Send as little as possible to a slow terminal."
+    "--low-bandwidth", is_flag=True, help="Send as little as possible, for a slow link."
 )
 mouse_option = click.option(
-    "--mouse", is_flag=True, help="Let the terminal report its mouse; the panel needs none."
+    "--mouse", is_flag=True, help="Let the terminal report the mouse; the keys do all without."
 )
 
 
 bell_option = click.option(
-    "--bell/--no-bell", default=True, show_default=True, help="Ring once for a new fault."
+    "--bell/--no-bell", default=True, show_default=True, help="Ring the bell once for a new fault."
 )
 ascii_option = click.option(
     "--ascii/--no-ascii",
     default=None,
-    help="Draw with plain signs only; what the locale says otherwise.",
+    help="Draw with ASCII characters only; unless given, as the locale says.",
 )
 
 
@@ -143,13 +146,15 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
 
 
 @click.command(hidden=True)
-@click.argument("line_text", required=False, metavar="[LINE]")
+@click.argument("line_text", required=False, metavar="[LINE]", shell_complete=complete_line)
 @click.option(
     "-d",
     "--device",
     type=SLAVE_ADDRESS,
+    multiple=True,
+    callback=one_device,
     metavar="ADDRESS",
-    help="Watch the drive at this slave address at once; without it, look for drives.",
+    help="Slave address of the drive to open; without it the line is searched.",
 )
 @read_only_option
 @low_bandwidth_option
@@ -171,6 +176,10 @@ def panel(
     """Open the panel."""
     if device is not None and line_text is None:
         raise click.UsageError("A device is on a line: write LINE -d ADDRESS.")
+    if line_text is not None and not is_line(line_text):
+        from ..main import no_such_command
+
+        raise click.UsageError(no_such_command(line_text))
     run_panel(
         line_text,
         device,

@@ -28,4 +28,4 @@ def ports(as_json: bool) -> None:
         say("No serial port found. Plug in the adapter, or use tcp:HOST or rtu-tcp:HOST:PORT.")
     for port, by in found:
         used = f"  in use by {by}" if by else ""
-        say(f"{port.path:<20} {port.description}{used}")
+        say(f"{port.path:<20} {port.description}{used}", indent=21)

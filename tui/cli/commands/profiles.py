@@ -9,6 +9,7 @@ import click
 
 from tui.drive.plain import plain
 
+from ..shared.completion import complete_profile
 from ..shared.errors import told
 from ..shared.options import json_option
 from ..shared.say import say
@@ -19,22 +20,27 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("profile_id", required=False, metavar="[ID|new NEW-ID|path]")
+@click.argument(
+    "profile_id",
+    required=False,
+    metavar="[ID|new NEW-ID|path]",
+    shell_complete=complete_profile,
+)
 @click.argument("more", nargs=-1, metavar="")
 @click.option(
     "--check",
     "file",
     type=click.Path(path_type=Path),
     metavar="FILE...",
-    help="Check profile files of your own: all faults, each with its line.",
+    help="Check profile files: every fault is told with its line.",
 )
-@click.option("--from", "origin", metavar="ID", help="With new: the profile that it begins as.")
+@click.option("--from", "origin", metavar="ID", help="With new: the profile to copy.")
 @click.option("--schema", is_flag=True, help="Print the JSON schema: every field, described.")
 @click.option(
     "--wiring",
     is_flag=True,
-    help="Of the profile: warnings, waiting time, pins, rules of the line, addresses, lamps,"
-    " command words, and where the manuals are wrong.",
+    help="Of the profile: safety warnings, discharge time, terminals, line rules, addresses,"
+    " LEDs, command words, and errata of the manuals.",
 )
 @json_option
 @told
@@ -47,9 +53,9 @@ def profiles(
     wiring: bool,
     as_json: bool,
 ) -> None:
-    """List the profiles, show one, check files, or begin one of your own.
+    """List the profiles, show one, check files, or create one of your own.
 
-    `path` tells the folder for profiles of your own, `new NEW-ID --from ID` begins one there.
+    `path` tells the folder for your own profiles, `new NEW-ID --from ID` creates one there.
     """
     if wiring and (profile_id in (None, "new", "path")):
         raise click.UsageError("--wiring is of one profile: name its ID.")
@@ -63,11 +69,11 @@ def profiles(
 
         say(schema_text().rstrip())
     elif words[:1] == ("new",):
-        _begin(words[1:], origin)
+        _begin(words[1:], origin, as_json)
     elif more or origin is not None:
-        raise click.UsageError("Say one ID, or: profiles new NEW-ID --from ID.")
+        raise click.UsageError("Name one ID, or: profiles new NEW-ID --from ID.")
     elif profile_id == "path":
-        say(str(library.user_folder()))
+        _tell_folder(as_json)
     elif profile_id is not None and wiring:
         _show_wiring(library.load(profile_id), as_json)
     elif profile_id is not None:
@@ -101,14 +107,28 @@ def check_files(files: list[Path], as_json: bool) -> None:
         raise Failure("\n".join((f"{told_count} found:", *faults)), USAGE)
 
 
-def _begin(words: tuple[str, ...], origin: str | None) -> None:
+def _tell_folder(as_json: bool) -> None:
+    from tui.drive.profile import library
+
+    from ..shared.output import print_json
+
+    folder = str(library.user_folder())
+    if as_json:
+        print_json({"folder": folder})
+    else:
+        say(folder)
+
+
+def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     """Write the file of a new profile, a copy of another; never over a file."""
     from tui.drive.profile import library
     from tui.drive.profile.new_file import new_profile_text
     from tui.drive.small_file import read_small_text
 
+    from ..shared.output import print_json
+
     if len(words) != 1 or origin is None:
-        raise click.UsageError("Say what it is to be, and what it begins as: new NEW-ID --from ID.")
+        raise click.UsageError("Name the new id and the profile to copy: new NEW-ID --from ID.")
     known = {listing.id: listing for listing in library.listings()}
     library.load(origin)  # a broken one is told, and is no start
     new_id = words[0].strip()
@@ -124,8 +144,11 @@ def _begin(words: tuple[str, ...], origin: str | None) -> None:
             file.write(text)
     except FileExistsError:
         raise click.UsageError(f"{path} is there already; nothing was written.") from None
+    if as_json:
+        print_json({"id": new_id, "from": source.id, "file": str(path)})
+        return
     say(f"{path}")
-    say(f"It begins as {source.id}. Change it, then: drivepanel profiles --check {path}")
+    say(f"It is a copy of {source.id}. Change it, then: drivepanel profiles --check {path}")
 
 
 def _list(as_json: bool) -> None:
@@ -144,12 +167,13 @@ def _list(as_json: bool) -> None:
             ]
         )
         return
-    for listing in found:
+    rows = [(one.id, one.vendor, one.name) for one in found]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for listing, row in zip(found, rows, strict=True):
         remark = _remark(listing)
-        say(
-            f"{listing.id:<12} {listing.vendor:<20} {listing.name:<22}"
-            f" {listing.parameters:>4} parameters{f'  ({remark})' if remark else ''}"
-        )
+        cells = "  ".join(text.ljust(width) for text, width in zip(row, widths, strict=True))
+        more = f"  ({remark})" if remark else ""
+        say(f"{cells}  {listing.parameters:>4} parameters{more}", indent=widths[0] + 2)
 
 
 def _remark(listing: Listing) -> str:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import DRIVE_REFUSED, told
+from ..shared.completion import complete_code
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, DRIVE_REFUSED, told
 from ..shared.options import (
     Target,
     connect_drive,
-    drive_options,
+    drives_options,
+    force_profile_option,
+    hold_option,
     json_option,
     line_argument,
     on_line,
@@ -21,19 +25,21 @@ from ..shared.say import say
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
-    from tui.session.reading import Reading
 
 
 @click.command()
 @line_argument
-@click.argument("codes", nargs=-1, required=True, metavar="CODE...")
-@drive_options
+@click.argument("codes", nargs=-1, required=True, metavar="CODE...", shell_complete=complete_code)
+@drives_options
+@force_profile_option
+@hold_option
 @read_only_option
 @json_option
 @told
 def read(
     target: Target,
     codes: tuple[str, ...],
+    hold: float | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
@@ -44,20 +50,28 @@ def read(
     """
     from tui.session.read.reader import Reader
 
-    from ..shared.output import print_json, print_readings, readings_json
+    from ..running.holding import hold_on
+    from ..shared.output import print_readings, readings_json
 
-    async def work(opened: OpenLine) -> tuple[DriveSession, dict[str, Reading]]:
-        session = await connect_drive(opened, target)
+    sessions: list[DriveSession] = []
+
+    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+        session = await connect_drive(opened, drive)
+        sessions.append(session)
         wanted = [session.profile.find(code).code for code in codes]
-        return session, await Reader(session).read(wanted)
+        readings = await Reader(session).read(wanted)
+        if not as_json:
+            print_readings(readings)
+        refused = [reading for reading in readings.values() if reading.raw is None]
+        for reading in refused:
+            say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
+        told = readings_json(target.line_text, session, readings)
+        return told, DRIVE_REFUSED if refused else DONE
 
-    session, readings = on_line(target, work, read_only=read_only)
-    if as_json:
-        print_json(readings_json(target.line_text, session, readings))
-    else:
-        print_readings(readings)
-    refused = [reading for reading in readings.values() if reading.raw is None]
-    for reading in refused:
-        say(f"drivepanel: {reading.parameter.code}: {reading.error}", err=True)
-    if refused:
-        raise click.exceptions.Exit(DRIVE_REFUSED)
+    async def work(opened: OpenLine) -> int:
+        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        await hold_on(opened, sessions, hold)
+        return status
+
+    if status := on_line(target, work, read_only=read_only):
+        raise click.exceptions.Exit(status)

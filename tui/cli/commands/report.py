@@ -6,9 +6,9 @@ from pathlib import Path
 
 import click
 
-from ..shared.errors import told
-from ..shared.options import Target, line_argument, settings_options
-from ..shared.say import say
+from ..shared.errors import INTERRUPTED, Failure, told
+from ..shared.messages import Messages
+from ..shared.options import Target, json_option, line_argument, never_forced, settings_options
 from ..shared.sets import (
     file_argument,
     force_option,
@@ -22,20 +22,32 @@ from ..shared.sets import (
 @line_argument
 @file_argument
 @force_option
+@json_option
 @settings_options
+@never_forced
 @told
-def report(target: Target, file: Path, force: bool) -> None:
+def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     """Write a report on a drive to FILE, as Markdown.
 
-    What it is, its line settings, settings changed from the factory, who commands it, scanner,
-    what it does on a silent line, its faults, and what was written to it from here.
+    Identification, line settings, settings changed from the factory, control source, scanner,
+    reaction to a loss of communication, faults, and what was written to it from here.
     """
     from tui.session.journal import Journal
     from tui.session.journal_reading import entries_of
     from tui.session.report import report_text as text_of
 
+    from ..shared.output import drive_json, print_json
+
     refuse_existing(file, force=force)
-    session, values = set_of_drive(target)
+    try:
+        session, values = set_of_drive(target)
+    except KeyboardInterrupt:
+        raise Failure("Ended by Ctrl-C: nothing was written.", INTERRUPTED) from None
     entries = entries_of(Journal(), session.line_text, target.device)
     write_down(file, text_of(session.profile, values, entries), force=force)
-    say(f"{file}: report on {session.profile.name} at address {target.device}")
+    messages = Messages(as_json=as_json)
+    messages.tell(f"{file}: report on {session.profile.name} at address {target.device}")
+    if as_json:
+        found = {"file": str(file), "parameters": len(values.raws), "absent": dict(values.absent)}
+        head = drive_json(target.line_text, session)
+        print_json({**head, **found, "messages": messages.texts})

@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import DONE, DRIVE_REFUSED, status_of, told
+from ..shared.devices import devices_option
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, DRIVE_REFUSED, told
+from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     connect_drive,
-    devices_option,
+    json_option,
     line_argument,
+    never_forced,
     on_line,
     profile_option,
     read_only_option,
 )
-from ..shared.say import say
 from ..shared.sets import (
+    ResultTelling,
     codes_of,
     confirm_option,
     counter,
     dry_run_option,
     file_argument,
+    results_json,
+    round_option,
     save_option,
     say_afterwards,
-    say_result,
     set_in,
     status_of_results,
 )
@@ -35,10 +39,12 @@ from .orders import arm_option, close_journal, need_arming, permit_of, told_jour
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
-    from tui.drive.settings.restore_plan import Options, RestorePlan
+    from tui.drive.settings.restore_plan import Options, RestoreItem, RestorePlan
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
+ALIKE = 3
+"""More than so many that are left out for one reason are told without their values."""
 CODES_NAMED = 12
 """How many codes are named for one reason; --dry-run names all."""
 
@@ -48,11 +54,14 @@ CODES_NAMED = 12
 @file_argument
 @dry_run_option
 @arm_option
-@click.option("--line-settings", is_flag=True, help="Write address, baud and format too.")
+@click.option("--line-settings", is_flag=True, help="Write address, baud rate and format too.")
 @click.option("--rating", is_flag=True, help="Write rating and motor data to another model too.")
 @confirm_option
+@round_option
 @save_option
 @read_only_option
+@json_option
+@never_forced
 @profile_option
 @devices_option(
     "Slave address of the drive; several times for several drives.",
@@ -68,76 +77,90 @@ def restore(
     line_settings: bool,
     rating: bool,
     confirmed: tuple[str, ...],
+    rounded: bool,
     save: bool,
     read_only: bool,
+    as_json: bool,
     profile_id: str | None,
     devices: tuple[int, ...],
 ) -> None:
-    """Bring a parameter set back into a drive: what differs is written and read back.
+    """Write a parameter set back to a drive: what differs is written and read back.
 
     With several -d the set goes to each of these drives in turn; one that cannot take it does
     not keep it from the others.
 
-    --dry-run tells what would be written, what is left out, and why. An interrupted restoring
-    is resumed by the same command: the drive is read, and what is missing is written.
+    --dry-run tells what would be written, what is left out, and why. An interrupted restore is
+    resumed by the same command: the drive is read, and what is missing is written.
     """
-    if dry_run is arm:
-        if not dry_run:
-            need_arming(False, "restoring writes settings of the drive")
-        raise click.UsageError("Give either --dry-run or --arm.")
+    from tui.drive.settings.restore_plan import Options
+
+    from ..shared.output import drive_json
+
+    _either(dry_run=dry_run, arm=arm)
     values = set_in(file)
+    telling = ResultTelling(Messages(as_json=as_json))
 
-    async def one(opened: OpenLine, device: int) -> int:
-        from tui.drive.settings.restore_plan import Options
-
-        session = await connect_drive(opened, Target(line_text, device, profile_id))
-        codes = codes_of(session, confirmed)
-        options = Options(line_settings, rating, codes)
+    async def one(opened: OpenLine, target: Target) -> tuple[dict[str, Any], int]:
+        nonlocal telling
+        telling = ResultTelling(Messages(as_json=as_json))
+        session = await connect_drive(opened, target)
+        options = Options(line_settings, rating, codes_of(session, confirmed), rounded)
         if dry_run:
-            return await _tell(session, values, options)
-        return await _restore(session, values, options, save=save)
+            found, status = await _tell(session, values, options, telling.messages)
+        else:
+            found, status = await _restore(session, values, options, telling, save=save)
+        head = {**drive_json(line_text, session), "dry_run": dry_run}
+        return {**head, **found, "messages": telling.messages.texts}, status
 
-    async def work(opened: OpenLine) -> int:
-        if len(devices) == 1:
-            return await one(opened, devices[0])
-        return max([await _in_turn(opened, device, one) for device in devices])
-
-    status = on_line(
-        Target(line_text, devices[0], profile_id), work, read_only=read_only or dry_run
-    )
+    where = Target(line_text, devices[0], profile_id, others=devices[1:])
+    try:
+        status = on_line(
+            where,
+            lambda opened: each_drive(where, lambda drive: one(opened, drive), as_json=as_json),
+            read_only=read_only or dry_run,
+        )
+    except KeyboardInterrupt:
+        if dry_run:
+            raise
+        raise telling.interrupted() from None
     if status != DONE:
         raise click.exceptions.Exit(status)
 
 
-async def _in_turn(
-    opened: OpenLine, device: int, one: Callable[[OpenLine, int], Awaitable[int]]
-) -> int:
-    """One of several drives; what is wrong with it is told, and the next one is tried."""
-    say(f"Device {device}:")
-    try:
-        return await one(opened, device)
-    except click.ClickException as error:
-        status, text = error.exit_code, error.format_message()
-    except Exception as error:
-        known = status_of(error)
-        if known is None:
-            raise
-        status, text = known, str(error)
-    say(f"drivepanel: device {device}: {text}", err=True)
-    return status
+def _either(*, dry_run: bool, arm: bool) -> None:
+    if not dry_run:
+        need_arming(arm, "restore writes settings of the drive")
+    elif arm:
+        raise click.UsageError("Give either --dry-run or --arm.")
 
 
-async def _tell(session: DriveSession, values: ParameterSet, options: Options) -> int:
+async def _tell(
+    session: DriveSession, values: ParameterSet, options: Options, messages: Messages
+) -> tuple[dict[str, Any], int]:
     from tui.drive.profile import library
     from tui.session.settings.restore import plan_for
 
     source = library.load(values.head.profile)
     plan = await plan_for(session, values, source, options, counter("Read"))
-    say_plan(session, plan)
-    return DONE
+    say_plan(session, plan, messages)
+    return {**_plan_json(plan), "results": [], "saved": False, "left": []}, DONE
 
 
-def say_plan(session: DriveSession, plan: RestorePlan) -> None:
+def _plan_json(plan: RestorePlan) -> dict[str, Any]:
+    keys = ("code", "kind", "reason", "text", "old", "new")
+    return {
+        "plan": [
+            {key: getattr(item, key) or None for key in keys}
+            for item in plan.items
+            if item.reason != "no setting"
+        ],
+        "same_rating": plan.same_rating,
+        "needs_stop": plan.needs_stop,
+        "across": plan.across,
+    }
+
+
+def say_plan(session: DriveSession, plan: RestorePlan, messages: Messages) -> None:
     """The plan: what is written in its order, and what is left out with its reason."""
     from tui.drive.settings.write_sequence import ordered
 
@@ -145,62 +168,87 @@ def say_plan(session: DriveSession, plan: RestorePlan) -> None:
     held = {edit.code: edit.old for edit in plan.edits if edit.old is not None}
     for edit in ordered(session.profile, plan.edits, held):
         item = items[edit.code]
-        say(f"write  {item.code}: {item.old} -> {item.new}  {item.text}".rstrip())
+        text = f"write  {item.code}: {item.old} -> {item.new}  {item.text}"
+        messages.tell(text.rstrip(), indent=7)
+    left: dict[str, list[RestoreItem]] = {}
     for item in plan.of_kind("skip"):
         if item.reason != "no setting":
-            value = f" {item.new}" if item.new else ""
-            say(f"leave  {item.code}{value}: {item.text}")
+            left.setdefault(item.text, []).append(item)
+    for text, same in left.items():
+        values = [f"{item.code} {item.new}".rstrip() for item in same]
+        if len(same) > ALIKE:
+            values = [f"{len(same)}", ", ".join(item.code for item in same)]
+        messages.tell(
+            f"leave  {' '.join(values) if len(same) > ALIKE else ', '.join(values)}: {text}"
+        )
     if plan.same_rating is False and not plan.across:
-        say("The set is of another model or rating than this drive.")
+        messages.tell("The set is of another model or rating than this drive.")
     if plan.across:
-        say("The set is of another family: common quantities are carried over in their units.")
+        messages.tell(
+            "The set is of another family: common quantities are carried over in their units."
+        )
     stop = " Some of it needs the motor stopped." if plan.needs_stop else ""
-    say(
+    messages.tell(
         f"{plan.count('write')} to write, {plan.count('equal')} equal already,"
         f" {plan.count('skip')} left out.{stop}"
     )
 
 
 async def _restore(
-    session: DriveSession, values: ParameterSet, options: Options, *, save: bool
-) -> int:
+    session: DriveSession,
+    values: ParameterSet,
+    options: Options,
+    telling: ResultTelling,
+    *,
+    save: bool,
+) -> tuple[dict[str, Any], int]:
     from tui.drive.profile import library
     from tui.session.settings.eeprom import save_to_eeprom
     from tui.session.settings.restore import Mark
     from tui.session.settings.restore import restore_set as bring_back
 
-    source = library.load(values.head.profile)
+    source, messages = library.load(values.head.profile), telling.messages
     if told_before := Mark.of(session).interrupted:
-        say(told_before)
+        messages.tell(told_before)
     journal, permit = told_journal(), permit_of(session)
     try:
         done = await bring_back(
             session, journal, values, source, options, permit=permit,
-            progress=say_result, reading=counter("Read"),
+            progress=telling, reading=counter("Read"),
         )  # fmt: skip
-        say_plan_left_out(done.plan)
+        say_plan_left_out(done.plan, messages)
         for link in done.links:
-            say(link.text)
+            messages.tell(link.text)
         saved = save and done.complete
         if saved:
-            say(await save_to_eeprom(session, journal, permit))
-        say_afterwards(done.after_reset, done.unsaved, saved=saved)
+            messages.tell(await save_to_eeprom(session, journal, permit))
+        say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
-        say(f"{written} written and read back, {len(done.left)} not.")
-        if done.complete:
-            return DONE
-        say("drivepanel: The same command writes what is missing.", err=True)
-        return status_of_results(done.results) or DRIVE_REFUSED
+        messages.tell(f"{written} written and read back, {len(done.left)} not.")
+        if not done.complete:
+            messages.complain("The same command writes what is missing.")
     finally:
         close_journal(journal)
+    found = {
+        **_plan_json(done.plan),
+        "results": results_json(done.results),
+        "saved": saved,
+        "left": [edit.code for edit in done.left],
+    }
+    return found, DONE if done.complete else status_of_results(done.results) or DRIVE_REFUSED
 
 
-def say_plan_left_out(plan: RestorePlan) -> None:
-    """What was left out, by reason."""
+def say_plan_left_out(plan: RestorePlan, messages: Messages) -> None:
+    """What was left out, by reason; roundings each, as somebody wrote these values by hand."""
     reasons: dict[str, list[str]] = {}
     for item in plan.of_kind("skip"):
-        if item.reason != "no setting":
+        if item.reason == "rounding":
+            messages.tell(f"left out: {item.text.rstrip('.')}. --round writes that all the same.")
+        elif item.reason != "no setting":
             reasons.setdefault(item.reason, []).append(item.code)
+    for item in plan.of_kind("write"):
+        if item.text:
+            messages.tell(item.text)
     for reason, codes in reasons.items():
         more = f" and {len(codes) - CODES_NAMED} more" if len(codes) > CODES_NAMED else ""
-        say(f"left out, {reason}: {', '.join(codes[:CODES_NAMED])}{more}")
+        messages.tell(f"left out, {reason}: {', '.join(codes[:CODES_NAMED])}{more}")

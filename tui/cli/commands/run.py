@@ -11,6 +11,7 @@ from ..shared.options import (
     drive_options,
     json_option,
     line_argument,
+    never_forced,
     on_line,
     read_only_option,
 )
@@ -21,7 +22,7 @@ from .orders import arm_option, need_arming
 @line_argument
 @drive_options
 @click.option("--reverse", is_flag=True, help="Run reverse.")
-@click.option("--reference", metavar="REFERENCE", help="Give this reference first: 30Hz, 900rpm.")
+@click.option("--reference", metavar="REFERENCE", help="Set this reference first: 30Hz, 900rpm.")
 @click.option(
     "--for",
     "seconds",
@@ -31,20 +32,21 @@ from .orders import arm_option, need_arming
 )
 @arm_option
 @click.option(
-    "--leave-running", is_flag=True, help="Do not stop the motor at the end of this command."
+    "--leave-running", is_flag=True, help="Leave the motor running at the end of this command."
 )
 @click.option(
     "--unrecorded",
     is_flag=True,
-    help="Run even where the start cannot be put on record in the state folder.",
+    help="Run even if the start cannot be recorded in the state folder.",
 )
 @click.option(
     "--take-control",
     is_flag=True,
-    help="Take the control from the drive's terminals first; their stop counts no more then.",
+    help="Take the control from the drive's terminals first; their stop has no effect then.",
 )
 @read_only_option
 @json_option
+@never_forced
 @told
 def run(
     target: Target,

@@ -10,7 +10,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..shared.completion import complete_profile
 from ..shared.errors import told
+from ..shared.options import json_option
+from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.standard_input import stay_in_background, typed_lines
 
@@ -23,46 +26,52 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
 
 
 @click.command()
-@click.argument("drives", nargs=-1, required=True, metavar="PROFILE[@ADDRESS]...")
-@click.option("--pty", "pty", metavar="PATH", help="A pseudo-terminal, with a link at PATH.")
-@click.option("--serial", "serial", metavar="PATH", help="A serial port.")
-@click.option("--tcp", metavar="HOST:PORT", help="Modbus TCP.")
-@click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="RTU over TCP.")
+@click.argument(
+    "drives",
+    nargs=-1,
+    required=True,
+    metavar="PROFILE[@ADDRESS]...",
+    shell_complete=complete_profile,
+)
+@click.option("--pty", "pty", metavar="PATH", help="Serve a pseudo-terminal, linked at PATH.")
+@click.option("--serial", "serial", metavar="PATH", help="Serve a serial port.")
+@click.option("--tcp", metavar="HOST:PORT", help="Serve Modbus TCP.")
+@click.option("--rtu-tcp", "rtu_tcp", metavar="HOST:PORT", help="Serve RTU over TCP.")
 @click.option(
-    "--baud", type=click.IntRange(min=300), help="Instead of what the first drive comes with."
+    "--baud", type=click.IntRange(min=300), help="Baud rate; by default that of the first drive."
 )
 @click.option(
     "--format",
     "form",
     metavar="8E1|8N2|...",
-    help="Instead of what the first drive comes with.",
+    help="Character format; by default that of the first drive.",
 )
 @click.option(
     "--any-settings",
     is_flag=True,
-    help="Answer whatever baud and stop bits a client sets on the pseudo-terminal.",
+    help="Answer whatever baud rate and stop bits a client sets on the pseudo-terminal.",
 )
-@click.option("--real-time", is_flag=True, help="Keep the time of the line's characters.")
+@click.option("--real-time", is_flag=True, help="Keep the transmission times of the line.")
 @click.option(
     "--set",
     "sets",
     multiple=True,
     metavar="[ADDRESS:]CODE=RAW",
-    help="A raw value in force from power-up; a monitored word stays at it.",
+    help="Raw value from power-up; a measured word keeps it.",
 )
 @click.option(
     "--protect",
     "protects",
     multiple=True,
     metavar="[ADDRESS:]CODE,...",
-    help="Parameters that the line cannot see.",
+    help="Parameters that the drive refuses over the line.",
 )
 @click.option(
     "--line-fault",
     "faults",
     multiple=True,
     metavar="KIND=RATE",
-    help=f"Share of replies with a fault: {', '.join(FAULT_KINDS)}.",
+    help=f"Share of replies with a line fault: {', '.join(FAULT_KINDS)}.",
 )
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the line faults.")
 @click.option(
@@ -71,8 +80,9 @@ FAULT_KINDS = ("late", "lost", "duplicated", "truncated", "corrupted", "noise", 
     type=float,
     default=0.0,
     metavar="HZ",
-    help="Motors run at this frequency: by their inputs, or as another master left them.",
+    help="Motors run at this frequency, by terminals or as another master left them.",
 )
+@json_option
 @told
 def simulate(
     drives: tuple[str, ...],
@@ -89,6 +99,7 @@ def simulate(
     faults: tuple[str, ...],
     seed: int,
     run_hz: float,
+    as_json: bool,
 ) -> None:
     """Serve simulated drives until Ctrl-C or SIGTERM.
 
@@ -118,22 +129,34 @@ def simulate(
     with simulation:
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
-        say(f"Ready: {names} on {where}. Ctrl-C ends it.")
+        if as_json:
+            found = [{"profile": spec.profile, "device": spec.address} for spec in specs]
+            print_json({"event": "ready", "line": where, "drives": found}, compact=True)
+        else:
+            say(f"Ready: {names} on {where}. Ctrl-C ends it.")
         stay_in_background()
-        threading.Thread(target=_follow, args=(simulation,), name="inputs", daemon=True).start()
+        inputs = (simulation, as_json)
+        threading.Thread(target=_follow, args=inputs, name="inputs", daemon=True).start()
         stop.wait()
 
 
-def _follow(simulation: Simulation) -> None:
+def _follow(simulation: Simulation, as_json: bool) -> None:
     """Set inputs as the lines of standard input say; a line that is wrong is told of."""
     from tui.simulator import SimulatorError, set_inputs
 
     for line in typed_lines():
         if line.strip():
             try:
-                say(set_inputs(simulation, line))
+                text = set_inputs(simulation, line)
             except SimulatorError as error:
                 say(str(error), err=True)
+                continue
+            if as_json:
+                # click knows no command in a thread
+                told = {"command": "simulate", "event": "inputs", "text": text}
+                print_json(told, compact=True)
+            else:
+                say(text)
 
 
 def _serve(

@@ -11,18 +11,21 @@ import click
 from tui.drive.plain import plain
 
 from ..shared.control import control_json, control_row
-from ..shared.errors import told
+from ..shared.drives import each_drive
+from ..shared.errors import DONE, told
 from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
 from ..shared.options import (
     Target,
     connect_drive,
-    drive_options,
+    drives_options,
+    force_profile_option,
+    hold_option,
     json_option,
     line_argument,
     on_line,
     read_only_option,
 )
-from ..shared.say import say
+from ..shared.say import say_row
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -30,8 +33,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
-    from tui.session.monitor.timeout import TimeoutWatch
     from tui.session.reading import Reading
+    from tui.session.timeout_told import TimeoutWatch
 
 SHOWN_QUANTITIES: dict[Quantity, str] = {
     "output_frequency": "Output frequency",
@@ -43,6 +46,9 @@ CHANNEL_NAMES: dict[Quantity, str] = {
     "command_channel": "Commanded by",
     "reference_channel": "Reference from",
 }
+
+STATUS_TITLES = 18
+"""Width of the column of titles, with its gap."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -169,11 +175,11 @@ def _refused(session: DriveSession) -> str:
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
     """The object that `status --json` prints."""
+    from ..shared.output import drive_json
+
     state, watch = status.state, status.watch
     return {
-        "line": line_text,
-        "device": status.session.device,
-        "profile": status.session.profile.id,
+        **drive_json(line_text, status.session),
         "state": {"id": state.id, "name": state.name, "kind": state.kind},
         "direction": state.direction,
         "fault": fault_json(state, status.finding),
@@ -251,24 +257,37 @@ def _watch_text(status: Status) -> str:
 
 @click.command()
 @line_argument
-@drive_options
+@drives_options
+@force_profile_option
+@hold_option
 @read_only_option
 @json_option
 @told
 def status(
     target: Target,
+    hold: float | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
     """Tell what a drive does, who commands it, and what it does when the line falls silent."""
-    from ..shared.output import print_json
 
-    async def work(opened: OpenLine) -> Status:
-        return await status_of_drive(await connect_drive(opened, target), opened)
+    from ..running.holding import hold_on
 
-    found = on_line(target, work, read_only=read_only)
-    if as_json:
-        print_json(status_json(target.line_text, found))
-        return
-    for title, text in status_table(found):
-        say(f"{title:<17} {plain(text) or '-----'}")
+    sessions: list[DriveSession] = []
+
+    async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
+        session = await connect_drive(opened, drive)
+        sessions.append(session)
+        found = await status_of_drive(session, opened)
+        if not as_json:
+            for title, text in status_table(found):
+                say_row(title, plain(text) or "-----", STATUS_TITLES)
+        return status_json(target.line_text, found), DONE
+
+    async def work(opened: OpenLine) -> int:
+        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        await hold_on(opened, sessions, hold)
+        return status
+
+    if status := on_line(target, work, read_only=read_only):
+        raise click.exceptions.Exit(status)

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.completion import complete_code
 from ..shared.errors import DIFFERENT, told
 from ..shared.options import (
     Target,
@@ -13,6 +14,7 @@ from ..shared.options import (
     drive_options,
     json_option,
     line_argument,
+    never_forced,
     on_line,
 )
 from ..shared.say import say
@@ -25,20 +27,21 @@ if TYPE_CHECKING:
 
 @click.command(context_settings={"ignore_unknown_options": True})  # -12.5 is a VALUE
 @line_argument
-@click.argument("code", required=False)
+@click.argument("code", required=False, shell_complete=complete_code)
 @click.argument("value", required=False)
 @click.argument("unit", required=False)
 @drive_options
-@click.option("--forget", is_flag=True, help="Teach CODE no longer: it is shown raw again.")
+@click.option("--forget", is_flag=True, help="Forget the scale of CODE: it is shown raw again.")
 @click.option(
     "--reference",
     is_flag=True,
     help="Confirm that CODE, once taught, takes the drive's reference.",
 )
 @click.option(
-    "--no-reference", is_flag=True, help="Give the reference by no taught parameter any more."
+    "--no-reference", is_flag=True, help="Set the reference by no taught parameter any more."
 )
 @json_option
+@never_forced
 @told
 def teach(
     target: Target,
@@ -50,11 +53,11 @@ def teach(
     no_reference: bool,
     as_json: bool,
 ) -> None:
-    """Teach what a raw value is in its unit, by what the drive's display shows now.
+    """Teach the scale and unit of a raw value by what the drive's display shows now.
 
     VALUE is what the display shows while CODE is read: 50.3 Hz. Two looks at different values tell
-    scale and sign; a look that disagrees ends it. Without VALUE it is told what is taught. Writes
-    nothing to the drive.
+    scale and sign; one that contradicts them ends with 1. Without VALUE what was taught is shown.
+    Nothing is written to the drive.
     """
     wishes = sum((forget, reference, no_reference, value is not None))
     if wishes > 1:
@@ -67,16 +70,18 @@ def teach(
         found = teacher.family.find(code).code if code is not None else ""
         if value is not None:
             return await _look(teacher, found, value, unit or "", as_json=as_json)
-        if forget:
-            known = teacher.forget(found)
-            say(f"{found}: {'shown raw again' if known else 'was not taught'}.")
-        elif reference:
-            _confirm(teacher, found)
-        elif no_reference:
-            teacher.drop_reference()
-            say("No taught parameter takes the reference.")
-        else:
+        if not (forget or reference or no_reference):
             _tell_all(teacher, found, as_json=as_json)
+        else:
+            if forget:
+                known = teacher.forget(found)
+                text = f"{found}: {'shown raw again' if known else 'was not taught'}."
+            elif reference:
+                text = _confirm(teacher, found)
+            else:
+                teacher.drop_reference()
+                text = "No taught parameter takes the reference."
+            _tell_change(teacher, text, as_json=as_json)
         _tell_trouble(teacher)
         return 0
 
@@ -108,11 +113,20 @@ async def _look(teacher: Teacher, code: str, value: str, unit: str, *, as_json: 
     return DIFFERENT if lesson.went_wrong else 0
 
 
-def _confirm(teacher: Teacher, code: str) -> None:
+def _confirm(teacher: Teacher, code: str) -> str:
     from tui.session.teaching.teacher import reference_asks
 
     said = teacher.confirm_reference(code)
-    say(f"{said} {reference_asks(teacher.family, code)}")
+    return f"{said} {reference_asks(teacher.family, code)}"
+
+
+def _tell_change(teacher: Teacher, text: str, *, as_json: bool) -> None:
+    from ..shared.output import print_json
+
+    if as_json:
+        print_json({**_of_drive(teacher), "text": text, "reference": teacher.reference or None})
+    else:
+        say(text)
 
 
 def _tell_all(teacher: Teacher, only: str, *, as_json: bool) -> None:

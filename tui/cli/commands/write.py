@@ -2,27 +2,33 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
+from ..shared.completion import complete_setting
 from ..shared.errors import DONE, REFUSED_HERE, told
+from ..shared.messages import Messages
 from ..shared.options import (
     Target,
     connect_drive,
+    force_profile_option,
+    json_option,
     line_argument,
     on_line,
     read_only_option,
     settings_options,
 )
-from ..shared.say import say
 from ..shared.sets import (
+    ResultTelling,
     codes_of,
     confirm_option,
     dry_run_option,
+    edit_json,
+    results_json,
+    round_option,
     save_option,
     say_afterwards,
-    say_result,
     status_of_results,
 )
 from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
@@ -35,12 +41,21 @@ if TYPE_CHECKING:
 
 @click.command()
 @line_argument
-@click.argument("wanted", nargs=-1, required=True, metavar="CODE=VALUE...")
+@click.argument(
+    "wanted",
+    nargs=-1,
+    required=True,
+    metavar="CODE=VALUE...",
+    shell_complete=complete_setting,
+)
 @dry_run_option
 @arm_option
 @confirm_option
+@round_option
 @save_option
+@force_profile_option
 @read_only_option
+@json_option
 @settings_options
 @told
 def write(
@@ -49,32 +64,44 @@ def write(
     dry_run: bool,
     arm: bool,
     confirmed: tuple[str, ...],
+    rounded: bool,
     save: bool,
     read_only: bool,
+    as_json: bool,
 ) -> None:
     """Write settings of a drive, each read back: ACC=3.5s HSP=50 CHCF=Separate.
 
-    A VALUE is a number with or without its unit, a name as the profile gives it, or a word in
-    hexadecimal (16#0021). Limits and scales are written before what depends on them.
+    A VALUE is a number, with or without a unit (3.5s, 3500ms), a name as the profile gives it, or
+    a word in hexadecimal (16#0021). A value that the drive would round to another one is refused
+    without --round. Limits and scales are written before what depends on them.
     """
+    from ..shared.output import drive_json, print_json
+
     typed = _pairs(wanted)
     if not dry_run:
         need_arming(arm, "this writes settings of the drive")
+    messages = Messages(as_json=as_json)
+    telling = ResultTelling(messages)
 
     async def work(opened: OpenLine) -> int:
         session = await connect_drive(opened, target)
-        edits = await _staged(session, typed)
+        edits = await _staged(session, typed, messages, rounded=rounded)
         if dry_run:
-            told = await _past_limits(session, edits)
-            for edit in edits:
-                if edit.code in told:
-                    say(f"refuse {told[edit.code]}")
-                else:
-                    say(f"write  {edit.code}: {edit.old_text} -> {edit.text}")
-            return REFUSED_HERE if told else DONE
-        return await _write(session, edits, confirmed, save=save)
+            found, status = await _tell(session, edits, messages)
+        else:
+            codes = codes_of(session, confirmed)
+            found, status = await _write(session, edits, codes, telling, save=save)
+        if as_json:
+            head = drive_json(target.line_text, session)
+            print_json({**head, "dry_run": dry_run, **found, "messages": messages.texts})
+        return status
 
-    status = on_line(target, work, read_only=read_only or dry_run)
+    try:
+        status = on_line(target, work, read_only=read_only or dry_run)
+    except KeyboardInterrupt:
+        if dry_run:
+            raise
+        raise telling.interrupted() from None
     if status != DONE:
         raise click.exceptions.Exit(status)
 
@@ -89,8 +116,13 @@ def _pairs(wanted: tuple[str, ...]) -> list[tuple[str, str]]:
     return pairs
 
 
-async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
-    """The edits against what the drive holds; what is to be known of them is said."""
+async def _staged(
+    session: DriveSession, typed: list[tuple[str, str]], messages: Messages, *, rounded: bool
+) -> Edits:
+    """The edits against what the drive holds; what is to be known of them is said.
+
+    Raises ValueRefused where a value would be rounded to another without a person's wish.
+    """
     from tui.drive.errors import ValueRefused
     from tui.drive.settings.edits import Edits, consequences
     from tui.drive.shown import scale_sources
@@ -98,6 +130,9 @@ async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
 
     profile = session.profile
     pairs = [(profile.find(code).code, value) for code, value in typed]
+    codes = [code for code, _ in pairs]
+    if twice := ", ".join(code for code in dict.fromkeys(codes) if codes.count(code) > 1):
+        raise click.UsageError(f"{twice}: given more than once. Which value is meant?")
     sources = scale_sources(profile)
     follow = [p.code for p in profile.parameters if p.scale_by and {c for c, _ in pairs} & sources]
     retrying = RetryingReader(session)
@@ -108,12 +143,30 @@ async def _staged(session: DriveSession, typed: list[tuple[str, str]]) -> Edits:
         if profile[code].access == "r":
             raise ValueRefused(f"{code} can only be read.")
         edits = edits.stage(profile, code, value, retrying.raws, retrying.lacking)
+    if not rounded and (losses := [edit.loss for edit in edits.asked if edit.loss]):
+        raise ValueRefused(f"{'; '.join(losses)}. --round writes that all the same.")
     for edit in edits.asked:
         if edit.remark:
-            say(edit.remark)
+            messages.tell(edit.remark)
     for text in consequences(profile, edits, retrying.raws, retrying.lacking):
-        say(text)
+        messages.tell(text)
     return edits
+
+
+async def _tell(
+    session: DriveSession, edits: Edits, messages: Messages
+) -> tuple[dict[str, Any], int]:
+    """Tell what would be written; the same for JSON, and the exit status."""
+    past = await _past_limits(session, edits)
+    rows = []
+    for edit in edits:
+        why = past.get(edit.code)
+        text = f"write  {edit.code}: {edit.old_text} -> {edit.text}"
+        messages.tell(text if why is None else f"refuse {why}")
+        outcome = "would-write" if why is None else "refused"
+        rows.append({**edit_json(edit), "outcome": outcome, "held": edit.old, "text": why or text})
+    found = {"results": rows, "saved": False, "after_reset": [], "unsaved": []}
+    return found, REFUSED_HERE if past else DONE
 
 
 async def _past_limits(session: DriveSession, edits: Edits) -> dict[str, str]:
@@ -129,29 +182,37 @@ async def _past_limits(session: DriveSession, edits: Edits) -> dict[str, str]:
 
 
 async def _write(
-    session: DriveSession, edits: Edits, confirmed: tuple[str, ...], *, save: bool
-) -> int:
+    session: DriveSession,
+    edits: Edits,
+    confirmed: frozenset[str],
+    telling: ResultTelling,
+    *,
+    save: bool,
+) -> tuple[dict[str, Any], int]:
+    """Write, tell each; what became of all for JSON, and the exit status."""
     from tui.session.settings.apply import apply_edits
     from tui.session.settings.eeprom import save_to_eeprom
 
+    messages = telling.messages
     if not len(edits):
-        say("The drive holds these values already.")
+        messages.tell("The drive holds these values already.")
     journal, permit = told_journal(), permit_of(session)
     try:
         done = await apply_edits(
-            session,
-            journal,
-            edits,
-            permit=permit,
-            confirmed=codes_of(session, confirmed),
-            progress=say_result,
+            session, journal, edits, permit=permit, confirmed=confirmed, progress=telling
         )
         for link in done.links:
-            say(link.text)
+            messages.tell(link.text)
         saved = save and len(done.written) == len(done.results) and not done.stopped
         if saved:
-            say(await save_to_eeprom(session, journal, permit))
-        say_afterwards(done.after_reset, done.unsaved, saved=saved)
-        return status_of_results(done.results)
+            messages.tell(await save_to_eeprom(session, journal, permit))
+        say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
     finally:
         close_journal(journal)
+    found = {
+        "results": results_json(done.results),
+        "saved": saved,
+        "after_reset": list(done.after_reset),
+        "unsaved": [] if saved else list(done.unsaved),
+    }
+    return found, status_of_results(done.results)

@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 from ..commands.orders import carried_out, close_journal, told_journal
 from ..shared.control import GIVE_BACK_OPTION, taking_of
 from ..shared.errors import REFUSED_HERE, Failure
-from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
@@ -16,8 +15,8 @@ if TYPE_CHECKING:
 WAITS = "a run command that waits at the terminals starts the motor"
 
 
-async def give_control_back(session: DriveSession, *, arm: bool) -> None:
-    """Give it back, and tell; the motor was stopped before. Raises Failure."""
+async def give_control_back(session: DriveSession, *, arm: bool) -> str:
+    """Give it back; the motor was stopped before. What it came to; raises Failure."""
     from tui.drive.orders import deciding_codes
     from tui.session.command.commander import Commander
     from tui.session.read.reader import Reader
@@ -36,7 +35,7 @@ async def give_control_back(session: DriveSession, *, arm: bool) -> None:
         session.arming.arm(seconds=math.inf)
         commander = Commander(session, journal)
         outcome = await carried_out(commander, lambda: commander.order("hand-back"))
-        say(f"Device {session.device}, {outcome.text}.")
+        return f"Device {session.device}, {outcome.text}."
     finally:
         session.arming.disarm()
         close_journal(journal)

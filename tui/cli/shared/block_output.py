@@ -14,7 +14,9 @@ if TYPE_CHECKING:
     from tui.session.blocks.mapping import BlockView, Slot
     from tui.session.drive import DriveSession
 
-HEADINGS = ("Slot", "Stands for", "Name", "Number", "Wire address", "Brings", "Direct", "", "")
+HEADINGS = ("Slot", "Mapped to", "Name", "Number", "Wire address", "Brings", "Direct", "", "")
+COLUMNS_LEFT_OUT = ("Wire address", "Number", "Name")
+"""Columns that a narrow terminal goes without, in this order."""
 AFTER_RESET = (
     "What counts since the last reset cannot be read: it is told by comparison with direct reads."
 )
@@ -38,7 +40,7 @@ def show_blocks(
         return
     out = console()
     for view in views:
-        out.print(_table(session, view))
+        out.print(_table(session, view, out.width))
         if view.trouble:
             say(view.trouble)
         if view.block.effective == "after-reset" and view.raws:
@@ -53,7 +55,9 @@ def show_blocks(
 
 
 def _head(session: DriveSession, line_text: str) -> dict[str, Any]:
-    return {"line": line_text, "device": session.device, "profile": session.profile.id}
+    from .output import drive_json
+
+    return drive_json(line_text, session)
 
 
 def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
@@ -111,11 +115,21 @@ def _slot_json(slot: Slot) -> dict[str, Any]:
     }
 
 
-def _table(session: DriveSession, view: BlockView) -> Table:
+def _table(session: DriveSession, view: BlockView, width: int) -> Table:
+    """The slots of a block; those that bring nothing in one row, columns as they fit."""
     from rich.table import Table
     from rich.text import Text
 
     title = f"{view.block.name}, 16#{view.block.address:04X}"
+    rows = [_cells(session, view, slot) for slot in _in_use(view)]
+    if unused := _unused(view):
+        rows.append((unused, "unused", *[""] * (len(HEADINGS) - 2)))
+    widths = [max(len(cell) for cell in column) for column in zip(HEADINGS, *rows, strict=True)]
+    shown = list(range(len(HEADINGS)))
+    for heading in COLUMNS_LEFT_OUT:
+        if sum(widths[at] + 2 for at in shown) <= width + 2:
+            break
+        shown.remove(HEADINGS.index(heading))
     table = Table(
         title=Text(title, style="bold"),
         title_justify="left",
@@ -123,24 +137,41 @@ def _table(session: DriveSession, view: BlockView) -> Table:
         padding=(0, 2, 0, 0),
         header_style="dim",
     )
-    for heading in HEADINGS:
-        table.add_column(heading, no_wrap=heading != "Name")
-    for slot in view.slots:
-        table.add_row(*(Text(cell) for cell in _cells(session, view, slot)))
+    for at in shown:
+        table.add_column(HEADINGS[at], no_wrap=at != 0, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(row[at]) for at in shown))
     return table
+
+
+def _in_use(view: BlockView) -> list[Slot]:
+    from tui.session.read.verdict import SlotMatch
+
+    return [slot for slot in view.slots if slot.verdict is not SlotMatch.UNUSED]
+
+
+def _unused(view: BlockView) -> str:
+    """The slots that bring nothing: `NMA3 to NMA8`."""
+    used = {slot.code for slot in _in_use(view)}
+    codes = [slot.code for slot in view.slots if slot.code not in used]
+    places = [at for at, slot in enumerate(view.slots) if slot.code not in used]
+    together = places == list(range(places[0], places[-1] + 1)) if places else False
+    if len(codes) > 2 and together:
+        return f"{codes[0]} to {codes[-1]}"
+    return ", ".join(codes)
 
 
 def _cells(session: DriveSession, view: BlockView, slot: Slot) -> tuple[str, ...]:
     from tui.drive.blocks.assignment import describe
 
-    stands = describe(session.profile, view.block, slot.raw)
+    mapped = describe(session.profile, view.block, slot.raw)
     if slot.parameter is None:
-        return (slot.code, stands, "", "", "", "", "", str(slot.verdict), "")
+        return (slot.code, mapped, "", "", "", "", "", str(slot.verdict), "")
     parameter = slot.parameter
     force = str(slot.force) if view.block.effective == "after-reset" else ""
     return (
         slot.code,
-        stands,
+        mapped,
         parameter.name,
         parameter.number,
         f"{parameter.address} (16#{parameter.address:04X})",

@@ -7,7 +7,7 @@ import logging
 import os
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import ParamSpec, TypeVar
 
 import click
@@ -15,7 +15,8 @@ import click
 from .say import say
 
 DONE, DIFFERENT, USAGE, LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE = range(6)
-OUTPUT_LOST = 70
+OWN_ERROR = 70
+INTERRUPTED = 130
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -39,14 +40,26 @@ class Failure(click.ClickException):
 
 
 @contextmanager
-def plain_usage() -> Iterator[None]:
-    """Tell a usage error in two lines: what is wrong, and where the right usage stands."""
+def plain_errors(*, as_json: bool) -> Iterator[None]:
+    """Turn usage errors and Ctrl-C into a Failure; with `as_json` print every error as JSON too."""
     try:
-        yield
-    except click.UsageError as error:
-        path = error.ctx.command_path if error.ctx is not None else "drivepanel"
-        command = path.removesuffix(" panel")
-        raise Failure(f"{error.format_message()}\nTry '{command} --help'.", USAGE) from error
+        try:
+            yield
+        except click.UsageError as error:
+            path = error.ctx.command_path if error.ctx is not None else "drivepanel"
+            command = path.removesuffix(" panel")
+            text = f"{error.format_message()}\nTry '{command} --help'."
+            raise Failure(text, USAGE) from error
+        except (KeyboardInterrupt, click.Abort) as error:
+            raise Failure("Ended by Ctrl-C.", INTERRUPTED) from error
+    except click.ClickException as error:
+        if as_json:
+            from .output import print_json
+
+            with suppress(OSError):
+                text = error.format_message()
+                print_json({"error": text, "status": error.exit_code}, compact=True)
+        raise
 
 
 def status_of(error: Exception) -> int | None:
@@ -78,8 +91,18 @@ def _tell_lost_output(command: Callable[..., object]) -> None:
     if lost := output_lost():
         text = f"What was printed is lost: standard output cannot be written: {lost}."
         if not acts(command):
-            raise Failure(text, OUTPUT_LOST)
+            raise Failure(text, OWN_ERROR)
         say(f"drivepanel: {text}", err=True)
+
+
+def failure_of(error: Exception) -> Failure:
+    """A known error with its exit status; raises one that nobody foresaw."""
+    if isinstance(error, click.ClickException):
+        return Failure(error.format_message(), error.exit_code)
+    status = status_of(error)
+    if status is None:
+        raise error
+    return Failure(str(error), status)
 
 
 def told(command: Callable[P, R]) -> Callable[P, R]:
@@ -105,7 +128,9 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
                 from .logs import log_file
 
                 raise Failure(
-                    f"{type(error).__name__}: {error}\nThe details are in {log_file()}.", 1
+                    f"An error of drivepanel itself: {type(error).__name__}: {error}\n"
+                    f"The details are in {log_file()}.",
+                    OWN_ERROR,
                 ) from error
             logging.getLogger(__name__).info("%s: %s", type(error).__name__, error)
             raise Failure(str(error), status) from error

@@ -5,10 +5,13 @@ from __future__ import annotations
 import asyncio
 import functools
 from collections.abc import Callable, Coroutine
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+
+from .completion import complete_line, complete_profile
+from .devices import CommandFunction, Option, device_option, several_devices_option
 
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
@@ -17,51 +20,30 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 T = TypeVar("T")
-CommandFunction = Callable[..., Any]
-Option = Callable[[CommandFunction], CommandFunction]
 
 CONNECT_WITHIN = 5.0
 """Seconds in which a headless command wants its line connected."""
 
-line_argument = click.argument("line_text", metavar="LINE")
+line_argument = click.argument("line_text", metavar="LINE", shell_complete=complete_line)
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON and nothing else.")
 
-read_only_option = click.option("--read-only", is_flag=True, help="Refuse every write on the line.")
+read_only_option = click.option("--read-only", is_flag=True, help="Write nothing on this line.")
 
-SLAVE_ADDRESS = click.IntRange(1, 247)
-device_option = click.option(
-    "-d",
-    "--device",
-    type=SLAVE_ADDRESS,
-    default=1,
-    show_default=True,
-    metavar="ADDRESS",
-    help="Slave address of the drive.",
-)
 profile_option = click.option(
-    "-p", "--profile", "profile_id", metavar="ID", help="Profile of the drive."
+    "-p",
+    "--profile",
+    "profile_id",
+    metavar="ID",
+    shell_complete=complete_profile,
+    help="Profile of the drive; it must match the drive's identification.",
 )
 rated_current_option = click.option(
     "--rated-current",
     "rated_current",
     type=float,
     metavar="A",
-    help="Rated current of the drive in A, for families that give currents in %.",
+    help="Rated current of the drive in A, for families that tell currents in %.",
 )
-
-
-def devices_option(help_text: str, **more: Any) -> Option:
-    """The option -d of a command that takes several drives; `more` goes to click."""
-    return click.option(
-        "-d",
-        "--device",
-        "devices",
-        type=SLAVE_ADDRESS,
-        multiple=True,
-        metavar="ADDRESS",
-        help=help_text,
-        **more,
-    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +54,48 @@ class Target:
     device: int
     profile_id: str | None
     rated_current: float | None = None
+    force_profile: bool = False
+    """Whether a profile counts that the drive contradicts; never for what moves a motor."""
+    others: tuple[int, ...] = ()
+    """Further addresses on the same line, where a command takes several."""
+
+    def each(self) -> list[Target]:
+        """A target for each drive, in the order in which they were named."""
+        devices = dict.fromkeys((self.device, *self.others))
+        return [replace(self, device=device, others=()) for device in devices]
+
+
+FORCE_PROFILE = "--force-profile"
+force_profile_option = click.option(
+    FORCE_PROFILE,
+    "force_profile",
+    is_flag=True,
+    help="Use the profile of -p although the drive identifies as another.",
+)
+"""For commands that read, watch or write; it reaches them in their Target."""
+
+hold_option = click.option(
+    "--hold",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Then ask the drive on for S seconds, so that its communication time-out does not run"
+    " out; its own protection against a lost line is off meanwhile.",
+)
+
+
+def never_forced(command: CommandFunction) -> CommandFunction:
+    """The same option, refused: for commands after which a wrong profile moves a motor."""
+
+    def refuse(context: click.Context, _option: click.Parameter, given: bool) -> None:
+        if given:
+            raise click.UsageError(
+                f"{FORCE_PROFILE} is not for {context.info_name}: it goes by the drive's own"
+                " profile only. It is for read, watch and write."
+            )
+
+    return click.option(
+        FORCE_PROFILE, is_flag=True, hidden=True, expose_value=False, callback=refuse
+    )(command)
 
 
 def _target_of(*options: Option) -> Option:
@@ -81,12 +105,15 @@ def _target_of(*options: Option) -> Option:
         @functools.wraps(command)
         def handed_over(
             line_text: str,
-            device: int,
+            device: int | tuple[int, ...],
             profile_id: str | None,
             rated_current: float | None = None,
+            force_profile: bool = False,
             **others: Any,
         ) -> Any:
-            return command(target=Target(line_text, device, profile_id, rated_current), **others)
+            first, *more = device if isinstance(device, tuple) else (device,)
+            target = Target(line_text, first, profile_id, rated_current, force_profile)
+            return command(target=replace(target, others=tuple(more)), **others)
 
         decorated: CommandFunction = handed_over
         for option in reversed(options):
@@ -98,6 +125,8 @@ def _target_of(*options: Option) -> Option:
 
 drive_options = _target_of(device_option, profile_option, rated_current_option)
 """Which drive on the line, and by which profile, for commands that show values."""
+drives_options = _target_of(several_devices_option, profile_option, rated_current_option)
+"""The same for commands that take several drives."""
 settings_options = _target_of(profile_option, device_option)
 """The same for commands about settings, where a current is a word like any other."""
 
@@ -119,13 +148,34 @@ def on_line(
     usual = None if isinstance(where, str) else _usual_settings(where.profile_id)
     opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual)
     try:
-        return asyncio.run(work(opened))
+        return asyncio.run(_to_its_end(opened, work))
     except NoAnswer as error:
         if not (hint := _about_silence(opened, text, usual is not None)):
             raise
         raise NoAnswer(error.device, error.function, error.address, f"{error} {hint}") from error
     finally:
         opened.close()
+
+
+async def _to_its_end(opened: OpenLine, work: Callable[[OpenLine], Coroutine[Any, Any, T]]) -> T:
+    """Do the work; whatever becomes of it, say what drives do that are asked no more.
+
+    Raises Exit with 128 and the number of a signal that ended it.
+    """
+    from .left_alone import say_farewells
+    from .signals import cancelled_by_signal
+
+    task = asyncio.current_task()
+    assert task is not None
+    with cancelled_by_signal(task) as came:
+        try:
+            return await work(opened)
+        except asyncio.CancelledError:
+            if not came:
+                raise
+            raise click.exceptions.Exit(128 + came[0]) from None
+        finally:
+            await say_farewells(opened)
 
 
 def _usual_settings(profile_id: str | None) -> UsualSettings | None:
@@ -161,25 +211,51 @@ def _about_silence(opened: OpenLine, text: str, by_profile: bool) -> str:
 
 
 async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
-    """The wanted drive with its profile, identified where none was named.
+    """The wanted drive with its profile: the named one, else that of its identity.
 
-    Raises UnidentifiedDrive with what to type where the drive does not say who it is.
+    Raises UsageError with what to type where the drive does not say who it is, Contradiction
+    where it says that it is another than the profile named.
     """
     from tui.drive.profile import library
+    from tui.session.connect.contradiction import own_words
     from tui.session.connect.identify import identify_drive
     from tui.session.drive import DriveSession
 
-    identity: DriveIdentity | None = None
-    profile_id = target.profile_id
-    if profile_id is None:
-        identity = await identify_drive(opened.line, target.device)
-        profile_id = identity.profile
-        if profile_id is None:
-            raise unidentified(identity)
-    session = DriveSession(opened.line, target.device, library.load(profile_id), identity)
+    from .left_alone import look_after
+
+    if target.profile_id is not None:
+        profile = library.load(target.profile_id)
+        told = await own_words(opened.line, target.device, profile)
+    else:
+        told = await identify_drive(opened.line, target.device)
+        if told.profile is None:
+            raise unidentified(told)
+        profile = library.load(told.profile)
+    session = DriveSession(opened.line, target.device, profile, told)
+    if session.contradiction:
+        _believe_the_person(session, target)
+    await look_after(opened, session, target.line_text).learn()
     await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session
+
+
+def _believe_the_person(session: DriveSession, target: Target) -> None:
+    """Go by a profile that the drive contradicts, if that was asked for; else raise."""
+    from tui.session.connect.contradiction import Contradiction
+
+    from .say import say
+
+    told = session.known_identity.profile
+    if not target.force_profile:
+        way = f"Name -p {told}, or leave -p away." if told else "Name the profile of that drive."
+        raise Contradiction(f"{session.contradiction}\n{way} Nothing was written.")
+    session.arming.barred = ""
+    say(
+        f"drivepanel: {session.contradiction} By {FORCE_PROFILE} it is taken as one all the same:"
+        " values, units and names may be wrong.",
+        err=True,
+    )
 
 
 def _recall(session: DriveSession) -> None:

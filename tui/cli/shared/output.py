@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from datetime import UTC, datetime
 from decimal import Decimal
 from typing import TYPE_CHECKING, Any, Literal
+
+import click
 
 from tui.drive.plain import escaped_json, plain
 
@@ -18,6 +21,10 @@ if TYPE_CHECKING:
 
     from tui.session.drive import DriveSession
     from tui.session.reading import Reading
+
+JSON_SCHEMA = 1
+"""Version of all that `--json` prints: fields are added to it, none is taken out or renamed."""
+JsonObject = Mapping[str, Any]
 
 COLUMNS = {
     "Code": False,
@@ -32,16 +39,36 @@ COLUMNS = {
 """Headings of a table of readings, and whether the column is aligned to the right."""
 
 NAME_COLUMN = tuple(COLUMNS).index("Name")
+LEFT_OUT = tuple(tuple(COLUMNS).index(title) for title in ("Number", "Wire address", "Raw"))
+"""Columns that a narrow terminal goes without, in this order."""
+LEAST_NAME, READABLE_NAME = 4, 16
+"""Characters that are left to a name, and for which other columns go."""
 GAP = 2
 
 PIPE_WIDTH = 200
 """Width of a table that goes to a file or another program, in characters."""
 
 
-def print_json(data: object, *, compact: bool = False) -> None:
-    """Print JSON on standard output, at once."""
-    sys.stdout.write(json_text(data, compact=compact) + "\n")
+def print_json(data: JsonObject | Sequence[JsonObject], *, compact: bool = False) -> None:
+    """Print one document, or a list of them, on standard output, at once."""
+    told = document(data) if isinstance(data, Mapping) else [document(one) for one in data]
+    sys.stdout.write(json_text(told, compact=compact) + "\n")
     sys.stdout.flush()
+
+
+def document(data: JsonObject) -> dict[str, Any]:
+    """The object with what every one begins with: version of the schema, and the command."""
+    return {"schema": JSON_SCHEMA, "command": _command(), **data}
+
+
+def _command() -> str | None:
+    """The name of the command that was called; None where the words name none."""
+    context = click.get_current_context(silent=True)
+    while context is not None and context.parent is not None and context.parent.parent is not None:
+        context = context.parent
+    if context is None:
+        return None
+    return context.invoked_subcommand if context.parent is None else context.info_name
 
 
 def json_text(data: object, *, compact: bool = True) -> str:
@@ -53,12 +80,18 @@ def readings_json(
     line: str, session: DriveSession, readings: Mapping[str, Reading]
 ) -> dict[str, Any]:
     """The object that `read` and `watch` print."""
-    return {
-        "line": line,
-        "device": session.device,
-        "profile": session.profile.id,
-        "values": {code: reading_json(reading) for code, reading in readings.items()},
-    }
+    values = {code: reading_json(reading) for code, reading in readings.items()}
+    return {**drive_json(line, session), "values": values}
+
+
+def drive_json(line: str, session: DriveSession) -> dict[str, Any]:
+    """Which drive, on which line as it was typed: how every document about one begins."""
+    from tui.session.monitor.timeout import timeout_now
+
+    from .left_alone import timeout_json
+
+    about = {"line": line, "device": session.device, "profile": session.profile.id}
+    return {**about, "timeout": timeout_json(timeout_now(session))}
 
 
 def reading_json(reading: Reading) -> dict[str, Any]:
@@ -110,6 +143,8 @@ def console() -> Console:
 
     return Plain(
         width=None if sys.stdout.isatty() else PIPE_WIDTH,
+        # bold and dim are no colours, but who wants none wants plain text
+        color_system=None if os.environ.get("NO_COLOR") else "auto",
         highlight=False,
         markup=False,
         emoji=False,
@@ -118,15 +153,21 @@ def console() -> Console:
 
 def print_readings(readings: Mapping[str, Reading]) -> None:
     """Print a table of readings."""
-    console().print(readings_table(readings))
+    out = console()
+    out.print(readings_table(readings, width=out.width, cut=False))
 
 
 def readings_table(
-    readings: Mapping[str, Reading], title: str = "", *, width: int | None = None
+    readings: Mapping[str, Reading],
+    title: str = "",
+    *,
+    width: int | None = None,
+    cut: bool = True,
 ) -> Table:
     """A table of readings with the three notations of each address.
 
-    With a `width` in characters every row is one line, and names are cut to fit.
+    With a `width` in characters columns of notations are left out where they do not fit; names
+    are cut so that every row is one line, or broken at words.
     """
     from rich.cells import cell_len
     from rich.table import Table
@@ -134,23 +175,40 @@ def readings_table(
 
     rows = [_cells(reading) for reading in readings.values()]
     widths = [max(map(cell_len, column)) for column in zip(tuple(COLUMNS), *rows, strict=True)]
+    shown = list(range(len(COLUMNS)))
     name_width = None
     if width is not None:
-        others = sum(widths) - widths[NAME_COLUMN] + GAP * (len(widths) - 1)
-        name_width = max(4, min(widths[NAME_COLUMN], width - others))
+        shown = _fitting(widths, width)
+        others = sum(widths[at] for at in shown) - widths[NAME_COLUMN] + GAP * (len(shown) - 1)
+        name_width = max(LEAST_NAME, min(widths[NAME_COLUMN], width - others))
     table = Table(box=None, padding=(0, GAP, 0, 0), header_style="dim", title_justify="left")
     table.title = Text(title, style="bold") if title else None
-    for index, (heading, right) in enumerate(COLUMNS.items()):
+    headings = list(COLUMNS.items())
+    for index in shown:
+        heading, right = headings[index]
         justify: Literal["left", "right"] = "right" if right else "left"
         if index == NAME_COLUMN:
-            table.add_column(heading, no_wrap=width is not None, max_width=name_width)
+            no_wrap = cut and width is not None
+            table.add_column(heading, no_wrap=no_wrap, max_width=name_width, overflow="fold")
         else:
             # a number that lost a digit would be another one
             table.add_column(heading, justify=justify, no_wrap=True, min_width=widths[index])
     for cells, reading in zip(rows, readings.values(), strict=True):
         style = "" if reading.quality == "good" else "dim"
-        table.add_row(*(Text(cell) for cell in cells), style=style)
+        table.add_row(*(Text(cells[index]) for index in shown), style=style)
     return table
+
+
+def _fitting(widths: Sequence[int], width: int) -> list[int]:
+    """The columns that fit beside a name that can be read; notations go first."""
+    shown = list(range(len(widths)))
+    for column in LEFT_OUT:
+        name = min(widths[NAME_COLUMN], READABLE_NAME)
+        needed = sum(widths[at] for at in shown if at != NAME_COLUMN) + GAP * (len(shown) - 1)
+        if needed + name <= width:
+            break
+        shown.remove(column)
+    return shown
 
 
 def _cells(reading: Reading) -> tuple[str, ...]:

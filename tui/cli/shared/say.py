@@ -3,16 +3,46 @@
 from __future__ import annotations
 
 import sys
+from shutil import get_terminal_size
 
 import click
 
 from tui.drive.plain import plain
 
 
-def say(text: str = "", *, err: bool = False) -> None:
-    """Print lines on standard output, or on standard error."""
+def say(text: str = "", *, err: bool = False, indent: int = 0) -> None:
+    """Print lines on standard output, or on standard error; on a terminal broken at words.
+
+    What does not fit goes on `indent` characters from the left.
+    """
     stream = sys.stderr if err else sys.stdout
-    click.echo(printable(text, stream.encoding), err=err)
+    width = get_terminal_size().columns if stream.isatty() else 0
+    told = printable(text, stream.encoding)
+    click.echo("\n".join(_broken(line, width, indent) for line in told.split("\n")), err=err)
+
+
+def say_row(title: str, text: str, width: int) -> None:
+    """Print a title and its text in two columns; the first is so wide, with its gap."""
+    say(f"{title:<{width - 1}} {text}", indent=width)
+
+
+def _broken(line: str, width: int, indent: int) -> str:
+    """A line broken at its last words that fit; one that fits, or goes to a file, as it is."""
+    if len(line) <= width // 2 or width <= 2 * indent:
+        return line
+    from rich.cells import cell_len
+
+    if cell_len(line) <= width:
+        return line
+    parts, rest, gap = [], line, ""
+    while cell_len(gap + rest) > width:
+        room = width - len(gap)
+        at = rest.rfind(" ", 0, room + 1)
+        if not rest[: max(at, 0)].strip():
+            at = room  # a word longer than the line
+        parts.append(gap + rest[:at].rstrip())
+        rest, gap = rest[at:].lstrip(), " " * indent
+    return "\n".join([*parts, gap + rest])
 
 
 def say_over(text: str, *, last: bool) -> None:

@@ -3,43 +3,63 @@
 from __future__ import annotations
 
 import asyncio
+import re
 import sys
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
-from .errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, USAGE, Failure
+from .completion import complete_code
+from .errors import (
+    DONE,
+    DRIVE_REFUSED,
+    INTERRUPTED,
+    LINE_TROUBLE,
+    REFUSED_HERE,
+    USAGE,
+    Failure,
+)
+from .messages import Messages
 from .options import Target, connect_drive, on_line
-from .say import say, say_over
+from .say import say_over
 
 if TYPE_CHECKING:
+    from tui.drive.settings.edits import Edit
     from tui.drive.settings.parameter_set import ParameterSet
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.read.upload import Upload
     from tui.session.settings.applied import Result
 
+_REGISTER = re.compile(r", register \d+")
 OUTAGE = 20.0
 """Seconds for which a read-out waits for a lost line to come back."""
 SET_POLL_INTERVAL = 0.1
 
 file_argument = click.argument("file", type=click.Path(path_type=Path))
-force_option = click.option("--force", is_flag=True, help="Replace FILE where it exists.")
+force_option = click.option("--force", is_flag=True, help="Replace FILE if it exists.")
 confirm_option = click.option(
     "--confirm",
     "confirmed",
     multiple=True,
     metavar="CODE",
-    help="Write this unverified parameter too, after comparing it with the keypad.",
+    shell_complete=complete_code,
+    help="Write this unverified parameter too, once its value was compared with the keypad.",
 )
 save_option = click.option(
-    "--save", is_flag=True, help="Save the settings to the drive's EEPROM afterwards."
+    "--save", is_flag=True, help="Then save the settings to the drive's EEPROM."
+)
+round_option = click.option(
+    "--round",
+    "rounded",
+    is_flag=True,
+    help="Write also values that are rounded to another one: to 0, or by half a step.",
 )
 dry_run_option = click.option(
-    "--dry-run", is_flag=True, help="Tell what would be written, and write nothing."
+    "--dry-run", is_flag=True, help="Tell what would be written; write nothing."
 )
 
 
@@ -71,33 +91,51 @@ def write_down(file: Path, text: str, *, force: bool = False) -> None:
         raise Failure(str(error), USAGE) from error
 
 
+def complain_absent(messages: Messages, absent: Mapping[str, str]) -> None:
+    """What could not be read, and why; what has one reason in one line."""
+    reasons: dict[str, list[str]] = {}
+    for code, why in absent.items():
+        reasons.setdefault(_REGISTER.sub("", why), []).append(code)
+    for reason, codes in reasons.items():
+        if len(codes) == 1:
+            messages.complain(f"{codes[0]} could not be read: {absent[codes[0]]}")
+        else:
+            messages.complain(f"{len(codes)} could not be read: {', '.join(codes)}. {reason}")
+
+
 def codes_of(session: DriveSession, names: Iterable[str]) -> frozenset[str]:
     """The codes that a person named in any notation; raises UnknownParameter."""
     return frozenset(session.profile.find(name).code for name in names)
 
 
-def set_of_drive(target: Target) -> tuple[DriveSession, ParameterSet]:
+def set_of_drive(
+    target: Target, *, settings_only: bool = False
+) -> tuple[DriveSession, ParameterSet]:
     """A drive and every readable parameter of it, read now on a line that is not written to."""
 
     async def work(opened: OpenLine) -> tuple[DriveSession, ParameterSet]:
         session = await connect_drive(opened, target)
-        return session, await take_set(session)
+        return session, await take_set(session, settings_only=settings_only)
 
     return on_line(target, work, read_only=True)
 
 
-async def take_set(session: DriveSession) -> ParameterSet:
-    """Every readable parameter of a drive, with who it is, as far as it says so."""
+async def take_set(session: DriveSession, *, settings_only: bool = False) -> ParameterSet:
+    """Every readable parameter of a drive, with who it is, as far as it says so.
+
+    With `settings_only` no measurement, counter or command word is among them.
+    """
     from tui.bus.errors import ExchangeError
     from tui.session.connect.identify import identify_drive
-    from tui.session.read.upload import Upload
+    from tui.session.read.upload import Upload, setting_codes
 
     if session.identity is None and session.profile.function(43) is not None:
         try:
             session.identity = await identify_drive(session.line, session.device)
         except ExchangeError:
             session.identity = None
-    upload = Upload(session, progress=counter("Read"))
+    codes = setting_codes(session.profile) if settings_only else []
+    upload = Upload(session, codes, progress=counter("Read"))
     await read_out(upload)
     return upload.parameter_set()
 
@@ -133,10 +171,61 @@ def counter(what: str) -> Callable[[int, int], None] | None:
     return show
 
 
-def say_result(done: int, of: int, result: Result) -> None:
-    """One written or refused setting: on standard output, or as an error."""
-    text = f"{done}/{of}  {result.text}"
-    say(text if result.done else f"drivepanel: {text}", err=not result.done)
+class ResultTelling:
+    """Tells each written or refused setting as soon as it is known, and keeps what was told."""
+
+    def __init__(self, messages: Messages) -> None:
+        self.messages = messages
+        self.results: dict[str, Result] = {}
+        self._of = 0
+
+    def __call__(self, done: int, of: int, result: Result) -> None:
+        """One setting: on standard output, or as an error."""
+        self.results[result.edit.code] = result
+        self._of = max(self._of, of)
+        text = f"{done}/{of}  {result.text}"
+        if result.done:
+            self.messages.tell(text)
+        else:
+            self.messages.complain(text)
+
+    def interrupted(self) -> Failure:
+        """The end by Ctrl-C, with what was written and what is not known."""
+        written = [code for code, result in self.results.items() if result.done]
+        if not self.results:
+            text = "Ended by Ctrl-C. The first setting may have been written: read it."
+            return Failure(text, INTERRUPTED)
+        count, names = len(written), ", ".join(written) or "none"
+        more = len(self.results) < self._of
+        rest = " The next one may have been written too: read it." if more else ""
+        text = f"Ended by Ctrl-C: {count} of {self._of} written: {names}.{rest}"
+        return Failure(text, INTERRUPTED)
+
+
+def results_json(results: Iterable[Result]) -> list[dict[str, Any]]:
+    """What became of each edit."""
+    return [
+        {
+            **edit_json(result.edit),
+            "outcome": result.outcome.name.lower().replace("_", "-"),
+            "held": result.held,
+            "text": result.text,
+        }
+        for result in results
+    ]
+
+
+def edit_json(edit: Edit) -> dict[str, Any]:
+    """One edit: values with their units as texts, and raw."""
+    return {
+        "code": edit.code,
+        "typed": edit.typed or None,
+        "old": edit.old_text or None,
+        "old_raw": edit.old,
+        "new": edit.text,
+        "new_raw": edit.new,
+        "rounded": edit.rounded,
+    }
 
 
 def status_of_results(results: Iterable[Result]) -> int:
@@ -157,9 +246,11 @@ def status_of_results(results: Iterable[Result]) -> int:
     return next((status for status in order if status in statuses), DONE)
 
 
-def say_afterwards(after_reset: Iterable[str], unsaved: Iterable[str], *, saved: bool) -> None:
+def say_afterwards(
+    messages: Messages, after_reset: Iterable[str], unsaved: Sequence[str], *, saved: bool
+) -> None:
     """What a person has to know once settings are written."""
     if waiting := ", ".join(after_reset):
-        say(f"In force only after the next reset of the drive: {waiting}.")
-    if any(True for _ in unsaved) and not saved:
-        say("Lost at power-off until they are saved: --save does that, motor stopped.")
+        messages.tell(f"In force only after the next reset of the drive: {waiting}.")
+    if unsaved and not saved:
+        messages.tell("Lost at power-off until they are saved: --save does that, motor stopped.")

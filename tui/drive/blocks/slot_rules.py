@@ -81,7 +81,7 @@ def _of_shape(plan: Assignment) -> list[Problem]:
     if holes and _writes_block(block):
         text = (
             f"{holes[0]} is unused: the drive refuses every write to this block (exception 4)"
-            f" while {plan.block.slots[0]} stands for nothing."
+            f" while {plan.block.slots[0]} is mapped to nothing."
         )
         found.append(Problem(holes[0], text))
     elif holes:
@@ -103,7 +103,7 @@ def reason_against(profile: Profile, block: Block, parameter: Parameter) -> str:
     if word_count(parameter) != 1:
         return f"{code} takes two words; a slot carries one."
     if parameter.address == UNUSED:
-        return f"{code} has the address 0, which stands for an unused slot."
+        return f"{code} has the address 0, which is that of an unused slot."
     if block.direction == "read" and parameter.access == "w":
         return f"{code} can only be written; it cannot stand in {block.name.lower()}."
     if block.direction == "write" and parameter.access == "r":

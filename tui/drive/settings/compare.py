@@ -16,7 +16,7 @@ from ..shown import shown
 from ..values import Value
 from .factory import factory_is_sure, factory_raw
 from .parameter_set import ParameterSet, lacking
-from .writable import is_setting
+from .writable import CUTTING, is_setting
 
 TableFormat = Literal["text", "markdown", "csv"]
 NOTHING = "-"
@@ -34,6 +34,8 @@ class Side:
     """What stands for a value that is no number: a factory setting that depends on the rating."""
     unsure: Mapping[str, str] = field(default_factory=dict)
     """Codes of values that no document of the family tells, and how that is said."""
+    left: Mapping[str, str] = field(default_factory=dict)
+    """Codes that are not compared with this side, and why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +59,10 @@ def side_of(label: str, values: ParameterSet) -> Side:
 
 
 def factory_side(profile: Profile, other: ParameterSet) -> Side:
-    """The factory settings of a profile as a side, on the drive whose other values are these."""
+    """The factory settings of a profile as a side, on the drive whose other values are these.
+
+    Address, baud and format are left: they are set for the line that the drive is on.
+    """
     raws: dict[str, int] = {}
     texts = {p.code: p.factory_text for p in profile.parameters if p.factory_text}
     absent = lacking(profile, other.raws)
@@ -76,7 +81,8 @@ def factory_side(profile: Profile, other: ParameterSet) -> Side:
         for p in profile.parameters
         if p.code in raws and not factory_is_sure(p)
     }
-    return Side("factory", raws, texts=texts, unsure=unsure)
+    left = {s.parameter: "line setting" for s in profile.data.link.settings if s.role in CUTTING}
+    return Side("factory", raws, texts=texts, unsure=unsure, left=left)
 
 
 def _nearly(factory: int, held: int | None) -> bool:
@@ -104,8 +110,9 @@ def _row(profile: Profile, parameter: Parameter, a: Side, b: Side) -> ComparedRo
     code = parameter.code
     values = [_value(profile, parameter, side) for side in (a, b)]
     texts = [_text(parameter, side, value) for side, value in zip((a, b), values, strict=True)]
-    setting = is_setting(profile, parameter)
-    note = "" if setting else "no setting"
+    left = next((side.left[code] for side in (a, b) if code in side.left), "")
+    setting = is_setting(profile, parameter) and not left
+    note = "" if setting else left or "no setting"
     if setting and values.count(None) == 1:
         bare = a if values[0] is None else b
         known = code in bare.absent

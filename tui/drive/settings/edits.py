@@ -30,8 +30,15 @@ class Edit:
     old_text: str = ""
     rounded: bool = False
     """True where the drive cannot hold exactly what was typed."""
+    lossy: bool = False
+    """True where rounding makes another value of it: 0, or either of two neighbours."""
     warning: str = ""
     """What is dangerous about it; else empty."""
+
+    @property
+    def loss(self) -> str:
+        """Why it is not written unless a person lets it be rounded; else empty."""
+        return f"{self.code}: {self.typed} would be held as {self.text}" if self.lossy else ""
 
     @property
     def remark(self) -> str:
@@ -160,10 +167,10 @@ def _encoded(
     parameter = profile[edit.code]
     names = profile.names(parameter)
     scale = profile.scale(parameter, after, absent)
-    raw, rounded = edit.new, False
+    raw, rounded, lossy = edit.new, False, False
     if edit.typed:
         conversion = encode(parameter, edit.typed, names, scale)
-        raw, rounded = conversion.raw, conversion.rounded
+        raw, rounded, lossy = conversion.raw, conversion.rounded, conversion.lossy
     else:
         check_raw(parameter, raw, names, scale)
     if raw != edit.old and (why := never_set(profile, parameter, raw)):
@@ -175,6 +182,7 @@ def _encoded(
         text=shown(profile, parameter, raw, after, absent).display,
         old_text=old,
         rounded=rounded,
+        lossy=lossy,
         warning=warning(profile, parameter, raw),
     )
 

@@ -59,6 +59,8 @@ class ParameterSet:
     """Where each code stands in its file."""
     notes: Mapping[str, str] = field(default_factory=dict)
     """By code, what is to be known of a value that was edited by hand: its rounding."""
+    lossy: frozenset[str] = frozenset()
+    """Codes of values that rounding makes others of, edited by hand."""
 
 
 def dump_set(profile: Profile, values: ParameterSet) -> str:

@@ -17,6 +17,7 @@ SkipReason = Literal[
     "line",
     "rating",
     "range",
+    "rounding",
     "absent",
     "unknown",
     "no counterpart",
@@ -33,6 +34,8 @@ class Options:
     """Write motor and rating data to a drive of another rating too."""
     confirmed: frozenset[str] = frozenset()
     """Codes of unverified parameters that the user has confirmed."""
+    rounded: bool = False
+    """Write values that rounding makes others of, too."""
 
 
 NO_OPTIONS = Options()

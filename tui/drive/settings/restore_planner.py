@@ -129,6 +129,9 @@ class _Planner:
             if not is_setting(self.source_profile, theirs) or theirs.unit != ours.unit:
                 continue
             taken.add(theirs.code)
+            if theirs.code in self.source.lossy and not self.options.rounded:
+                self._skip(ours.code, "rounding", self.source.notes[theirs.code])
+                continue
             self._consider(ours, typed, raw)
         for parameter in self.source_profile.parameters:
             code = parameter.code
@@ -195,7 +198,7 @@ class _Planner:
     def _reason_against(self, parameter: Parameter) -> tuple[SkipReason, str] | None:
         code, options = parameter.code, self.options
         if not is_setting(self.profile, parameter):
-            return "no setting", "it is measured, counted or ordered"
+            return "no setting", "it is a measurement, a counter or a command"
         if parameter.forbidden:
             return "forbidden", parameter.forbidden
         if not is_verified(parameter) and code not in options.confirmed:
@@ -215,17 +218,28 @@ class _Planner:
             self.edits = Edits().stage_many(
                 self.profile, self._wanted.values(), self.held.raws, self.held.lacking
             )
+            lossy = {} if self.options.rounded else self._lossy()
             wrong = edit_problems(self.profile, self.edits, self.held.raws)
-            if not wrong:
+            if not (wrong or lossy):
                 break
-            for code, text in wrong.items():
+            for code, text in {**wrong, **lossy}.items():
                 edit = self._wanted.pop(code)
-                self._skip(code, "range", text, edit.typed or edit.text)
+                reason: SkipReason = "rounding" if code in lossy else "range"
+                self._skip(code, reason, text, edit.typed or edit.text)
         self._tell(self.edits.asked)
         order = {p.code: place for place, p in enumerate(self.profile.parameters)}
         self.items = dict(
             sorted(self.items.items(), key=lambda pair: order.get(pair[0], len(order)))
         )
+
+    def _lossy(self) -> dict[str, str]:
+        """By code, what a value would be rounded to that makes another one of it."""
+        by_hand = {} if self._across else {c: self.source.notes[c] for c in self.source.lossy}
+        changed = {edit.code for edit in self.edits}
+        found = {edit.code: edit.loss for edit in self.edits if edit.lossy}
+        return found | {
+            c: text for c, text in by_hand.items() if c in changed and c in self._wanted
+        }
 
     def _tell(self, edits: Iterable[Edit]) -> None:
         for edit in edits:

@@ -76,6 +76,7 @@ def load_set(text: str, file: str, profile_of: Callable[[str], Profile]) -> Para
         },
         lines={entry.code: entry.line for entry in entries},
         notes=resolver.notes,
+        lossy=frozenset(resolver.lossy),
     )
 
 
@@ -208,6 +209,7 @@ class _Resolver:
     fault: _Fault
     found: dict[str, int] = field(default_factory=dict)
     notes: dict[str, str] = field(default_factory=dict)
+    lossy: set[str] = field(default_factory=set)
 
     def raws(self, entries: list[_Entry]) -> dict[str, int]:
         told = {entry.code: entry.raw for entry in entries if entry.raw is not None}
@@ -257,4 +259,6 @@ class _Resolver:
             absent = lacking(self.profile, raws)
             held = shown(self.profile, parameter, conversion.raw, raws, absent).display
             self.notes[entry.code] = f"{entry.code}: {entry.value} is held as {held}."
+        if conversion.lossy:
+            self.lossy.add(entry.code)
         return conversion.raw

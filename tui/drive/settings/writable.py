@@ -98,7 +98,7 @@ def write_refusal(
         return Refusal("read-only", f"{code} can only be read.")
     if is_order(profile, parameter):
         return Refusal(
-            "order", f"{code} is an order, not a setting: give it on Monitor or with run and stop."
+            "order", f"{code} is a command, not a setting: give it on Monitor or with run and stop."
         )
     if not is_verified(parameter) and code not in confirmed:
         return Refusal(

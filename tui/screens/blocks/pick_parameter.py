@@ -42,7 +42,7 @@ class PickParameter(Question[str | None]):
     def dialog(self) -> ComposeResult:
         """A search, and what it finds."""
         with Vertical(id="dialog"):
-            yield Plain(f"{self._slot} stands for", id="question")
+            yield Plain(f"{self._slot} is mapped to", id="question")
             yield Field(placeholder="code, number, address or name", id="search")
             yield OptionList(id="choices", compact=True)
             yield Plain("", id="count")

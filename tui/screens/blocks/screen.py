@@ -205,7 +205,7 @@ class BlocksScreen(BlockKeys):
         proposals = block_editor.proposals
         todo = [block for block in proposals.blocks if proposals.changes(block)]
         if not todo:
-            self._refuse("Nothing is proposed: Enter picks what the slot stands for.")
+            self._refuse("Nothing is proposed: Enter picks what the slot is mapped to.")
             return
         wrong = [p.text for block in todo for p in refusing(proposals.problems(block))]
         wrong += [text for block in todo if (text := block_editor.not_now(block))]

@@ -148,7 +148,7 @@ def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) 
     own = block_editor.session.profile[code]
     first = Text(f" {code}", STRONG)
     first.append(f"  {notation_text(own)}", FAINT)
-    first.append("  stands for ", FAINT)
+    first.append("  mapped to ", FAINT)
     if parameter is None:
         first.append(describe(block_editor.session.profile, block, raw), PLAIN)
         return [first, *_remarks(block_editor, view, slot, code, width), *[Text("")] * 3][:4]

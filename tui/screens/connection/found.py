@@ -7,11 +7,15 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from tui.session.fleet import FoundDrive
 
+WATCHED_ONLY = "It is watched by that profile, and not armed."
+
 
 def profile_text(drive: FoundDrive) -> str:
-    """The name of its profile, with a sign where it is a guess; empty without one."""
+    """The name of its profile, with a sign where it is a guess or wrong; empty without one."""
     if drive.session is None:
         return ""
+    if drive.session.contradiction:
+        return f"{drive.session.profile.name}, not its own"
     return drive.session.profile.name + (" ?" if drive.guessed else "")
 
 
@@ -26,7 +30,10 @@ def about_drive(drive: FoundDrive) -> str:
 
 
 def next_step(drive: FoundDrive) -> str:
-    """What a person can do about a drive that does not say what it is; else nothing."""
+    """What a person can do about a drive whose profile is not known, or wrong; else nothing."""
+    if drive.session is not None and drive.session.contradiction:
+        own = drive.identity.profile or "its own"
+        return f"Not armed: the profile is not its own. Type {own} beside Profile, then s."
     candidates = drive.identity.candidates
     others = [c for c in candidates if drive.session and c != drive.session.profile.id]
     if drive.session is None:

@@ -11,6 +11,7 @@ from textual import work
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
+from .found import WATCHED_ONLY
 from .state import ALARM_KIND, LineView
 
 if TYPE_CHECKING:
@@ -118,12 +119,20 @@ class Scanning(LineView):
             return
         try:
             profile = await asyncio.to_thread(library.load, wanted)
+            if identity.profile is not None:
+                # at hand for a stop, which goes by what the drive says of itself
+                await asyncio.to_thread(library.load, identity.profile)
         except DriveError as error:
             fleet.note(identity)
             self.fail(error)
             return
         session = DriveSession(fleet.line, identity.device, profile, identity, fleet.clock)
-        fleet.take(session, guessed=not typed and identity.profile is None)
+        before = fleet.console(session.device)
+        console = fleet.take(session, guessed=not typed and identity.profile is None)
+        if console is not before and session.contradiction:
+            self.app.events.add(
+                ALARM_KIND, f"{session.contradiction} {WATCHED_ONLY}", session.device
+            )
 
     @work(exclusive=True, group="open", exit_on_error=False)
     async def open_drive(self, device: int) -> None:

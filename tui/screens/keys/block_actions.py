@@ -6,7 +6,7 @@ from .action import BLOCKS, on
 
 BLOCK_ACTIONS = on(
     (BLOCKS,),
-    ("pick", "enter", "pick", "Choose what the slot stands for."),
+    ("pick", "enter", "pick", "Choose what the slot is mapped to."),
     ("best", "p", "best", "Propose the slots that save most for what Monitor shows."),
     ("write", "w", "write", "Write what is proposed; armed, motor at rest, asks."),
     ("other_table", "tab,left,right", "", "Inputs or outputs."),

@@ -28,6 +28,7 @@ from .value_text import factory_text, limits_now, step_text, value_text
 if TYPE_CHECKING:
     from ..dialogs.now import MotorsNow
 
+ROUNDED = "rounded to what the drive can hold"
 STAGES_NOTHING = ("Esc", "stages nothing")
 
 
@@ -88,12 +89,16 @@ class EditNumber(Question[str | None]):
             return False
         edit = edits.get(parameter.code)
         if edit is None:
-            held.update(Text("as it is held now", FAINT))
+            same = next(one for one in edits.asked if one.code == parameter.code)
+            told = Text("as it is held now", FAINT)
+            if same.rounded:
+                told.append(f": {same.text}   {ROUNDED}", ALARM)
+            held.update(told)
             return True
         shown = Text(f"→ {edit.text}", STRONG)
         shown.append(f"   raw {edit.new} = 16#{edit.new & 0xFFFF:04X}", FAINT)
         if edit.rounded:
-            shown.append("   rounded to what the drive can hold", ALARM)
+            shown.append(f"   {ROUNDED}", ALARM)
         if edit.warning:
             shown.append(f"\n{edit.warning}", ALARM)
         held.update(shown)

@@ -27,12 +27,19 @@ class SetKeys(ParameterKeys):
     # Back up and report
 
     def action_save_file(self) -> None:
-        """Ask for a file, read everything, write it."""
+        """Ask for a file, read the settings, write them."""
         from tui.drive.settings.parameter_set import dump_set
+        from tui.session.read.upload import setting_codes
 
-        about = "Every readable parameter, in units and raw, one a line (TOML)."
+        about = "Every setting, in units and raw, one a line (TOML)."
         profile = self.session.profile
-        self._ask_for_file("Back up to", "toml", about, lambda values: dump_set(profile, values))
+        self._ask_for_file(
+            "Back up to",
+            "toml",
+            about,
+            lambda values: dump_set(profile, values),
+            setting_codes(profile),
+        )
 
     def action_report(self) -> None:
         """Ask for a file, read everything, write what a customer may be given."""
@@ -47,11 +54,17 @@ class SetKeys(ParameterKeys):
             "Identity, line, changed settings, control source, reaction to a lost line, faults and"
             " what was written from here (Markdown)."
         )
-        self._ask_for_file("Report to", "md", about, text)
+        self._ask_for_file("Report to", "md", about, text, [])
 
     def _ask_for_file(
-        self, question: str, suffix: str, about: str, text: Callable[[ParameterSet], str]
+        self,
+        question: str,
+        suffix: str,
+        about: str,
+        text: Callable[[ParameterSet], str],
+        codes: list[str],
     ) -> None:
+        """Ask where to; then read these codes, all where there are none, and write the text."""
         from ..dialogs.ask import Ask
 
         when = time.strftime("%Y%m%d-%H%M")
@@ -59,21 +72,23 @@ class SetKeys(ParameterKeys):
 
         def told(name: str | None) -> None:
             if name:
-                work = self._read_to_file(Path(name).expanduser(), text)
+                work = self._read_to_file(Path(name).expanduser(), text, codes)
                 self.run_worker(work, exclusive=True, group="sets")
 
         proposed = str(Path.cwd() / name)
         asked = Ask(question, fault_of_new, text=proposed, about=about, takes="writes the file")
         self.app.push_screen(asked, told)
 
-    async def _read_to_file(self, path: Path, text: Callable[[ParameterSet], str]) -> None:
+    async def _read_to_file(
+        self, path: Path, text: Callable[[ParameterSet], str], codes: list[str]
+    ) -> None:
         from tui.drive.settings.set_file import write_file
         from tui.session.read.upload import Upload
 
         def progress(done: int, count: int) -> None:
             self._tell_reading(f"{path.name}: {done} of {count}")
 
-        upload = Upload(self.session, progress=progress)
+        upload = Upload(self.session, codes, progress)
         try:
             await upload.run()
             values = upload.parameter_set()

@@ -61,7 +61,7 @@ async def exchange(
         raise AssignmentRefused(f"{why} Nothing was written.")
     if outputs.block.effective == "after-reset" and not in_force:
         raise AssignmentRefused(
-            f"What {outputs.block.name.lower()} stands for since the last reset cannot be read,"
+            f"What {outputs.block.name.lower()} is mapped to since the last reset cannot be read,"
             " and nobody has confirmed it: nothing is written."
         )
     retrying = RetryingReader(session)
@@ -191,7 +191,7 @@ class _Exchange:
         if moved:
             texts = [f"{c} went to {self._text(profile[c], back[c])}" for c in moved]
             raise NotTaken(
-                f"{self.outputs.block.name} stands for something else than its slots say:"
+                f"{self.outputs.block.name} is mapped to something else than its slots say:"
                 f" {', '.join(texts)}. Look at the drive, and reset it before the next try."
             )
         if wrong := self._not_held(raws, back):

@@ -44,7 +44,7 @@ class ExchangeChecks:
         profile, block = self.session.profile, self.outputs.block
         known = {p.code for p in self.targets}
         if foreign := [code for code in self.wanted if code not in known]:
-            raise AssignmentRefused(f"No output slot stands for {', '.join(foreign)}.")
+            raise AssignmentRefused(f"No output slot is mapped to {', '.join(foreign)}.")
         if not self.wanted:
             raise AssignmentRefused("No output was named; nothing was written.")
         for place in self.places:

@@ -127,7 +127,7 @@ def _lines(
         lines.append(f"With them {', '.join(beside)} is written, with what it holds now.")
     if block.effective == "after-reset":
         lines.append(
-            f"What the {block.name.lower()} stands for since the last reset cannot be read. Go on"
+            f"What the {block.name.lower()} is mapped to since the last reset cannot be read. Go on"
             f" only if {' and '.join(block.slots)} were set before the drive was last reset or"
             " switched on."
         )

@@ -55,10 +55,11 @@ class Commander:
     def arm(self, *, seconds: float = ARMED_FOR) -> None:
         """Let commands through from now on; a state that is not fresh is read first.
 
-        Raises OrderRefused where the line is read-only or lost.
+        Raises OrderRefused where the line is read-only or lost, or the drive is not to be armed.
         """
         session = self.session
-        if session.line.read_only or session.state(STATE_FRESH).kind != "unknown":
+        refused = session.line.read_only or bool(session.arming.barred)
+        if refused or session.state(STATE_FRESH).kind != "unknown":
             session.arming.arm(seconds=seconds)
             return
         stamp = session.work.stops

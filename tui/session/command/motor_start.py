@@ -34,7 +34,7 @@ class MotorStart:
         """Reference first, then the way through the chart to the running state."""
         same = [order for order in chart.orders if order.id == id]
         if not same:
-            raise OrderRefused(f"The {chart.name} has no order {id!r}.")
+            raise OrderRefused(f"The {chart.name} has no command {id!r}.")
         access = self.access
         state = await access.state(chart)
         if state.kind == "fault":
@@ -71,7 +71,7 @@ class MotorStart:
                 return
         await access.send(chart, choose(chart, "stop", access.raws))
         raise OrderRefused(
-            f"Ordered {id}, the drive turned {turns} and was stopped: its reverse order is"
+            f"Commanded {id}, the drive turned {turns} and was stopped: its reverse command is"
             " assigned to something else."
         )
 

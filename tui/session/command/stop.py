@@ -22,6 +22,7 @@ from tui.drive.orders import (
     choose,
     order_target,
 )
+from tui.drive.profile import library
 from tui.drive.profile.schema import OrderId
 
 from ..connect.limits import limits_of
@@ -46,6 +47,8 @@ class Stopper:
         self._journal = journal
         self._reports: dict[int, StopReport] = {}
         self._under_way: dict[int, _UnderWay] = {}
+        self._own: dict[int, tuple[DriveSession, DriveSession]] = {}
+        """By device, a session that its drive contradicts, and one by the drive's own family."""
         self._lock = threading.Lock()
 
     @property
@@ -67,11 +70,30 @@ class Stopper:
             session.work.stop(by)
             if session.starts is not None:
                 session.starts.withdraw(session)
+        wanted = [self._by_its_own(session) for session in wanted]
         if len(wanted) > 1:
             self._line.spawn(lambda: self._broadcast(wanted, order), "stop all")
         with self._lock:
             for session in wanted:
                 self._begin(session, order, ordered)
+
+    def _by_its_own(self, session: DriveSession) -> DriveSession:
+        """The session by which a drive is stopped: that of the family which it says it is of.
+
+        A word that stops the family it was taken for may start its own.
+        """
+        own = session.known_identity.profile
+        if not session.contradiction or own is None:
+            return session
+        with self._lock:
+            taken, found = self._own.get(session.device, (None, None))
+            if taken is not session or found is None:
+                profile = library.load(own)
+                found = DriveSession(
+                    session.line, session.device, profile, session.identity, session.clock
+                )
+                self._own[session.device] = (session, found)
+            return found
 
     def _begin(self, session: DriveSession, order: OrderId, ordered: float) -> None:
         """Begin a stop of one drive, unless the same one goes out yet."""

@@ -51,7 +51,7 @@ class Monitor:
         self.device = session.device
         self.profile = session.profile
         self.period = 0.5
-        """Wished time of a cycle in seconds; read anew at each."""
+        """Target cycle time in seconds; read anew at each."""
         self.reader = Reader(session)
         self.restarts = 0
         """How often watching failed by an error of its own, and was begun anew."""
@@ -100,7 +100,7 @@ class Monitor:
         """Watch these codes, by default the profile's monitoring set.
 
         `extra` are read as seldom as the slow values: histories, inputs, hours. `period` is the
-        wished time of a cycle in seconds.
+        target cycle time in seconds.
         """
         self.stop()
         self.period = period
@@ -191,7 +191,7 @@ class Monitor:
             self.line.pace.release(self)
 
     def _period(self, rates: Rates) -> float:
-        """The wished time of a cycle, longer where the line cannot keep it for all."""
+        """The target cycle time, longer where the line cannot keep it for all."""
         cost = self.reader.seconds(rates.fast)
         cost += self.reader.seconds(rates.seldom) / SLOW_FACTOR
         return self.line.pace.claim(self, cost, max(self.period, SHORTEST_PERIOD))

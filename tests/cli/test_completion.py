@@ -1,0 +1,111 @@
+"""What a shell completes: commands, options, lines, profiles, codes."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from click.shell_completion import ShellComplete
+
+from tui.bus.transport.ports import PortInfo
+from tui.cli.main import COMMANDS, main
+from tui.drive.profile import library
+
+PORTS = [PortInfo("/dev/ttyUSB0", "FTDI"), PortInfo("/dev/ttyUSB1", "CH340")]
+
+
+@pytest.fixture(autouse=True)
+def _ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.bus.transport.ports.list_ports", lambda: PORTS)
+
+
+def completed(typed: str) -> list[str]:
+    """The values for a line that was typed so far, its last word begun."""
+    *words, incomplete = typed.split(" ")
+    found = ShellComplete(main, {}, "drivepanel", "_X").get_completions(words, incomplete)
+    return [item.value for item in found]
+
+
+def test_commands() -> None:
+    assert completed("st") == ["status", "stop"]
+    assert set(COMMANDS) <= set(completed(""))
+    assert completed("-v re") == ["read", "reference", "report", "reset", "restore"]
+
+
+def test_commands_are_not_imported_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    loaded = {name for name in sys.modules if name.startswith("tui.cli.commands.")}
+    for name in loaded:
+        monkeypatch.delitem(sys.modules, name)
+    assert completed("sta") == ["status"]
+    assert "tui.cli.commands.status" not in sys.modules
+
+
+def test_options() -> None:
+    assert {"--device", "--profile", "--every", "--csv", "--json"} <= set(completed("watch --"))
+    assert {"--read-only", "--low-bandwidth", "--verbose"} <= set(completed("--"))
+    assert "--on-hangup" in completed("/dev/ttyUSB0 --")
+    assert completed("compare a b --format m") == ["markdown"]
+
+
+@pytest.mark.parametrize("command", ["", "read ", "status ", "block ", "backup "])
+def test_lines(command: str) -> None:
+    assert completed(f"{command}/dev/") == ["/dev/ttyUSB0", "/dev/ttyUSB1"]
+    assert completed(f"{command}tc") == ["tcp:"]
+    assert completed(f"{command}sim:atv3") == ["sim:atv31", "sim:atv312"]
+    assert completed(f"{command}sim:atv71@2,atv31") == ["sim:atv71@2,atv31", "sim:atv71@2,atv312"]
+
+
+def test_profiles() -> None:
+    packaged = {listing.id for listing in library.listings()}
+    assert set(completed("read /dev/ttyUSB0 -p ")) == packaged
+    assert completed("profiles pow") == ["powerdrive"]
+    assert completed("simulate pow") == ["powerdrive"]
+
+
+def test_codes() -> None:
+    assert completed("read /dev/ttyUSB0 -p atv312 AC") == ["ACC", "AC2"]
+    assert completed("watch sim:atv71@2,atv312 -d 1 ac") == ["ACC", "AC2"]
+    assert completed("read sim:atv71@2,atv312 -d 2 RFRD") == ["RFRD"]
+    assert completed("write sim:atv312 AC") == ["ACC=", "AC2="]
+    assert "rFr=" not in completed("write sim:atv312 rF")
+    assert completed("read /dev/ttyUSB0 AC") == []  # nobody is asked who is there
+    assert completed("read sim:nosuch AC") == []
+
+
+def test_what_is_wrong_completes_to_nothing() -> None:
+    assert completed("sttaus x") == []
+    assert completed("block /dev/ttyUSB0 ver") == ["verify"]
+    assert completed("compare fac") == ["factory"]
+
+
+@pytest.mark.skipif(shutil.which("bash") is None, reason="needs bash")
+@pytest.mark.parametrize(
+    ("typed", "replies"),
+    [
+        ("drivepanel stat", "status"),
+        ("drivepanel read sim:atv3", "atv31 atv312"),  # bash's word begins behind the colon
+        ("drivepanel read sim:atv71@2,atv312 -d 1 AC", "ACC AC2"),
+        ("drivepanel write sim:atv312 ACC", "ACC="),
+    ],
+)
+def test_bash_itself(typed: str, replies: str, tmp_path: Path) -> None:
+    program = tmp_path / "drivepanel"
+    program.write_text(f'#!/bin/bash\nexec {shlex.quote(sys.executable)} -m tui "$@"\n')
+    program.chmod(0o755)
+    script = f"""
+        compopt() {{ :; }}
+        eval "$(_DRIVEPANEL_COMPLETE=bash_source drivepanel)"
+        COMP_LINE={shlex.quote(typed)}; COMP_POINT=${{#COMP_LINE}}
+        _drivepanel_completion drivepanel
+        echo "${{COMPREPLY[*]}}"
+    """
+    environment = {**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"}
+    done = subprocess.run(
+        ["bash", "-c", script], capture_output=True, text=True, env=environment, check=False
+    )
+    assert (done.stdout.strip(), done.stderr) == (replies, "")

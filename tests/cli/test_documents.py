@@ -1,0 +1,180 @@
+"""Every command's JSON against its schema."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.programs import DRIVEPANEL, drivepanel, port_of, served
+from tui.cli.commands.status import status_json
+from tui.cli.documents.json_schema import DOCUMENTS, document_of, documents_schema
+from tui.cli.main import COMMANDS
+
+from . import test_fault_status as fault_status
+from .commands import ended, invoked
+
+SCHEMA = Path(__file__).resolve().parents[2] / "docs" / "cli.schema.json"
+NO_JSON = {"demo"}
+"""Commands that print nothing: the panel."""
+SEEN: set[str] = set()
+DRIVE = ("sim:atv71@2", "-d", "2")
+
+
+def documents(text: str) -> list[dict[str, Any]]:
+    """Each document of an output, one or a list or one a line; all fit the schema."""
+    try:
+        whole = json.loads(text)
+    except ValueError:
+        whole = [json.loads(line) for line in text.splitlines()]
+    found = whole if isinstance(whole, list) else [whole]
+    for one in found:
+        form = type(document_of(json.dumps(one)))
+        assert one["schema"] == 1
+        SEEN.add(form.__name__)
+    return found
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with a set of an Altivar 71, and one of its blocks."""
+    folder = tmp_path_factory.mktemp("sets")
+    ended(0, "backup", *DRIVE, folder / "set.toml")
+    ended(0, "block", DRIVE[0], "save", folder / "slots.toml", *DRIVE[1:])
+    text = (folder / "set.toml").read_text("utf-8")
+    (folder / "other.toml").write_text(
+        text.replace('ACC = { raw = 30, value = "3.0 s"', 'ACC = { value = "4.5 s"'), "utf-8"
+    )
+    return folder
+
+
+RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
+    "a value": (0, ("read", *DRIVE, "ACC", "ETA"), "ReadTold"),
+    "two drives": (3, ("read", *DRIVE, "-d", "9", "ACC"), "ErrorTold"),
+    "who it is": (0, ("identify", *DRIVE), "IdentityTold"),
+    "what it does": (0, ("status", *DRIVE), "StatusTold"),
+    "cycles": (0, ("watch", *DRIVE, "--every", "0.1", "--count", "2"), "CycleTold"),
+    "a reference": (0, ("reference", *DRIVE, "20", "--arm"), "CommandTold"),
+    "stops": (0, ("stop", DRIVE[0], "--all"), "StopTold"),
+    "a stop": (0, ("stop", *DRIVE), "StopTold"),
+    "a write": (0, ("write", *DRIVE, "ACC=4", "--arm"), "WriteTold"),
+    "a write that would be": (0, ("write", *DRIVE, "ACC=4", "--dry-run"), "WriteTold"),
+    "a write that is refused": (5, ("write", *DRIVE, "BIR=1", "--arm"), "WriteTold"),
+    "a backup": (0, ("backup", *DRIVE, "FOLDER/new.toml"), "BackupTold"),
+    "a report": (0, ("report", *DRIVE, "FOLDER/new.md"), "ReportTold"),
+    "a plan": (0, ("restore", DRIVE[0], "FOLDER/other.toml", "--dry-run", *DRIVE[1:]),
+               "RestoreTold"),
+    "a restoring": (0, ("restore", DRIVE[0], "FOLDER/other.toml", "--arm", *DRIVE[1:]),
+                    "RestoreTold"),
+    "the journal": (0, ("journal", "--since", "1h"), "JournalTold"),
+    "a comparison": (1, ("compare", "FOLDER/set.toml", "FOLDER/other.toml"), "CompareTold"),
+    "blocks": (0, ("block", *DRIVE), "BlocksTold"),
+    "blocks compared": (0, ("block", DRIVE[0], "verify", *DRIVE[1:]), "BlocksTold"),
+    "no blocks": (0, ("block", "sim:atv312"), "BlocksTold"),
+    "a block that would be": (
+        0, ("block", DRIVE[0], "set", "NMA3=LCR", "--dry-run", *DRIVE[1:]), "BlockChangeTold",
+    ),
+    "a block that is": (0, ("block", DRIVE[0], "set", "NMA3=LCR", "--arm", *DRIVE[1:]),
+                        "BlocksTold"),
+    "a block in a file": (0, ("block", DRIVE[0], "save", "FOLDER/more.toml", *DRIVE[1:]),
+                          "BlockFileTold"),
+    "what is taught": (0, ("teach", "sim:powerdrive", "-p", "powerdrive"), "TaughtTold"),
+    "a lesson": (0, ("teach", "sim:powerdrive", "-p", "powerdrive", "1.21", "90", "rpm"),
+                 "LessonTold"),
+    "what is forgotten": (
+        0, ("teach", "sim:powerdrive", "-p", "powerdrive", "1.21", "--forget"), "TeachChangeTold",
+    ),
+    "profiles": (0, ("profiles",), "ProfileTold"),
+    "a profile": (0, ("profiles", "atv312"), "ProfileShown"),
+    "its wiring": (0, ("profiles", "atv312", "--wiring"), "WiringTold"),
+    "its folder": (0, ("profiles", "path"), "ProfileFolder"),
+    "a new one": (0, ("profiles", "new", "mine", "--from", "atv312"), "ProfileBegun"),
+    "a check": (2, ("profiles", "--check", "FOLDER/set.toml"), "CheckTold"),
+    "ports": (0, ("ports",), ""),
+    "no such code": (2, ("read", *DRIVE, "NOSUCH"), "ErrorTold"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", RUNS)
+def test_what_a_command_prints_fits_the_schema(name: str, folder: Path) -> None:
+    status, words, form = RUNS[name]
+    typed = [word.replace("FOLDER", str(folder)) for word in words]
+    told = documents(ended(status, *typed, "--json").stdout)
+    assert all(one["command"] == words[0] for one in told)
+    assert not form or form in SEEN
+
+
+def test_a_motor_that_runs_and_its_stop() -> None:
+    done = drivepanel("run", *DRIVE, "--reference", "20Hz", "--for", "2", "--arm", "--json")
+    assert done.returncode == 0, done.stderr
+    events = [one["event"] for one in documents(done.stdout)]
+    assert {"reference", "order", "state", "stopping", "stopped"} <= set(events)
+
+
+def test_a_drive_that_is_held() -> None:
+    with served([*DRIVEPANEL, "hold", *DRIVE, "--json"], ready="{") as holding:
+        (told,) = documents(holding.ready)
+    assert (told["event"], told["timeout"]["seconds"]) == ("holding", 10.0)
+    assert "HoldTold" in SEEN
+
+
+def test_what_a_stop_sent_first_is_told() -> None:
+    (told,) = documents(ended(0, "stop", *DRIVE, "--json").stdout)
+    (first,) = told["first"]
+    assert (first["address"], first["word"], first["answer"]) == (8501, 7, "ok")
+    assert "atv71" in first["families"]
+
+
+async def test_a_drive_in_fault() -> None:
+    async with fault_status.line("atv71") as opened:
+        fault_status.provoke(opened, "ObF")
+        status = await fault_status.status_of(opened, "atv71")
+    told = {"schema": 1, "command": "status", **status_json("demo", status)}
+    (one,) = documents(json.dumps(told))
+    assert one["fault"]["look_at"]
+    assert one["fault"]["reset"]
+
+
+def test_a_simulated_line() -> None:
+    simulate = [*DRIVEPANEL, "simulate", "atv71@2", "--tcp", "127.0.0.1:0", "--json"]
+    with served(simulate, ready="{") as simulation:
+        (told,) = documents(simulation.ready)
+    assert port_of(told["line"])
+    assert told["drives"] == [{"profile": "atv71", "device": 2}]
+
+
+def test_every_command_has_json() -> None:
+    tried = {words[0] for _, words, _ in RUNS.values()} | {"run", "reset", "simulate", "hold"}
+    assert tried == set(COMMANDS) - NO_JSON
+    for name in tried:
+        assert "--json" in invoked(name, "--help").stdout
+
+
+def test_the_committed_schema_is_up_to_date() -> None:
+    assert SCHEMA.read_text("utf-8") == documents_schema()
+
+
+WRONG: dict[str, Any] = {
+    "another version": {"schema": 2},
+    "a field that is not told": {"more": 1},
+    "a field that is missing": {"values": None},
+}
+
+
+@pytest.mark.parametrize("change", WRONG.values(), ids=WRONG.keys())
+def test_the_check_sees_what_it_is_for(change: dict[str, Any]) -> None:
+    (told,) = documents(ended(0, "read", *DRIVE, "ACC", "--json").stdout)
+    with pytest.raises(ValueError, match="ReadTold"):
+        document_of(json.dumps({**told, **change}))
+
+
+def forms() -> Iterator[str]:
+    """The names of all documents."""
+    yield from (form.__name__ for form in DOCUMENTS)
+
+
+def test_documents_have_names_of_their_own() -> None:
+    assert len(set(forms())) == len(DOCUMENTS)

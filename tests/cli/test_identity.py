@@ -1,0 +1,96 @@
+"""A profile named by -p, against what the drive says of itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import pytest
+
+from .commands import ended, held, motor, put, refused, run, tcp_line
+
+CMD, ACC = 8501, 9001
+
+
+@pytest.fixture(scope="module")
+def atv71() -> Iterator[str]:
+    with tcp_line("atv71@1") as line:
+        yield line
+
+
+COMMANDS: dict[str, tuple[str, ...]] = {
+    "read": ("read", "{line}", "ETA"),
+    "watch": ("watch", "{line}", "ETA", "--count", "1"),
+    "status": ("status", "{line}"),
+    "write": ("write", "{line}", "ACC=7s", "--arm"),
+    "a trial of write": ("write", "{line}", "ACC=7s", "--dry-run"),
+    "backup": ("backup", "{line}", "{folder}/b.toml"),
+    "report": ("report", "{line}", "{folder}/r.md"),
+    "compare": ("compare", "{line}", "factory"),
+    "reference": ("reference", "{line}", "20Hz", "--arm"),
+    "reset": ("reset", "{line}", "--arm"),
+    "block": ("block", "{line}"),
+    "teach": ("teach", "{line}"),
+}
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_5_a_drive_that_is_another_is_told_and_not_written(
+    atv71: str, command: str, tmp_path: object
+) -> None:
+    words = [one.format(line=atv71, folder=tmp_path) for one in COMMANDS[command]]
+    before = [held(atv71, address) for address in (CMD, ACC)]
+    said = refused(5, *words, "-p", "atv312")
+    assert "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312." in said
+    assert "-p atv71" in said
+    assert [held(atv71, address) for address in (CMD, ACC)] == before
+
+
+def test_restore_is_refused_too(atv71: str, tmp_path: object) -> None:
+    backup = f"{tmp_path}/b.toml"
+    run(0, "backup", atv71, backup)
+    said = refused(5, "restore", atv71, backup, "--arm", "-p", "atv312")
+    assert "says it is ATV71HU15M3" in said
+
+
+def test_run_is_refused_too(atv71: str) -> None:
+    said = motor(5, atv71, "--arm", "--for", "1", "-p", "atv312")
+    assert "says it is ATV71HU15M3" in said
+    assert held(atv71, CMD) == 0
+
+
+@pytest.mark.parametrize("profile", ["atv71", "ATV71"])
+def test_the_drives_own_profile_is_taken(atv71: str, profile: str) -> None:
+    assert "ETA" in run(0, "read", atv71, "ETA", "-p", profile)
+
+
+def test_forced_it_reads_watches_and_writes_and_says_so(atv71: str) -> None:
+    put(atv71, ACC, 30)
+    for words in (("read", atv71, "ETA"), ("watch", atv71, "ETA", "--count", "1")):
+        done = ended(0, *words, "-p", "atv312", "--force-profile")
+        assert "By --force-profile it is taken as one all the same" in done.stderr
+        assert "ETA" in done.stdout
+    done = ended(0, "write", atv71, "ACC=4s", "-p", "atv312", "--force-profile", "--arm")
+    assert "says it is ATV71HU15M3" in done.stderr
+    assert held(atv71, ACC) == 40
+
+
+NEVER = ("run", "reference", "reset", "restore", "block", "teach", "backup", "report", "compare")
+
+
+@pytest.mark.parametrize("command", NEVER)
+def test_2_what_moves_or_keeps_goes_by_the_drives_own_only(atv71: str, command: str) -> None:
+    more = {"reference": ["20Hz"], "restore": ["x"], "backup": ["x"], "report": ["x"]}
+    words = [command, atv71, *more.get(command, ["factory"] if command == "compare" else [])]
+    said = refused(2, *words, "-p", "atv312", "--force-profile")
+    assert f"--force-profile is not for {command}" in said
+
+
+@pytest.mark.parametrize("family", ["powerdrive", "varmeca"])
+def test_a_family_that_says_nothing_contradicts_nothing(family: str) -> None:
+    with tcp_line("powerdrive@1") as line:
+        assert "10.40" in run(0, "read", line, "10.40", "-p", family)
+
+
+def test_3_nobody_is_there_to_contradict() -> None:
+    with tcp_line("powerdrive@1") as line:
+        refused(3, "read", line, "10.40", "-p", "powerdrive", "-d", "9")

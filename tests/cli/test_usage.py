@@ -1,0 +1,84 @@
+"""What a person types wrong, and where `-v` and `--json` may stand."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from tui.cli.main import COMMANDS
+
+from .commands import ended, invoked, refused, run
+
+SIM = ("sim:atv71@2", "-d", "2")
+
+
+@pytest.mark.parametrize(
+    ("typed", "meant"), [("sttaus", "status"), ("Reed", "read"), ("wirte", "write")]
+)
+def test_a_misspelt_command_is_told_and_opens_no_panel(typed: str, meant: str) -> None:
+    for words in ((typed, *SIM), ("--read-only", typed), (typed,)):
+        said = refused(2, *words)
+        assert f"{typed}: no such command, did you mean {meant}?" in said
+
+
+def test_a_word_like_no_command_is_told_too() -> None:
+    assert "xyzzy: no such command, and no LINE." in refused(2, "xyzzy")
+
+
+@pytest.mark.parametrize("line", ["tcp:10.0.0.5", "COM3", "com3,9600", "/dev/ttyX", "sim:atv71"])
+def test_a_line_is_still_one(line: str) -> None:
+    assert "The panel needs a terminal" in refused(2, line)
+
+
+@pytest.mark.parametrize("place", range(4))
+def test_v_may_stand_anywhere(place: int) -> None:
+    words = ["read", *SIM, "ACC"]
+    words.insert(place, "-v")
+    assert "3.0" in run(0, *words)
+
+
+def test_v_behind_two_dashes_is_a_word_like_any_other() -> None:
+    assert "'-v'" in refused(2, "read", *SIM, "--", "-v")
+
+
+ERRORS = {
+    "a word that is no command": ((), "sttaus", 2),
+    "an option that is none": (("--nosuch",), "read", 2),
+    "nothing at all": ((), "read", 2),
+    "a code that is none": ((*SIM, "NOSUCH"), "read", 2),
+    "nobody there": (("sim:atv71@2", "-d", "9", "ACC"), "read", 3),
+    "not armed": ((*SIM, "ACC=5"), "write", 5),
+    "a motor not armed": (SIM, "run", 5),
+}
+
+
+@pytest.mark.parametrize(("words", "command", "status"), ERRORS.values(), ids=ERRORS.keys())
+def test_an_error_is_one_object_on_standard_output_too(
+    words: tuple[str, ...], command: str, status: int
+) -> None:
+    done = ended(status, command, *words, "--json")
+    told = json.loads(done.stdout)
+    known = command if command in COMMANDS else None
+    assert told == {"schema": 1, "command": known, "error": told["error"], "status": status}
+    assert done.stderr == f"drivepanel: {told['error']}\n"
+
+
+def test_without_json_standard_output_stays_empty() -> None:
+    assert ended(2, "read", *SIM, "NOSUCH").stdout == ""
+
+
+def test_the_statuses_stand_in_the_help() -> None:
+    told = invoked("--help").stdout
+    for status in ("0  done", "1  different", "70  an error", "130  ended by Ctrl-C"):
+        assert status in told
+
+
+def test_an_end_by_ctrl_c_is_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("tui.bus.transport.ports.list_ports", interrupted)
+    done = ended(130, "ports", "--json")
+    assert json.loads(done.stdout)["status"] == 130
+    assert "Ended by Ctrl-C" in done.stderr

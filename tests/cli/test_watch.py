@@ -1,0 +1,214 @@
+"""`drivepanel watch`: what is good, CSV files that are not lost, several drives."""
+
+from __future__ import annotations
+
+import csv
+import itertools
+import json
+import time
+from datetime import date, datetime
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.programs import DRIVEPANEL, PATIENCE, port_of, served, simulated
+from tui.cli.shared.csv_files import CsvFile
+from tui.cli.shared.errors import Failure
+
+from .commands import ended, refused, run
+
+LINE = ("sim:atv71@2", "-d", "2")
+SHORT = ("--every", "0.1", "--count")
+
+
+def cycles(*arguments: str) -> list[dict[str, Any]]:
+    """The objects that `watch --json` prints."""
+    told = run(0, "watch", *arguments, "--json")
+    return [json.loads(line) for line in told.splitlines()]
+
+
+def test_nothing_is_good_once_the_server_is_gone() -> None:
+    with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)},timeout=0.2"
+        watch = ("watch", line, "-d", "2", "ETA", "RFR", "--every", "0.1", "--json")
+        with served([*DRIVEPANEL, *watch], ready="{") as watching:
+            first = last = json.loads(watching.ready)
+            assert first["error"] is None
+            assert {value["quality"] for value in first["values"].values()} == {"good"}
+            assert first["state"] == "blocked"
+            assert watching.process.stdout is not None
+            simulation.end()
+            end = time.monotonic() + PATIENCE
+            while (told := json.loads(watching.process.stdout.readline()))["error"] is None:
+                assert time.monotonic() < end
+                last = told
+            for _ in range(3):
+                assert {value["quality"] for value in told["values"].values()} == {"stale"}
+                assert (told["state"], told["direction"]) == (None, None)
+                before = last["values"]["ETA"]["time"]
+                assert told["values"]["ETA"]["time"] == before
+                assert told["time"] > before
+                told = json.loads(watching.process.stdout.readline())
+            watching.process.kill()
+
+
+def test_every_value_has_its_own_time_and_is_read_in_its_cycle() -> None:
+    told = cycles(*LINE, *SHORT, "3")
+    assert len(told) == 3
+    for before, now in itertools.pairwise(told):
+        for value in now["values"].values():
+            assert value["quality"] == "good"
+            read = datetime.fromisoformat(value["time"])
+            assert datetime.fromisoformat(before["time"]) <= read
+            assert read <= datetime.fromisoformat(now["time"])
+
+
+def test_no_state_where_its_words_are_not_watched() -> None:
+    (told,) = cycles(*LINE, "RFR", *SHORT, "1")
+    assert (told["state"], told["direction"], told["error"]) == (None, None, None)
+
+
+def test_several_drives() -> None:
+    line = ("sim:atv71@1,atv312@2", "-d", "1", "-d", "2", "-d", "1")
+    told = cycles(*line, "ETA", *SHORT, "2")
+    assert sorted((one["device"], one["profile"]) for one in told) == [
+        (1, "atv71"), (1, "atv71"), (2, "atv312"), (2, "atv312"),
+    ]  # fmt: skip
+    text = run(0, "watch", *line, "ETA", *SHORT, "1")
+    assert "device 1" in text
+    assert "device 2" in text
+
+
+def test_several_drives_in_one_file(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    line = ("sim:atv71@1,atv312@2", "-d", "1", "-d", "2")
+    run(0, "watch", *line, "RFR", "ETA", *SHORT, "1", "--csv", file)
+    with file.open(newline="", encoding="utf-8") as opened:
+        rows = list(csv.DictReader(opened))
+    assert {row["device"]: row["ETA"] for row in rows} == {"1": "16#0250", "2": "16#0240"}
+    assert {row["state"] for row in rows} == {"blocked"}
+
+
+# Files
+
+
+def test_a_file_is_replaced_or_continued_only_as_told(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    watch = ("watch", *LINE, "ETA", *SHORT, "1", "--csv", file)
+    run(0, *watch)
+    text = file.read_text("utf-8")
+    assert "is there already" in refused(2, *watch)
+    assert file.read_text("utf-8") == text
+    run(0, *watch, "--append")
+    assert file.read_text("utf-8").startswith(text)
+    assert len(file.read_text("utf-8").splitlines()) == 3
+    run(0, *watch, "--force")
+    assert len(file.read_text("utf-8").splitlines()) == 2
+
+
+@pytest.mark.parametrize(
+    "options",
+    [("--append",), ("--rotate", "day"), ("--csv", "x.csv", "--append", "--force"),
+     ("--csv", "x.csv", "--rotate", "soon"), ("--csv", "x.csv", "--rotate", "0MB")],
+)  # fmt: skip
+def test_2_options_that_do_not_fit(options: tuple[str, ...]) -> None:
+    refused(2, "watch", *LINE, "ETA", *SHORT, "1", *options)
+    assert not Path("x.csv").exists()
+
+
+def test_other_columns_are_not_appended(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text("time,other\n", encoding="utf-8")
+    watch = ("watch", *LINE, "ETA", *SHORT, "1", "--csv", file)
+    assert "other columns" in refused(2, *watch, "--append")
+    assert file.read_text("utf-8") == "time,other\n"
+
+
+def test_a_row_that_a_crash_has_cut_stays_alone(tmp_path: Path) -> None:
+    file = tmp_path / "run.csv"
+    file.write_text("time,a\r\n1,2\r\n3", encoding="utf-8", newline="")
+    more = CsvFile(file, ["time", "a"], append=True)
+    more.write(["5", "6"])
+    more.close()
+    assert file.read_text("utf-8").splitlines() == ["time,a", "1,2", "3", "5,6"]
+
+
+def test_rotation_by_size_loses_no_row(tmp_path: Path) -> None:
+    file = CsvFile(tmp_path / "run.csv", ["time", "a"], rotate=100)
+    for number in range(40):
+        file.write([f"{number:06d}", "x" * 10])
+    file.close()
+    found = sorted(tmp_path.glob("run*.csv"))
+    assert len(found) > 5
+    rows = []
+    for path in found:
+        head, *more = path.read_text("utf-8").splitlines()
+        assert head == "time,a"
+        assert path.stat().st_size <= 100
+        rows += more
+    assert sorted(rows) == [f"{number:06d},{'x' * 10}" for number in range(40)]
+
+
+def test_rotation_by_day(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class Today(date):
+        now = date(2026, 11, 22)
+
+        @classmethod
+        def today(cls) -> date:  # type: ignore[override]
+            return cls.now
+
+    monkeypatch.setattr("tui.cli.shared.csv_files.date", Today)
+    file = CsvFile(tmp_path / "run.csv", ["time"], rotate="day")
+    file.write(["one"])
+    file.write(["two"])
+    Today.now = date(2026, 11, 23)
+    file.write(["three"])
+    file.close()
+    assert (tmp_path / "run-2026-11-22.csv").read_text("utf-8").split() == ["time", "one", "two"]
+    assert (tmp_path / "run.csv").read_text("utf-8").split() == ["time", "three"]
+
+
+def test_a_full_disk_is_told() -> None:
+    with pytest.raises(Failure, match="cannot be written: No space left"):
+        CsvFile(Path("/dev/full"), ["time"], force=True)
+
+
+# Repeated -d
+
+
+@pytest.mark.parametrize(
+    "command",
+    [("write", "ACC=5", "--arm"), ("run", "--arm"), ("reference", "5", "--arm"),
+     ("reset", "--arm"), ("backup", "x.toml"), ("report", "x.md"), ("teach",), ("block",)],
+)  # fmt: skip
+def test_2_a_command_for_one_drive_takes_one(command: tuple[str, ...]) -> None:
+    name, *more = command
+    said = refused(2, name, "sim:atv71@1,atv71@2", *more, "-d", "1", "-d", "2")
+    assert "this command is for one drive" in said
+
+
+def test_the_panel_takes_one_drive() -> None:
+    assert "for one drive" in refused(2, "sim:atv71@1,atv71@2", "-d", "1", "-d", "2")
+
+
+@pytest.mark.parametrize("command", [("read", "ETA"), ("status",), ("identify",)])
+def test_several_drives_one_of_which_is_not_there(command: tuple[str, ...]) -> None:
+    name, *more = command
+    line = ("sim:atv71@1,atv312@2", "-d", "2", "-d", "9", "-d", "1")
+    done = ended(3, name, line[0], *more, *line[1:], "--json")
+    two, nine, one = json.loads(done.stdout)
+    assert (two["profile"], one["profile"]) == ("atv312", "atv71")
+    assert (nine["device"], nine["status"]) == (9, 3)
+    assert "did not answer" in nine["error"]
+    assert "Device 1:" in ended(3, name, line[0], *more, *line[1:]).stdout
+
+
+def test_several_drives_are_stopped() -> None:
+    line = ("sim:atv71@1,atv312@2", "-d", "2", "-d", "1")
+    told = run(0, "stop", *line)
+    assert "Device 1, Altivar 71: stopped" in told
+    assert "Device 2, Altivar 312: stopped" in told
+    done = ended(3, "stop", *line, "-d", "9")
+    assert "no answer at 9" in done.stderr
+    refused(2, "stop", *line, "--give-back", "--arm")

@@ -1,0 +1,151 @@
+"""A drive that says it is another than the profile it is taken by."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tui.bus.api import IdentificationObjects, Priority
+from tui.bus.errors import ChecksumFault, DeviceException, LineLost, NoAnswer
+from tui.drive.orders import OrderRefused
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+from tui.session.command.commander import Commander
+from tui.session.command.stop import Stopper
+from tui.session.command.stop_report import Phase
+from tui.session.connect.contradiction import contradiction, own_words
+from tui.session.connect.identify import DriveIdentity, identify_drive
+from tui.session.connect.limits import limits_of
+from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+from tui.simulator import DriveSpec
+
+from .fakes import OneDrive, parameter, profile_of
+from .test_stop import Start, ended, journal, start, wait_for, writes
+
+__all__ = ["journal", "start"]
+
+
+def said(reference: str) -> DriveIdentity:
+    fits = tuple(library.matching_profiles(reference)) if reference else ()
+    return DriveIdentity(1, "", reference, "", "", fits[0] if fits else None, fits)
+
+
+def of_kinds(*prefixes: str) -> Profile:
+    known = {"reference_prefixes": list(prefixes)}
+    return profile_of(parameter("A", 1), identification=known)
+
+
+@pytest.mark.parametrize(
+    ("reference", "profile"),
+    [
+        ("ATV71HU15M3", "atv312"),
+        ("ATV312HU09M3", "atv31"),
+        ("ATV31HU09M3S232", "atv312"),
+        ("ATV21H075M3X", "atv71"),
+        ("ATV71HU15M3", "powerdrive"),
+        ("VFD055CP43B", "atv71"),
+        ("ATV12H018M2", "atv312"),
+    ],
+)
+def test_another_kind_is_told_by_both_names(reference: str, profile: str) -> None:
+    told = contradiction(said(reference), library.load(profile))
+    assert told.startswith(f"Device 1 says it is {reference}")
+    assert library.load(profile).name in told
+
+
+@pytest.mark.parametrize(
+    ("reference", "profile"),
+    [
+        ("ATV71HU15M3", "atv71"),
+        ("ATV31HU09M3", "atv31"),
+        ("ATV31A075M3", "atv31"),  # a kind that no profile claims, of the same name
+        ("ATV31", "atv31"),
+        ("ATV31", "atv312"),  # cut short: it may be either
+        ("", "atv71"),
+        ("", "varmeca"),
+        ("VFD055CP43B", "powerdrive"),  # names no kinds: nothing to compare
+    ],
+)
+def test_what_may_be_is_no_contradiction(reference: str, profile: str) -> None:
+    assert contradiction(said(reference), library.load(profile)) == ""
+    assert contradiction(None, library.load(profile)) == ""
+
+
+def test_a_profile_of_the_users_own_is_compared_by_what_it_claims() -> None:
+    assert contradiction(said("PUMP 7"), of_kinds("PUMP")) == ""
+    assert contradiction(said("FAN 7"), of_kinds("PUMP"))
+    assert contradiction(said("FAN 7"), of_kinds()) == ""
+    assert contradiction(said("ATV71HU15M3"), of_kinds()), "another profile claims it"
+
+
+class Answering(OneDrive):
+    """A line whose drive answers function 43 so; `asked_by` lists the priorities."""
+
+    def __init__(self, answer: IdentificationObjects | Exception) -> None:
+        super().__init__({})
+        self.answer = answer
+        self.asked_by: list[Priority] = []
+
+    async def identify(
+        self, device: int, *, priority: Priority = Priority.OPERATOR_READ
+    ) -> IdentificationObjects:
+        self.asked_by.append(priority)
+        if isinstance(self.answer, Exception):
+            raise self.answer
+        return self.answer
+
+
+@pytest.mark.parametrize(
+    "error", [NoAnswer(1, 43, 0), DeviceException(1, 43, 0, code=1), ChecksumFault(1, 43, 0)]
+)
+async def test_who_says_nothing_is_asked_once_and_believed(error: Exception) -> None:
+    line = Answering(error)
+    assert await own_words(line, 1, library.load("powerdrive")) is None
+    assert line.asked_by == [Priority.BACKGROUND], "a silent family is not waited for long"
+
+
+async def test_a_lost_line_is_told() -> None:
+    with pytest.raises(LineLost):
+        await own_words(Answering(LineLost("unplugged")), 1, library.load("atv71"))
+
+
+@pytest.mark.parametrize("family", ["atv71", "powerdrive"])
+def test_a_contradicted_drive_is_never_armed(family: str) -> None:
+    identity = said("ATV312HU09M3")
+    session = DriveSession(OneDrive({}), 1, library.load(family), identity)
+    with pytest.raises(OrderRefused, match="says it is ATV312HU09M3, Altivar 312"):
+        session.arming.arm()
+    # neither where its state is read first
+    with pytest.raises(OrderRefused, match="not the drive's own"):
+        Commander(session, Journal()).arm()
+    assert not session.arming.armed
+
+
+def test_a_drive_that_fits_is_armed() -> None:
+    identity = replace(said("ATV312HU09M3"), device=1)
+    session = DriveSession(OneDrive({}), 1, library.load("atv312"), identity)
+    assert session.contradiction == ""
+    session.arming.arm()
+
+
+async def test_a_contradicted_drive_is_stopped_as_what_it_says_it_is(
+    start: Start, journal: Journal
+) -> None:
+    """16#0007, the ramp stop of an Altivar 312, runs an Altivar 71 in the I/O profile."""
+    simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0}))
+    drive = simulation.drive(1)
+    identity = await identify_drive(line, 1)
+    line.describe(1, limits_of(library.load("atv71")))
+    for address, word in ((8502, 200), (8501, 1)):
+        await line.write(1, address, [word])
+    await wait_for(lambda: drive.motor.frequency > 15)
+    session = DriveSession(line, 1, library.load("atv312"), identity)
+    sent = len(writes(line))
+    stopper = Stopper(line, journal)
+    for _ in range(2):
+        stopper.stop([session])
+        assert (await ended(stopper, 1)).phase is Phase.STOPPED
+    assert {word for address, word in writes(line)[sent:] if address == 8501} == {0x0000}
+    assert drive.motor.frequency == 0

@@ -1,0 +1,46 @@
+"""A profile that was typed on Line, against what a drive says of itself."""
+
+from __future__ import annotations
+
+import pytest
+from textual.widgets import Input
+
+from tui.screens.monitor.screen import MonitorScreen
+from tui.simulator import DriveSpec
+
+from .test_flows import shown, until
+from .test_search_flows import panel, said
+
+
+@pytest.fixture(autouse=True)
+def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+async def test_a_drive_is_not_armed_by_a_profile_that_it_contradicts() -> None:
+    async with panel(DriveSpec("atv71", 1)) as (app, pilot):
+        await until(pilot, lambda: app.connection.drives.has_focus)
+        field = app.connection.query_one("#profile", Input)
+        field.value = "atv312"
+        await pilot.press("s")
+        told = "Device 1 says it is ATV71HU15M3, Altivar 71: it is not an Altivar 312."
+        await until(pilot, lambda: any(one.startswith(told) for one in said(app)))
+        way = "Not armed: the profile is not its own. Type atv71 beside Profile, then s."
+        await until(pilot, lambda: way in shown(app, "about"))
+        app.connection.drives.focus()
+        await pilot.press("enter")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        await pilot.press("a")
+        await until(pilot, lambda: said(app)[-1].startswith(f"Not armed: {told}"))
+        console = app.connection.found[1].console
+        assert console is not None
+        assert console.commander.armed_for is None
+        # its own profile, and it is armed as ever
+        await pilot.press("1")
+        await until(pilot, lambda: app.screen is app.connection)
+        field.value = ""
+        await pilot.press("s")
+        await until(pilot, lambda: "not its own" not in shown(app, "about"))
+        drive = app.connection.found[1]
+        assert drive.session is not None
+        assert drive.session.profile.id == "atv71"

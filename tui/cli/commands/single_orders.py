@@ -1,0 +1,143 @@
+"""`drivepanel reference` and `reset`: one command to a drive."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable, Coroutine
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tui.drive.orders import chart_in_force, follows_from
+
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure, told
+from ..shared.messages import Messages
+from ..shared.options import (
+    Target,
+    drive_options,
+    json_option,
+    line_argument,
+    never_forced,
+    on_line,
+    read_only_option,
+)
+from .orders import (
+    COMMAND_POLL_INTERVAL,
+    arm_drive,
+    arm_option,
+    carried_out,
+    latest_of,
+    need_arming,
+    watched,
+)
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.console import DriveConsole
+    from tui.session.work import Outcome
+
+FAULT_GONE_WITHIN = 3.0
+"""Seconds that a drive may take to leave its fault after a reset."""
+
+
+def _ordered(
+    target: Target,
+    read_only: bool,
+    work: Callable[[DriveConsole, Messages], Coroutine[Any, Any, str]],
+    *,
+    as_json: bool,
+) -> None:
+    """Do the work at the armed drive and print what it came to."""
+    from ..shared.output import drive_json, print_json
+
+    messages = Messages(as_json=as_json)
+
+    async def at_console(opened: OpenLine) -> dict[str, Any]:
+        async with watched(opened, target) as (_, console):
+            arm_drive(console)
+            text = await work(console, messages)
+            messages.tell(text)
+            return {**drive_json(target.line_text, console.session), "text": text}
+
+    found = on_line(target, at_console, read_only=read_only)
+    if as_json:
+        print_json({**found, "messages": messages.texts})
+
+
+@click.command()
+@line_argument
+@click.argument("text", metavar="REFERENCE")
+@drive_options
+@arm_option
+@read_only_option
+@json_option
+@never_forced
+@told
+def reference(
+    target: Target,
+    text: str,
+    arm: bool,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Set a drive's reference: 30, 30.5Hz, 900rpm. Starts no motor."""
+    need_arming(arm, "reference writes the drive's reference; a running motor follows it")
+
+    async def work(console: DriveConsole, _: Messages) -> str:
+        commander = console.commander
+        return (await carried_out(commander, lambda: commander.refer(text))).text
+
+    _ordered(target, read_only, work, as_json=as_json)
+
+
+@click.command()
+@line_argument
+@drive_options
+@arm_option
+@read_only_option
+@json_option
+@never_forced
+@told
+def reset(
+    target: Target,
+    arm: bool,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Reset a drive's fault. Its cause must be gone.
+
+    It commands no run; a run command that waits at the terminals may start the motor.
+    """
+    need_arming(arm, "reset writes the drive's command word and ends its fault")
+
+    async def work(console: DriveConsole, messages: Messages) -> str:
+        session = console.session
+        chart = chart_in_force(session.profile, session.image.raws)
+        if chart is not None and (besides := follows_from(chart, "reset")):
+            messages.tell(besides)
+        outcome = await carried_out(console.commander, lambda: console.commander.order("reset"))
+        await _out_of_fault(console, outcome)
+        name, _, came = outcome.text.partition(":")
+        now = came.partition(";")[2]
+        return f"{name}: {latest_of(console).state.headline}{';' * bool(now)}{now}"
+
+    _ordered(target, read_only, work, as_json=as_json)
+
+
+async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
+    """Wait until the drive shows no fault any more; raises Failure where it stays in it."""
+    end = outcome.time + FAULT_GONE_WITHIN
+    while True:
+        latest = latest_of(console)
+        fresh = latest.time > outcome.time and not latest.error
+        if fresh and latest.state.kind not in ("fault", "unknown", "starting"):
+            return
+        if latest.time > end:
+            break
+        await asyncio.sleep(COMMAND_POLL_INTERVAL)
+    if latest.error:
+        raise Failure(latest.error, LINE_TROUBLE)
+    raise Failure(
+        f"The drive stays in {latest.state.headline}: its cause is not gone. Look at the machine.",
+        DRIVE_REFUSED,
+    )

@@ -1,0 +1,1 @@
+"""The documents that `--json` prints, field by field, and their JSON Schema."""

@@ -1,0 +1,141 @@
+"""Documents about a drive: what it says, does and was told to do."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+from msgspec import UNSET, UnsetType
+
+from .parts import (
+    ControlTold,
+    FaultTold,
+    FirstWordTold,
+    ModelTold,
+    OldTimeoutTold,
+    StateTold,
+    TimeoutTold,
+    ValueTold,
+    WatchedValueTold,
+)
+
+
+class DocumentTold(msgspec.Struct, forbid_unknown_fields=True, kw_only=True):
+    """What every document begins with."""
+
+    schema: Literal[1]
+    command: str | None
+
+
+class OfDriveTold(DocumentTold, kw_only=True):
+    """A document about one drive on the LINE as it was typed."""
+
+    line: str
+    device: int
+    profile: str | None
+    timeout: TimeoutTold | UnsetType | None = UNSET
+
+
+class ErrorTold(DocumentTold, kw_only=True):
+    """An error that ended the command, or that of one of several drives."""
+
+    error: str
+    status: int
+    line: str | UnsetType = UNSET
+    device: int | UnsetType = UNSET
+
+
+class ReadTold(OfDriveTold, kw_only=True):
+    """`read`: values by code."""
+
+    command: Literal["read"]
+    values: dict[str, ValueTold]
+
+
+class CycleTold(OfDriveTold, kw_only=True):
+    """`watch`: one cycle."""
+
+    command: Literal["watch"]
+    time: str
+    values: dict[str, WatchedValueTold]
+    state: str | None
+    direction: str | None
+    error: str | None
+
+
+class IdentityTold(OfDriveTold, kw_only=True):
+    """`identify`: who a drive says it is."""
+
+    command: Literal["identify"]
+    vendor: str
+    reference: str
+    version: str
+    name: str
+    model: ModelTold | None
+
+
+class StatusTold(OfDriveTold, kw_only=True):
+    """`status`: what a drive does and who commands it."""
+
+    command: Literal["status"]
+    state: StateTold
+    direction: str | None
+    fault: FaultTold | None
+    alarms: list[str]
+    commanded_by: str | None
+    reference_from: str | None
+    switched_by: list[str]
+    commandable: bool
+    why_not: str | None
+    control: ControlTold | None
+    watch: OldTimeoutTold | None
+    values: dict[str, ValueTold | None]
+
+
+class RunTold(DocumentTold, kw_only=True):
+    """`run`: one event."""
+
+    command: Literal["run"]
+    time: str
+    device: int
+    event: Literal[
+        "control", "reference", "order", "state", "ended", "stopping", "stopped", "left-running"
+    ]
+    text: str
+    state: str | UnsetType | None = UNSET
+    direction: str | UnsetType | None = UNSET
+    fault: str | UnsetType | None = UNSET
+    values: dict[str, ValueTold | None] | UnsetType = UNSET
+    error: str | UnsetType | None = UNSET
+    timeout: TimeoutTold | UnsetType | None = UNSET
+
+
+class HoldTold(DocumentTold, kw_only=True):
+    """`hold`: one event."""
+
+    command: Literal["hold"]
+    time: str
+    line: str
+    device: int
+    event: Literal["holding", "lost", "back", "fault"]
+    text: str
+    timeout: TimeoutTold | UnsetType | None = UNSET
+
+
+class CommandTold(OfDriveTold, kw_only=True):
+    """`reference`, `reset`: what the command came to."""
+
+    command: Literal["reference", "reset"]
+    text: str
+    messages: list[str]
+
+
+class StopTold(OfDriveTold, kw_only=True):
+    """`stop`: what became of one drive; a list with --all or several -d."""
+
+    command: Literal["stop"]
+    stopped: bool
+    text: str
+    status: int
+    first: list[FirstWordTold] | UnsetType = UNSET
+    given_back: str | UnsetType = UNSET

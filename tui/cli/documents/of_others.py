@@ -1,0 +1,127 @@
+"""Documents about ports, profiles and simulated lines."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+import msgspec
+
+from .of_drives import DocumentTold
+
+
+class PortTold(DocumentTold, kw_only=True):
+    """`ports`: one port of the list."""
+
+    command: Literal["ports"]
+    path: str
+    description: str
+    holder: str | None
+
+
+class ProfileTold(DocumentTold, kw_only=True):
+    """`profiles`: one of the list."""
+
+    command: Literal["profiles"]
+    id: str
+    name: str
+    vendor: str
+    parameters: int
+    own: bool
+    file: str
+    remark: str
+
+
+class ProfileShown(msgspec.Struct, kw_only=True):
+    """`profiles ID`: the profile itself, as profiles/profile.schema.json describes it."""
+
+    schema: Literal[1]
+    command: Literal["profiles"]
+    profile: dict[str, Any]
+    parameters: list[dict[str, Any]]
+
+
+class WiringTold(DocumentTold, kw_only=True):
+    """`profiles ID --wiring`."""
+
+    command: Literal["profiles"]
+    id: str
+    name: str
+    sections: list[dict[str, Any]]
+
+
+class CheckTold(DocumentTold, kw_only=True):
+    """`profiles --check`: one file of the list."""
+
+    command: Literal["profiles"]
+    file: str
+    faults: list[str]
+
+
+class ProfileBegun(DocumentTold, kw_only=True):
+    """`profiles new`."""
+
+    command: Literal["profiles"]
+    id: str
+    from_: str = msgspec.field(name="from")
+    file: str
+
+
+class ProfileFolder(DocumentTold, kw_only=True):
+    """`profiles path`."""
+
+    command: Literal["profiles"]
+    folder: str
+
+
+class SimulationReady(DocumentTold, kw_only=True):
+    """`simulate`: the line is served."""
+
+    command: Literal["simulate"]
+    event: Literal["ready"]
+    line: str
+    drives: list[dict[str, str | int]]
+
+
+class InputsTold(DocumentTold, kw_only=True):
+    """`simulate`: inputs of a drive were set or asked for."""
+
+    command: Literal["simulate"]
+    event: Literal["inputs"]
+    text: str
+
+
+class JournalEntryTold(msgspec.Struct, kw_only=True):
+    """One write, or a trip that was seen; `read_back` is what the drive held then or later."""
+
+    time: str
+    line: str
+    device: int
+    profile: str
+    code: str
+    address: int
+    old_raw: int | None
+    old: str
+    new_raw: int
+    new: str
+    answer: str
+    read_back: int | None
+    why: str
+    kind: Literal["write", "fault", "read-back"]
+    of: str
+
+
+class DamagedLineTold(msgspec.Struct, kw_only=True):
+    """A line of the journal that is no entry, with its beginning."""
+
+    file: str
+    line: int
+    text: str
+
+
+class JournalTold(DocumentTold, kw_only=True):
+    """`journal`: what was written to drives from here, oldest first."""
+
+    command: Literal["journal"]
+    journal: str
+    entries: list[JournalEntryTold]
+    damaged: list[DamagedLineTold]

@@ -1,0 +1,172 @@
+"""Objects inside the documents of `--json`."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+from msgspec import UNSET, UnsetType
+
+QualityTold = Literal["good", "stale", "bad"]
+
+
+class PartTold(msgspec.Struct, forbid_unknown_fields=True):
+    """Something whose every field is told here."""
+
+
+class ValueTold(PartTold):
+    """One value; `raw` and `value` are null where there is none."""
+
+    address: int
+    raw: int | None
+    value: int | float | None
+    unit: str
+    text: str
+    taught: bool
+    quality: QualityTold
+    unsure: bool | UnsetType = UNSET
+
+
+class WatchedValueTold(PartTold):
+    """One value of a cycle; `time` is when it was read, null where it never was."""
+
+    address: int
+    raw: int | None
+    value: int | float | None
+    unit: str
+    text: str
+    taught: bool
+    quality: QualityTold
+    time: str | None
+    error: str | None
+    unsure: bool | UnsetType = UNSET
+
+
+class TimeoutTold(PartTold):
+    """The communication time-out of a drive; all null where the drive does not tell it."""
+
+    seconds: float | None
+    reaction: str | None
+    fault: str | None
+    begun: bool | None
+
+
+class FirstWordTold(PartTold):
+    """A word that a stop sent before the drive had said what it is."""
+
+    address: int
+    word: int
+    families: list[str]
+    answer: str
+
+
+class ModelTold(PartTold):
+    """A drive's model by its own code word."""
+
+    code: int | None
+    text: str
+    reference: str | None
+    voltage: str | None
+    power_kw: int | float | str | None
+    variant: str | None
+    class_b: bool | None
+
+
+class StateTold(PartTold):
+    """The state of a drive's chart."""
+
+    id: str
+    name: str
+    kind: str
+
+
+class EditTold(PartTold):
+    """What became of one setting."""
+
+    code: str
+    typed: str | None
+    old: str | None
+    old_raw: int | None
+    new: str
+    new_raw: int
+    rounded: bool
+    outcome: Literal[
+        "done", "sent", "changed", "not-taken", "drive-refused", "refused", "unknown",
+        "not-sent", "held-back", "waits", "would-write",
+    ]  # fmt: skip
+    held: int | None
+    text: str
+
+
+class PlanItemTold(PartTold):
+    """One parameter of a set, and what becomes of it."""
+
+    code: str
+    kind: Literal["write", "equal", "skip"]
+    reason: str | None
+    text: str | None
+    old: str | None
+    new: str | None
+
+
+class ComparedSettingTold(PartTold):
+    """One parameter on both sides."""
+
+    code: str
+    name: str
+    group: str
+    a: str
+    b: str
+    raw_a: int | None
+    raw_b: int | None
+    differs: bool
+    remark: str | None
+
+
+class FaultTold(PartTold):
+    """The fault that a drive is in, with what it points at."""
+
+    raw: int | None
+    code: str | None
+    name: str | None
+    causes: list[str]
+    checks: list[str]
+    look_at: list[LookTold]
+    confidence: str | None
+    source: str | None
+    reset: ResetTold | None
+
+
+class LookTold(PartTold):
+    """A parameter that a fault points at."""
+
+    code: str
+    name: str
+    why: str
+    value: ValueTold | None
+
+
+class ResetTold(PartTold):
+    """How a fault is reset."""
+
+    way: str | None
+    confidence: str
+    possible_now: bool | None
+    wait_s: float | None
+
+
+class ControlTold(PartTold):
+    """Who has the control, and the commands that change that."""
+
+    taken: bool | None
+    take: str | None
+    give_back: str | None
+
+
+class OldTimeoutTold(PartTold):
+    """The communication time-out as `status` has told it; `timeout` takes its place."""
+
+    timeout_s: float
+    reaction: str | None
+    does: str | None
+    begun: bool

@@ -1,0 +1,120 @@
+"""What a shell may complete: lines, profiles, codes; nothing of it asks a drive."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
+import click
+from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+
+Items = list[CompletionItem[str]]
+
+KINDS_OF_LINE = {
+    "tcp:": "Modbus TCP: tcp:HOST[:PORT]",
+    "rtu-tcp:": "RTU over TCP: rtu-tcp:HOST:PORT",
+    "serial:": "a serial port with its settings: serial:PATH,BAUD,FORMAT",
+    "sim:": "simulated drives: sim:PROFILE[@ADDRESS],...",
+}
+FILE = CompletionItem("", type="file")
+
+
+def complete_line(_: click.Context, __: click.Parameter, incomplete: str) -> Items:
+    """Ports of this machine, and the other kinds of a LINE; profiles behind `sim:`."""
+    kind, colon, rest = incomplete.partition(":")
+    if kind.lower() == "sim" and colon:
+        before, comma, begun = rest.rpartition(",")
+        return [
+            CompletionItem(f"{kind}:{before}{comma}{item.value}", help=item.help)
+            for item in _profiles(begun)
+        ]
+    if incomplete.startswith(("/", ".")):
+        ports = [item for item in _ports() if item.value.startswith(incomplete)]
+        return ports or [CompletionItem(incomplete, type="file")]
+    known = [CompletionItem(text, help=what) for text, what in KINDS_OF_LINE.items()]
+    return [item for item in (*_ports(), *known) if item.value.startswith(incomplete)]
+
+
+def complete_side(context: click.Context, option: click.Parameter, incomplete: str) -> Items:
+    """What `compare` compares: a file, a LINE, or the factory."""
+    factory = [CompletionItem("factory", help="the factory settings")]
+    found = [item for item in factory if item.value.startswith(incomplete)]
+    return found or complete_line(context, option, incomplete) or [FILE]
+
+
+def complete_profile(_: click.Context, __: click.Parameter, incomplete: str) -> Items:
+    """Ids of the profiles."""
+    return _profiles(incomplete)
+
+
+def complete_code(context: click.Context, _: click.Parameter, incomplete: str) -> Items:
+    """Codes of the profile that `-p` names, or of the simulated drive."""
+    return _codes(context, incomplete)
+
+
+def complete_setting(context: click.Context, _: click.Parameter, incomplete: str) -> Items:
+    """CODE= for what can be written."""
+    if "=" in incomplete:
+        return []
+    return [
+        CompletionItem(f"{item.value}=", help=item.help)
+        for item in _codes(context, incomplete, writable=True)
+    ]
+
+
+def _ports() -> Iterator[CompletionItem[str]]:
+    from tui.bus.transport.ports import list_ports
+
+    yield from (CompletionItem(port.path, help=port.description) for port in list_ports())
+
+
+def _profiles(incomplete: str) -> Items:
+    from tui.drive.profile import library
+
+    return [
+        CompletionItem(listing.id, help=listing.name)
+        for listing in library.listings()
+        if listing.id.startswith(incomplete.lower())
+    ]
+
+
+def _codes(context: click.Context, incomplete: str, *, writable: bool = False) -> Items:
+    profile = _profile_of(context)
+    if profile is None:
+        return []
+    return [
+        CompletionItem(parameter.code, help=parameter.name)
+        for parameter in profile.parameters
+        if parameter.code.lower().startswith(incomplete.lower())
+        and not (writable and parameter.access == "r")
+    ]
+
+
+def _profile_of(context: click.Context) -> Profile | None:
+    """The profile that was typed, with -p or within a simulated LINE; None where none is known."""
+    from tui.drive.errors import DriveError
+    from tui.drive.profile import library
+
+    named = context.params.get("profile_id") or _simulated(context)
+    try:
+        return library.load(str(named)) if named else None
+    except DriveError:
+        return None
+
+
+def _simulated(context: click.Context) -> str:
+    kind, _, drives = str(context.params.get("line_text") or "").partition(":")
+    if kind.lower() != "sim":
+        return ""
+    from tui.simulator import SimulatorError, parse_drives
+
+    given = context.params.get("device") or 1
+    device = given[0] if isinstance(given, tuple) else given
+    try:
+        found = {drive.address: drive.profile for drive in parse_drives(drives)}
+    except SimulatorError:
+        return ""
+    return found.get(device, "")

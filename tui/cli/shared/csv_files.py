@@ -1,0 +1,153 @@
+"""CSV files of `watch`: begun anew, continued or replaced as told, and rotated."""
+
+from __future__ import annotations
+
+import csv
+import io
+import os
+import re
+from collections.abc import Sequence
+from contextlib import suppress
+from datetime import date, datetime
+from pathlib import Path
+from typing import TextIO
+
+import click
+
+from tui.drive.plain import plain_cells
+
+from .errors import USAGE, Failure
+
+_SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|M|G)i?B?", re.IGNORECASE)
+_FACTORS = {"k": 1_000, "m": 1_000_000, "g": 1_000_000_000}
+DAY = "day"
+
+
+def rotation(_: click.Context, option: click.Parameter, text: str | None) -> int | str | None:
+    """When a file is put aside and a new one begun: bytes for a size such as 10MB, or `day`."""
+    if text is None or text.strip().lower() == DAY:
+        return text and DAY
+    match = _SIZE.fullmatch(text.strip())
+    size = int(float(match[1]) * _FACTORS[match[2].lower()]) if match else 0
+    if not size:
+        wrong = f"{text!r} is neither a size, such as 500kB or 10MB, nor day."
+        raise click.BadParameter(wrong, param=option)
+    return size
+
+
+def refuse_unasked(path: Path, *, append: bool, force: bool) -> None:
+    """Raise Failure where a file exists and is neither to be continued nor replaced."""
+    if path.exists() and not (append or force):
+        raise Failure(f"{path} is there already. Use another name, --append or --force.", USAGE)
+
+
+class CsvFile:
+    """Rows in a CSV file, each there as soon as it was written.
+
+    Raises Failure where the file exists and is neither to be continued nor replaced, where it has
+    other columns than are to be written, and where it cannot be written.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        titles: Sequence[str],
+        *,
+        append: bool = False,
+        force: bool = False,
+        rotate: int | str | None = None,
+    ) -> None:
+        self.path = path
+        self.rows = 0
+        """Rows written by this command."""
+        self._titles = plain_cells(titles)
+        self._rotate = rotate
+        refuse_unasked(path, append=append, force=force)
+        self._day = date.today()
+        self._file = self._opened(append=append)
+
+    def _opened(self, *, append: bool) -> TextIO:
+        try:
+            if not append or not self.path.exists() or not self.path.stat().st_size:
+                return self._begun()
+            self._check_titles()
+            self._day = date.fromtimestamp(self.path.stat().st_mtime)
+            whole = _ends_with_a_line(self.path)
+            file = self.path.open("a", newline="", encoding="utf-8")
+            if not whole:  # a row that a crash has cut
+                file.write("\r\n")
+            return file
+        except OSError as error:
+            raise self._trouble(error) from error
+
+    def _begun(self) -> TextIO:
+        file = self.path.open("w", newline="", encoding="utf-8")
+        try:
+            csv.writer(file).writerow(plain_cells(self._titles))
+            file.flush()
+        except OSError:
+            with suppress(OSError):
+                file.close()
+            raise
+        return file
+
+    def _check_titles(self) -> None:
+        with self.path.open(newline="", encoding="utf-8", errors="replace") as file:
+            found = next(csv.reader(file), [])
+        if found != self._titles:
+            raise Failure(
+                f"{self.path} has other columns ({', '.join(found)[:200]}): use another name.",
+                USAGE,
+            )
+
+    def write(self, cells: Sequence[str]) -> None:
+        """Write a row; raises Failure where the disk does not take it."""
+        text = io.StringIO(newline="")
+        csv.writer(text).writerow(plain_cells(cells))
+        row = text.getvalue()
+        try:
+            if self._due(len(row.encode())):
+                self._put_aside()
+            self._file.write(row)
+            self._file.flush()
+        except OSError as error:
+            raise self._trouble(error) from error
+        self.rows += 1
+
+    def _due(self, more: int) -> bool:
+        if self._rotate == DAY:
+            return date.today() != self._day
+        if not isinstance(self._rotate, int):
+            return False
+        size = os.fstat(self._file.fileno()).st_size
+        head = len(",".join(self._titles)) + 2
+        return size > head and size + more > self._rotate
+
+    def _put_aside(self) -> None:
+        """Give what was written so far a name of its own, and begin anew."""
+        self._file.close()
+        by_day = self._rotate == DAY
+        when = self._day.isoformat() if by_day else f"{datetime.now():%Y-%m-%dT%H%M%S}"
+        aside, number = self._named(when), 2
+        while aside.exists():
+            aside, number = self._named(f"{when}-{number}"), number + 1
+        self.path.rename(aside)
+        self._day = date.today()
+        self._file = self._opened(append=False)
+
+    def _named(self, part: str) -> Path:
+        return self.path.with_name(f"{self.path.stem}-{part}{self.path.suffix}")
+
+    def _trouble(self, error: OSError) -> Failure:
+        return Failure(f"{self.path} cannot be written: {error.strerror or error}.", USAGE)
+
+    def close(self) -> None:
+        """Close the file; what a full disk did not take was told when it was written."""
+        with suppress(OSError):
+            self._file.close()
+
+
+def _ends_with_a_line(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read(1) == b"\n"

@@ -1,0 +1,63 @@
+"""Cycles of a watched drive as `watch` tells them: good is what was read in that very cycle."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from tui.session.drive_state import drive_state
+from tui.session.reading import Quality, Reading
+
+if TYPE_CHECKING:
+    from tui.session.drive import DriveSession
+    from tui.session.monitor.snapshot import Snapshot
+
+SNAPSHOTS_WAITING = 64
+"""Snapshots kept for an output that is slower than the line; older ones are dropped."""
+
+
+class Cycles:
+    """Takes snapshots in the line's thread, gives them out in a loop."""
+
+    def __init__(self, session: DriveSession, codes: Sequence[str]) -> None:
+        self.session = session
+        self._codes = codes
+        self._loop = asyncio.get_running_loop()
+        self._waiting: asyncio.Queue[Snapshot] = asyncio.Queue(SNAPSHOTS_WAITING)
+        self._before = float("-inf")
+        """When the cycle before ended (monotonic)."""
+
+    def take(self, snapshot: Snapshot) -> None:
+        """Hand a snapshot over; for the line's thread."""
+        told = self.as_read(snapshot)
+        self._loop.call_soon_threadsafe(self._put, told)
+
+    def _put(self, snapshot: Snapshot) -> None:
+        if self._waiting.full():
+            self._waiting.get_nowait()
+        self._waiting.put_nowait(snapshot)
+
+    async def next(self) -> Snapshot:
+        """The oldest one that waits, or the next."""
+        return await self._waiting.get()
+
+    def as_read(self, snapshot: Snapshot) -> Snapshot:
+        """The cycle with all codes in their order; what was not read in it is stale.
+
+        What was never read is bad, and says why. Its state is what those of now tell.
+        """
+        since, self._before = self._before, snapshot.time
+        readings: dict[str, Reading] = {}
+        for code in self._codes:
+            reading = snapshot.readings.get(code)
+            if reading is None:
+                parameter = self.session.profile[code]
+                reading = Reading.bad(parameter, snapshot.time, snapshot.error)
+            elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):
+                reading = replace(reading, quality=Quality.STALE)
+            readings[code] = reading
+        return replace(
+            snapshot, readings=readings, state=drive_state(self.session.profile, readings)
+        )

@@ -1,0 +1,47 @@
+"""One command at several drives of a line, in turn."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from .errors import DONE, failure_of
+from .options import Target
+from .output import print_json
+from .say import say
+
+Work = Callable[[Target], Awaitable[tuple[dict[str, Any], int]]]
+"""What is done at one drive: it says its lines, and gives its JSON and its exit status."""
+
+
+async def each_drive(target: Target, work: Work, *, as_json: bool) -> int:
+    """Do the work at every drive; with `as_json` print one document, or the list of several.
+
+    What is wrong with one of several is told and keeps it from no other. Returns the highest exit
+    status; raises what the work raises where there is one drive only.
+    """
+    targets = target.each()
+    documents: list[dict[str, Any]] = []
+    worst = DONE
+    for one in targets:
+        if len(targets) > 1 and not as_json:
+            say(f"Device {one.device}:")
+        try:
+            document, status = await work(one)
+        except Exception as error:
+            if len(targets) == 1:
+                raise
+            failure = failure_of(error)
+            document, status = failed(one, failure.message, failure.status), failure.status
+        documents.append(document)
+        worst = max(worst, status)
+    if as_json:
+        print_json(documents if len(targets) > 1 else documents[0])
+    return worst
+
+
+def failed(target: Target, text: str, status: int) -> dict[str, Any]:
+    """Tell what is wrong with one of several drives; the same as an object."""
+    who = "" if text.startswith(f"Device {target.device}") else f"Device {target.device}: "
+    say(f"drivepanel: {who}{text}", err=True)
+    return {"line": target.line_text, "device": target.device, "error": text, "status": status}
