@@ -25,17 +25,19 @@ from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
 
-from tests.defects import bus, commanding, drive, lines, scripts, watching
+from tests.defects import bus, commanding, drive, identity, lines, records, scripts, watching
 from tests.defects.defect import Defect
 
 ROOT = Path(__file__).resolve().parent.parent
-COPIED = ("tui", "tests", "profiles", "pyproject.toml", "README.md", "LICENSE")
+COPIED = ("tui", "tests", "benchmarks", "profiles", "pyproject.toml", "README.md", "LICENSE")
 DEFECTS: tuple[Defect, ...] = (
     *bus.DEFECTS,
     *drive.DEFECTS,
     *commanding.DEFECTS,
     *watching.DEFECTS,
+    *records.DEFECTS,
     *scripts.DEFECTS,
+    *identity.DEFECTS,
     *lines.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"

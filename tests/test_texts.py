@@ -30,7 +30,20 @@ MADE_ELSEWHERE = {
 }
 """What Textual would read as markup or send as it is, and what to take instead."""
 READ_AS_MARKUP = {"border_title", "border_subtitle", "tooltip"}
-PRINTING = {"print", "echo", "secho", "click.echo", "click.secho"}
+PRINTING = {
+    "print", "echo", "secho", "click.echo", "click.secho",
+    "sys.stdout.write", "sys.stderr.write", "sys.stdout.writelines", "sys.stderr.writelines",
+}  # fmt: skip
+PRINTS_THEMSELVES = (
+    PACKAGE / "drive" / "profile" / "json_schema.py",
+    PACKAGE / "cli" / "documents" / "json_schema.py",
+)
+"""Print what they have made themselves, for a redirection."""
+READS_ITSELF = {
+    PACKAGE / "terminal" / "abilities.py",
+    PACKAGE / "session" / "starts" / "processes.py",
+}
+"""Read files of the system's own, in /proc."""
 
 
 def faults(source: str, path: Path) -> Iterator[str]:
@@ -57,8 +70,12 @@ def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
         yield f"{name}: take {MADE_ELSEWHERE[name]}"
     if name == "Console" and not off:
         yield "a console with markup"
-    if ast.unparse(call.func) in PRINTING and path not in PRINTS:
+    if ast.unparse(call.func) in PRINTING and path not in (*PRINTS, *PRINTS_THEMSELVES):
         yield f"{name}: take say"
+    if name in ("read_text", "read_bytes") and path not in READS_ITSELF:
+        yield f"{name} waits for a pipe, and takes files of any length: take read_small_text"
+    if name in ("writerow", "writerows") and _name(call.args[0]) != "plain_cells":
+        yield f"{name}: take plain_cells"
     if name == "add_row" and PACKAGE / "cli" not in path.parents:
         for cell in call.args:
             if not (isinstance(cell, ast.Constant) or _name(cell) in ("Text", "assemble")):
@@ -107,6 +124,9 @@ def test_no_text_is_markup(path: Path) -> None:
         "print(name)",
         "table.add_row(name)",
         "table.add_row(Text(code), f'{name}')",
+        "sys.stdout.write(name)",
+        "rows.writerow([name])",
+        "path.read_text()",
     ],
 )
 def test_the_check_sees_what_it_is_for(line: str) -> None:
@@ -117,3 +137,4 @@ def test_what_is_right_passes() -> None:
     assert list(faults("console().print(table)", PACKAGE / "cli" / "new.py")) == []
     right = 'Plain(name); entry(Text(name)); table.add_row(Text(name), ""); app.notify(name)'
     assert list(faults(right, PACKAGE / "screens" / "new.py")) == []
+    assert list(faults("rows.writerow(plain_cells(row))", PACKAGE / "cli" / "new.py")) == []

@@ -11,6 +11,9 @@ ASKING = ("_DRIVEPANEL_COMPLETE", "DRIVEPANEL_LINE")
 
 def main() -> None:
     """Run the command line, or the panel where there is none."""
+    from tui.cli.shared.standard_streams import keep_streams
+
+    keep_streams()
     if len(sys.argv) == 1 and not any(os.environ.get(name) for name in ASKING):
         from tui.cli.alone import alone
 

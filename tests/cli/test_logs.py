@@ -76,3 +76,10 @@ def test_a_disk_that_hangs_holds_up_nobody_who_logs() -> None:
     with log_file().open("rb") as disk:  # lets the writer go
         assert b"stop of device 1" in disk.read()
     assert not held_up
+
+
+def test_a_line_of_the_log_commands_no_terminal() -> None:
+    start_logging(0)
+    logging.getLogger("tui.anything").warning("drive \x1b]0;x\x07\x9b2J\nsays")
+    stop_logging()
+    assert "WARNING drive ␛]0;x␇\ufffd2J\nsays" in log_file().read_text("utf-8")

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
 from tests.drive.test_add_a_drive import example
+from tui.cli.shared.logs import stop_logging
 from tui.cli.shared.output import json_text
 from tui.cli.shared.say import printable
 from tui.drive.plain import commands
 from tui.drive.profile import library
+from tui.drive.settings.set_file import read_set
 from tui.simulator import DriveSpec, Simulation
 
 from .commands import invoked, refused, run
@@ -42,7 +45,83 @@ def test_a_drives_name(line: str) -> None:
     assert f"Name       {SHOWN}\n" in printed
     text = run(0, "identify", line, "--json")
     assert tame(text)
-    assert json.loads(text)["name"] == NAME
+    # whoever takes it out of the JSON prints it on a terminal, too
+    assert json.loads(text)["name"] == SHOWN
+
+
+ESCAPED = json.dumps(NAME + "\x9b2J\u202e").replace("\x7f", "\\u007f")
+
+
+@pytest.fixture
+def evil(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A profile in which every name, unit and note commands the terminal."""
+    monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path))
+    (tmp_path / "profiles").mkdir()
+    whole = (library.packaged_folder() / "atv71.toml").read_text("utf-8")
+    text = re.sub(r'^id = "atv71"$', 'id = "evil"', whole, flags=re.M)
+    for key in ("name", "unit", "note", "summary", "group", "title", "does", "starts", "cause"):
+        text = re.sub(
+            rf'(?<![\w]){key} = "([^"\n]*)"',
+            lambda m, key=key: f'{key} = {ESCAPED[:-1]}{m[1]}"',  # type: ignore[misc]
+            text,
+        )
+    (tmp_path / "profiles" / "evil.toml").write_text(text, encoding="utf-8")
+    library.load.cache_clear()
+    faults = library.faults_of(tmp_path / "profiles" / "evil.toml")
+    assert faults == []
+    return "evil"
+
+
+READING = {
+    "identify": ("identify",),
+    "status": ("status",),
+    "status json": ("status", "--json"),
+    "read": ("read", "ACC", "ETA", "LCR"),
+    "read json": ("read", "ACC", "ETA", "LCR", "--json"),
+    "watch": ("watch", "ACC", "ETA", "--count", "2", "--every", "0.05", "--csv", "out.csv"),
+    "watch json": ("watch", "ACC", "--count", "2", "--every", "0.05", "--json"),
+    "backup": ("backup", "out.toml"),
+    "report": ("report", "out.md"),
+    "block": ("block",),
+    "save block": ("block", "save", "out-blocks.toml"),
+    "write": ("write", "ACC=4.0", "--arm"),
+    "write json": ("write", "CHCF=Separate", "--dry-run"),
+    "stop": ("stop",),
+    "reference": ("reference", "20", "--arm"),
+    "too much": ("reference", "9999", "--arm"),
+    "unknown": ("read", "\x1b[2J"),
+}
+
+
+@pytest.mark.parametrize("name", READING)
+def test_nothing_that_a_drive_or_a_profile_says_commands_a_terminal(
+    name: str, line: str, evil: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """On the terminal, in every file that is written, the journal and the log among them."""
+    monkeypatch.chdir(tmp_path)
+    command, *more = READING[name]
+    done = invoked(command, line, *more, "-p", evil)
+    assert done.exception is None or isinstance(done.exception, SystemExit), done.output
+    assert "Traceback" not in done.output
+    said = done.output + run(0, "journal") + run(0, "journal", "--json")
+    assert tame(said), ascii(said)
+    stop_logging()
+    written = [path for path in tmp_path.rglob("*") if path.is_file() and "evil" not in path.name]
+    for path in written:
+        assert tame(path.read_text("utf-8").replace("\r", "")), path
+    for argument in more:
+        if argument.startswith("out"):
+            assert tmp_path / argument in written
+
+
+def test_a_backup_of_names_that_command_is_read_as_it_was(
+    line: str, evil: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "set.toml"
+    run(0, "backup", line, path, "-p", evil)
+    values = read_set(path)
+    assert values.head.identity["name"] == SHOWN
+    assert values.head.family.startswith(NAME)
 
 
 def test_a_name_in_a_command_line() -> None:

@@ -10,6 +10,7 @@ import msgspec
 import pytest
 import tomli
 
+from tui.drive import small_file
 from tui.drive.errors import ProfileError
 from tui.drive.hints import RESETS, reset_ready, reset_text
 from tui.drive.profile import json_schema, library
@@ -41,13 +42,13 @@ def test_every_fault_of_a_family_has_help(family: str) -> None:
 
 def test_help_is_not_read_with_the_profile(monkeypatch: pytest.MonkeyPatch) -> None:
     read: list[Path] = []
-    text_of = Path.read_text
+    opened = small_file.open_regular
 
-    def watched(path: Path, *args: object, **options: object) -> str:
+    def watched(path: Path) -> int:
         read.append(path)
-        return text_of(path, *args, **options)  # type: ignore[arg-type]
+        return opened(path)
 
-    monkeypatch.setattr(Path, "read_text", watched)
+    monkeypatch.setattr(small_file, "open_regular", watched)
     profile = library.load_file(library.packaged_folder() / "atv71.toml")
     assert [path for path in read if path.parent == FOLDER] == []
     assert profile.guide.fault(18) is not None

@@ -118,6 +118,16 @@ def test_refusals_say_why(typed: str, words: str) -> None:
         encode(p, typed, {}, Decimal("0.1"))
 
 
+@pytest.mark.parametrize(
+    "typed", ["1e999999999", "-1e999999", "1e-999999999", "9" * 5000, "0." + "0" * 500 + "1"]
+)
+def test_numbers_that_nobody_means(typed: str) -> None:
+    p = parameter(unit="s", scale="0.1", min=1, max=9999)
+    with pytest.raises(ValueRefused, match="out of range") as refused:
+        encode(p, typed, {}, Decimal("0.1"))
+    assert len(str(refused.value)) < 100
+
+
 def test_names_are_typed_in_any_case_or_as_numbers() -> None:
     p = parameter(values={"0": "Terminals", "2": "Serial link"})
     names = {0: "Terminals", 2: "Serial link"}

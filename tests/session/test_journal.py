@@ -24,7 +24,7 @@ from tui.session import journal_file
 from tui.session.command.stop import Stopper
 from tui.session.command.stop_report import Phase
 from tui.session.journal import Entry, Journal
-from tui.session.report import entries_of
+from tui.session.journal_reading import entries_of
 
 PROGRAM = """
 import os, signal, sys, threading

@@ -10,8 +10,9 @@ import pytest
 from tests.programs import wait_until
 from tests.session.sets_bench import FAMILIES, bench
 from tui.session.connect.identify import identify_drive
+from tui.session.journal_reading import entries_of
 from tui.session.read.upload import Upload
-from tui.session.report import entries_of, report_text
+from tui.session.report import report_text
 
 SECTIONS = [
     "## Line settings of the drive",

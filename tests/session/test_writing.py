@@ -15,7 +15,8 @@ from tui.bus.fake_device import FakeDevice
 from tui.bus.requests import WriteOne
 from tui.session.arming import NotArmed
 from tui.session.drive import DriveSession
-from tui.session.journal import Journal
+from tui.session.journal import Entry, Journal
+from tui.session.journal_reading import completed, read_journal
 from tui.session.read.reader import Reader
 from tui.session.settings.write import NotTaken, Writer
 from tui.session.work import Permit, Stopped
@@ -233,3 +234,62 @@ async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
     await Reader(session).read(["INR"])
     await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
     assert order == ["read", "write", "read"]
+
+
+def told_of(journal: Journal) -> list[Entry]:
+    """What the journal's files tell, completions apart from what they complete."""
+    assert journal.flush(60)
+    return [one for one in read_journal(journal.files) if isinstance(one, Entry)]
+
+
+@pytest.mark.parametrize("taken", [True, False])
+async def test_a_lost_answer_is_completed_once_the_drive_is_read(
+    line: WilfulLine, session: DriveSession, journal: Journal, taken: bool
+) -> None:
+    await Reader(session).read(["ACC"])
+    line.fail_write(1, 10, NoAnswer(1, 6, 10), taken=taken)
+    with pytest.raises(NoAnswer):
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
+    # whoever reads it, and for whatever reason
+    await Reader(session).read(["ACC"])
+    await Reader(session).read(["ACC"])
+    lost, later = told_of(journal)
+    assert (lost.kind, lost.read_back) == ("write", None)
+    assert (later.kind, later.of, later.read_back) == ("read-back", lost.time, 50 if taken else 30)
+    (entry,) = completed([lost, later])
+    came = "Taken: it holds 5.0 s" if taken else "Not taken: it holds 3.0 s"
+    assert entry.answer == f"{lost.answer} {came}, read back later."
+    assert entry.read_back == later.read_back
+
+
+async def test_a_word_that_the_drive_may_change_is_told_and_not_judged(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    line.fail_write(1, 11, NoAnswer(1, 6, 11), taken=True)
+    with pytest.raises(NoAnswer):
+        await writer(session, journal).write_parameter(
+            PROFILE["INR"], 2, why="command", read_back=False
+        )
+    line.registers[11] = 1
+    await Reader(session).read(["INR"])
+    assert told_of(journal)[-1].answer == "It holds 1, read back later."
+
+
+async def test_a_lost_answer_is_not_completed_by_what_a_later_write_left(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    line.fail_write(1, 10, NoAnswer(1, 6, 10), times=1)
+    with pytest.raises(NoAnswer):
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
+    await writer(session, journal).write_parameter(PROFILE["ACC"], 40, why="setting")
+    assert [one.kind for one in told_of(journal)] == ["write", "write"]
+
+
+async def test_a_refused_write_has_its_answer(
+    line: WilfulLine, session: DriveSession, journal: Journal
+) -> None:
+    line.fail_write(1, 10, 4)
+    with pytest.raises(DeviceException):
+        await writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
+    await Reader(session).read(["ACC"])
+    assert [one.kind for one in told_of(journal)] == ["write"]

@@ -125,3 +125,19 @@ def test_a_message_that_warns_is_whole_at_first_and_one_line_later() -> None:
 @given(st.text(max_size=200), st.integers(1, 120))
 def test_a_text_is_cut_at_a_word(text: str, width: int) -> None:
     assert len(cut_at_word(text, width)) <= max(width, 1)
+
+
+@pytest.mark.parametrize("width", [60, 72, 80, 120])
+@pytest.mark.parametrize("faults", [0, 3])
+def test_a_journal_that_cannot_be_written_stands_there_and_moves_nothing(
+    width: int, faults: int
+) -> None:
+    before = strip_line(StripView(drive=RUNS), width).plain
+    line = strip_line(StripView(drive=RUNS, faults=faults, off_record=True), width)
+    assert line.cell_len == width
+    assert ("NO JOURNAL" if width >= 72 else "J!") in line.plain
+    assert "ARM 56" in line.plain
+    for part in ("▶", " A "):
+        assert cells_before(line.plain, part) == cells_before(before, part)
+    assert "NO JOURNAL" in strip_line(StripView(line="sim:atv71", off_record=True), width).plain
+    assert "JOURNAL" not in before

@@ -10,10 +10,12 @@ from pymodbus.framer.rtu import FramerRTU
 from tests.simulator.manual import FRAMES, Frame
 from tui.bus.requests import Read, ReadWrite, WriteMany
 from tui.simulator.server import frames as witness
+from tui.wire.frame_search import frame_ends
 from tui.wire.frames import (
+    MAX_FRAME,
+    MIN_FRAME,
     crc16,
     frame,
-    frame_end,
     hex_text,
     is_whole,
     read_frame,
@@ -53,6 +55,22 @@ def test_a_frame_ends_where_its_checksum_does(before: bytes, device: int, pdu: b
     assert end is not None
     assert is_whole(data[len(before) : end])
     assert frame_end(data[: end - 1], len(before)) is None
+
+
+def frame_end(data: bytes, start: int = 0) -> int | None:
+    return frame_ends(data).get(start)
+
+
+@given(st.lists(st.binary(max_size=30) | st.binary(max_size=20).map(sealed)).map(b"".join))
+def test_every_whole_frame_is_found_wherever_it_begins(data: bytes) -> None:
+    found = {}
+    for start in range(len(data)):
+        ends = range(start + MIN_FRAME, min(len(data), start + MAX_FRAME) + 1)
+        for end in ends:
+            if is_whole(data[start:end]):
+                found[start] = end
+                break
+    assert frame_ends(data) == found
 
 
 def test_what_is_no_frame_does_not_end() -> None:

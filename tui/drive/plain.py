@@ -7,7 +7,9 @@ was laid out by its length stays so.
 
 from __future__ import annotations
 
+import json
 import unicodedata
+from collections.abc import Iterable
 
 PICTURES = 0x2400
 """Where Unicode has the pictures of the first 32 control characters: ␀ to ␟."""
@@ -23,6 +25,24 @@ def plain(text: str, *, lines: bool = False) -> str:
     if text.isprintable():
         return text
     return "".join(c if lines and c == "\n" else _sign(c) for c in text)
+
+
+def plain_cells(cells: Iterable[object]) -> list[str]:
+    """The cells of a row of a table, for a file or a terminal; nothing for None."""
+    return ["" if cell is None else plain(str(cell)) for cell in cells]
+
+
+def escaped_json(text: str) -> str:
+    """JSON that means the same, with every character escaped that could command a terminal."""
+    if text.replace("\n", "").isprintable():
+        return text
+    return "".join(json.dumps(c)[1:-1] if c != "\n" and commands(c) else c for c in text)
+
+
+def escaped_toml(text: str) -> str:
+    """A basic string of TOML with every character escaped that could command a terminal."""
+    quoted = json.dumps(text.encode("utf-8", "replace").decode(), ensure_ascii=False)
+    return "".join(f"\\U{ord(c):08X}" if commands(c) else c for c in quoted)
 
 
 def commands(character: str) -> bool:

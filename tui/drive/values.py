@@ -15,6 +15,8 @@ from .errors import ValueRefused
 from .profile.schema import Bit, Parameter
 from .units import factor_between
 
+LONGEST_NUMBER = 30
+"""Places before or behind the point of a number that anybody means."""
 NOT_AVAILABLE = "-----"
 HALF_A_STEP = Decimal("0.5")
 _WITH_UNIT = re.compile(r"(.*\d[.,]?)\s*([^\d\s.,].*)", re.DOTALL)
@@ -258,6 +260,9 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
         choice = ", ".join(list(names.values())[:4])
         wanted = f"one of {choice}" if choice else f"a number in {parameter.unit or 'counts'}"
         raise ValueRefused(f"{parameter.code}: {typed!r} is not {wanted}.")
+    if number and not -LONGEST_NUMBER <= number.adjusted() <= LONGEST_NUMBER:
+        # its digits alone would fill the screen, or the memory
+        raise ValueRefused(f"{parameter.code}: {typed[:40]!r} is out of range.")
     return number
 
 

@@ -57,6 +57,7 @@ class FrameSource:
             load=self._measured(now),
             clock=app.clock.time_of_day(),
             read_only=app.read_only,
+            off_record=bool(app.journal_trouble),
         )
         return FrameView(strip, app.place, _marks(console, fleet), self._said(console, now))
 

@@ -1,20 +1,26 @@
 """The record of everything that was written to a drive: JSON lines in the state folder, rotated.
 
 Nobody waits for the disk: entries are put down by a thread, in their order and one by one, so a
-kill -9 or a power cut takes at most those that were not flushed by then.
+kill -9 or a power cut takes at most those that were not flushed by then. A program that ends waits
+for its last ones, `JOURNAL_PATIENCE` at most.
 """
 
 from __future__ import annotations
 
+import atexit
 import json
 import logging
 import threading
 import time
+import weakref
 from collections import deque
+from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from datetime import datetime
 from pathlib import Path
 from typing import Literal
+
+from tui.drive.plain import escaped_json
 
 from .journal_file import JournalFile
 from .paths import state_folder
@@ -55,19 +61,26 @@ class Entry:
     read_back: int | None
     why: str
     """The command or edit that it belongs to."""
-    kind: Literal["write", "fault", "proof"] = "write"
-    """`fault` for a trip that was seen: `code` and `new` are the fault's, nothing was written;
-    `proof` for a proof of communication loss, whose words are in `new`."""
+    kind: Literal["write", "fault", "read-back", "proof"] = "write"
+    """`fault` for a trip that was seen: `code` and `new` are the fault's, nothing was written.
+    `read-back` completes a write whose answer was lost: `read_back` is what the drive held then.
+    `proof` is a proof of communication loss, whose words are in `new`."""
+    of: str = ""
+    """The time of the write that a `read-back` completes."""
 
 
 class Journal:
     """Appends entries; keeps the last ones at hand. May be used from any thread.
 
-    What the disk refuses is kept and tried again.
+    What the disk refuses is kept and tried again. `on_trouble` is called with `trouble`, in the
+    journal's thread, as soon as the disk refuses.
     """
 
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(
+        self, folder: Path | None = None, on_trouble: Callable[[str], None] | None = None
+    ) -> None:
         self._file = JournalFile(folder or state_folder())
+        self._on_trouble = on_trouble
         self._changed = threading.Condition()
         """Guards all below; never held over disk work."""
         self._recent: deque[Entry] = deque(maxlen=ENTRIES_KEPT)
@@ -79,6 +92,10 @@ class Journal:
         self._failures = 0
         self._lost = 0
         self._closed = False
+        self._asked = False
+        """Whether somebody waits for another try that was not begun yet."""
+        self._ending: Callable[[], None] | None = None
+        """What waits for the last entries where the program ends without close()."""
 
     @property
     def path(self) -> Path:
@@ -103,6 +120,12 @@ class Journal:
             return self._lost
 
     @property
+    def unkept(self) -> int:
+        """How many entries are not on the disk: waiting for it, or lost."""
+        with self._changed:
+            return len(self._waiting) + (self._begun is not None) + self._lost
+
+    @property
     def trouble(self) -> str:
         """Why entries cannot be kept, for the person; empty while they can."""
         with self._changed:
@@ -111,7 +134,8 @@ class Journal:
                 why = f"the disk has not answered for {since:.0f} s"
         if not why:
             return ""
-        return f"The journal cannot be written: {why}." + (f" {lost} entries lost." if lost else "")
+        told = f"The journal cannot be written: {why}: {self.path}."
+        return told + (f" {lost} entries lost." if lost else "")
 
     def add(self, entry: Entry) -> None:
         """Keep an entry; returns at once and never raises, whatever the disk does."""
@@ -120,6 +144,7 @@ class Journal:
             self._waiting.append(entry)
             self._closed = False
             self._drop()
+            self._end_with_program()
             self._begin()
             self._changed.notify_all()
 
@@ -131,6 +156,7 @@ class Journal:
         with self._changed:
             failures = self._failures
             if not self._is_done():
+                self._asked = True
                 self._begin()
                 self._changed.notify_all()
             self._changed.wait_for(lambda: self._is_done() or self._failures > failures, timeout)
@@ -140,8 +166,23 @@ class Journal:
         """Flush what is left, as flush() does; a disk that still refuses is tried no more."""
         with self._changed:
             self._closed = True
+            if self._ending is not None:
+                atexit.unregister(self._ending)
+                self._ending = None
             self._changed.notify_all()
         return self.flush(timeout)
+
+    def _end_with_program(self) -> None:
+        if self._ending is not None:
+            return
+        own = weakref.ref(self)
+
+        def ending() -> None:
+            if (journal := own()) is not None:
+                journal.flush()
+
+        self._ending = ending
+        atexit.register(ending)
 
     def _is_done(self) -> bool:
         return not self._waiting and self._begun is None
@@ -174,10 +215,14 @@ class Journal:
                 if why:
                     self._waiting.appendleft(entry)
                     self._drop()
-                    self._failures += 1
                 lost, left = self._lost, len(self._waiting)
-                self._changed.notify_all()
             _tell(before, why, took, left, lost)
+            if why and not before:
+                self._cry()
+            # who waits goes on once the trouble was told
+            with self._changed:
+                self._failures += bool(why)
+                self._changed.notify_all()
             if why and not self._may_go_on():
                 return
 
@@ -188,22 +233,29 @@ class Journal:
             if not self._waiting:
                 self._thread = None
                 return None
-            self._begun = time.monotonic()
+            self._begun, self._asked = time.monotonic(), False
             return self._waiting.popleft()
 
     def _may_go_on(self) -> bool:
         """Whether the disk is to be tried again, after a moment or as soon as somebody waits."""
         with self._changed:
-            if self._closed:
+            if self._closed and not self._asked:
                 self._thread = None
                 return False
-            self._changed.wait(RETRY_DISK_AFTER)
+            self._changed.wait_for(lambda: self._asked, RETRY_DISK_AFTER)
             return True
+
+    def _cry(self) -> None:
+        try:
+            if self._on_trouble is not None:
+                self._on_trouble(self.trouble)
+        except Exception:
+            log.exception("whoever was to be told of the journal")
 
     def _trouble_with(self, entry: Entry) -> str:
         """Write an entry; what went wrong, or nothing."""
         try:
-            self._file.append(json.dumps(asdict(entry), ensure_ascii=False))
+            self._file.append(escaped_json(json.dumps(asdict(entry), ensure_ascii=False)))
         except OSError as error:
             return error.strerror or str(error)
         except Exception as error:

@@ -1,18 +1,40 @@
-"""The files of the journal: each line is flushed to the disk before the next one is begun."""
+"""The files of the journal: each line is one write at the file's end, flushed to the disk.
+
+Several programs append at a time: they take turns by a lock on the folder, and where there are no
+such locks the system's own append keeps their lines apart.
+"""
 
 from __future__ import annotations
 
+import errno
+import json
 import os
+import stat
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
 
 from .starts.files import sync_folder
+from .stored import make_folder
+
+try:
+    import fcntl
+except ImportError:  # Windows
+    fcntl = None  # type: ignore[assignment]
 
 JOURNAL_NAME = "journal.jsonl"
 LARGEST_FILE = 1_000_000
 """Bytes of one file; then the next one is begun."""
 FILES_KEPT = 9
 """Older files beside the one that is written."""
+TURN_PATIENCE = 0.5
+"""Seconds that a line waits for those of other programs; then it is appended all the same."""
+TURN_POLL_INTERVAL = 0.01
+OWN_MODE = 0o600
+CUT_OFF = "the line before this one was cut off: by a crash, a power cut or a full disk"
 
 
 class JournalFile:
@@ -31,32 +53,44 @@ class JournalFile:
     def append(self, text: str) -> None:
         """Put a line down, flushed to the disk. Raises OSError; the line may stand there even so.
 
-        Tried again, it is written over what the first try has left.
+        Tried again, it is written over what the first try has left. What an earlier program has
+        left of a line stays, and is marked as cut off.
         """
         line = text.encode("utf-8", "backslashreplace") + b"\n"
         tried, self._tried = self._tried, line
-        self.path.parent.mkdir(parents=True, exist_ok=True)
-        self._rotate(len(line))
-        # opened for each line: another program may have begun the next file meanwhile
-        with self.path.open("ab+", buffering=0) as file:
-            start = max(0, file.seek(0, os.SEEK_END) - len(line))
-            file.seek(start)
-            end = file.read()
-        if end == line == tried:
-            self._put(line, "rb+", start)
-        else:
-            # a line that was cut off damages no other
-            self._put(line if end[-1:] in (b"", b"\n") else b"\n" + line, "ab")
+        make_folder(self.path.parent)
+        with self._turn() as alone:
+            if alone:
+                self._rotate(len(line))
+            # opened for each line: another program may have begun the next file meanwhile
+            handle = _opened(self.path)
+            try:
+                start = self._put(handle, line, tried, alone=alone)
+            except BaseException:
+                os.close(handle)
+                raise
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
         if start == 0:  # the file is new, or was when this line was first tried
             sync_folder(self.path.parent)
         self._tried = b""
 
-    def _put(self, data: bytes, mode: str, start: int = 0) -> None:
-        with self.path.open(mode, buffering=0) as file:
-            file.seek(start)
-            while data:
-                data = data[file.write(data) :]
-            os.fsync(file.fileno())
+    def _put(self, handle: int, line: bytes, tried: bytes, *, alone: bool) -> int:
+        """Write a line at the end; returns where it begins."""
+        size = os.fstat(handle).st_size
+        start = max(0, size - len(line))
+        os.lseek(handle, start, os.SEEK_SET)
+        end = os.read(handle, len(line))
+        if end == line == tried:
+            # it stands there and was not flushed: written anew, it will be
+            with self.path.open("rb+", buffering=0) as file:
+                file.seek(start)
+                file.write(line)
+            return start
+        _write(handle, line if end[-1:] in (b"", b"\n") else b"\n" + _mark() + line, size, alone)
+        return size
 
     def _older(self, number: int) -> Path:
         return self.path.with_name(f"{JOURNAL_NAME}.{number}")
@@ -69,3 +103,69 @@ class JournalFile:
             if younger.exists():
                 younger.replace(older)
         sync_folder(self.path.parent)
+
+    @contextmanager
+    def _turn(self) -> Iterator[bool]:
+        """While inside, other programs wait; gives False where one of them does not let us in."""
+        if fcntl is None:
+            yield True
+            return
+        folder = os.open(self.path.parent, os.O_RDONLY | os.O_CLOEXEC)
+        try:
+            yield _locked(folder)
+        finally:
+            os.close(folder)
+
+
+def _locked(folder: int) -> bool:
+    """Lock a folder against the other programs; True too where no such locks are to be had."""
+    end = time.monotonic() + TURN_PATIENCE
+    while True:
+        try:
+            fcntl.flock(folder, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            if time.monotonic() > end:
+                return False
+            time.sleep(TURN_POLL_INTERVAL)
+        except OSError:
+            return True
+        else:
+            return True
+
+
+def _opened(path: Path) -> int:
+    """A handle that appends, to a file that its owner alone may read. Raises OSError."""
+    flags = os.O_RDWR | os.O_APPEND | os.O_CREAT
+    # a pipe in its place must not hold up the journal
+    flags |= getattr(os, "O_CLOEXEC", 0) | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+    handle = os.open(path, flags, OWN_MODE)
+    try:
+        told = os.fstat(handle)
+        if not stat.S_ISREG(told.st_mode):
+            raise OSError(errno.EINVAL, "Not a regular file")
+        if told.st_mode & 0o077 and hasattr(os, "fchmod"):
+            with suppress(OSError):  # of another owner, or a file system without modes
+                os.fchmod(handle, OWN_MODE)
+    except BaseException:
+        os.close(handle)
+        raise
+    return handle
+
+
+def _write(handle: int, data: bytes, start: int, alone: bool) -> None:
+    """Append in one write; what a full disk took of it is taken back. Raises OSError."""
+    done = 0
+    try:
+        while done < len(data):
+            done += os.write(handle, data[done:])
+    except OSError:
+        if done and alone and os.fstat(handle).st_size == start + done:
+            with suppress(OSError):
+                os.ftruncate(handle, start)
+        raise
+
+
+def _mark() -> bytes:
+    """The line that says of the one before it that it is half a line."""
+    when = datetime.now().astimezone().isoformat(timespec="milliseconds")
+    return json.dumps({"time": when, "kind": "mended", "why": CUT_OFF}).encode() + b"\n"

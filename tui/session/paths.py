@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import os
+from contextlib import suppress
 from pathlib import Path
+
+from .stored import NOWHERE, store_json, stored_json
 
 RECENT_LENGTH = 8
 ADDRESSES_LENGTH = 50
@@ -17,15 +19,17 @@ def state_folder() -> Path:
         return Path(configured)
     from platformdirs import user_state_path
 
-    return user_state_path("drivepanel", appauthor=False)
+    try:
+        folder = user_state_path("drivepanel", appauthor=False)
+    except RuntimeError:
+        return NOWHERE
+    # without a home it would lie wherever the panel happens to be started
+    return folder if folder.is_absolute() else NOWHERE
 
 
 def recent_lines() -> list[str]:
     """Lines used lately, the last one first; none where the file is missing or damaged."""
-    try:
-        stored = json.loads(_recent_file().read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return []
+    stored = stored_json(_recent_file())
     return [text for text in stored if isinstance(text, str)] if isinstance(stored, list) else []
 
 
@@ -49,21 +53,13 @@ def remember_addresses(key: str, text: str) -> None:
 
 
 def _all_addresses() -> dict[str, object]:
-    try:
-        stored = json.loads(_addresses_file().read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
+    stored = stored_json(_addresses_file())
     return stored if isinstance(stored, dict) else {}
 
 
 def _keep(file: Path, what: object) -> None:
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part")
-        part.write_text(json.dumps(what, indent=1), encoding="utf-8")
-        part.replace(file)
-    except OSError:
-        return
+    with suppress(OSError):
+        store_json(file, what)
 
 
 def _addresses_file() -> Path:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime, tzinfo
-from pathlib import Path
 
 from tui.drive.blocks.assignment import slot_target
 from tui.drive.channel import switch_texts
@@ -14,6 +12,7 @@ from tui.drive.chart import read_chart
 from tui.drive.control_source import source_in_force
 from tui.drive.hints import hint_markdown, reset_text
 from tui.drive.model import model_told
+from tui.drive.plain import plain
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Block, Quantity
 from tui.drive.settings.compare import compare_settings, factory_side, side_of
@@ -21,37 +20,11 @@ from tui.drive.settings.parameter_set import ParameterSet, lacking
 from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, set_bits
 
-from .journal import Entry, Journal
+from .journal import Entry
 
 ENTRIES_SHOWN = 200
 """How many entries of the journal a report shows at most, the last ones."""
 CHANNEL_QUANTITIES: tuple[Quantity, ...] = ("command_channel", "reference_channel")
-
-
-def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
-    """What the journal's files tell of a drive on a line, oldest first.
-
-    Waits a few seconds for entries that are not on the disk yet. Damaged lines are left out.
-    """
-    journal.flush()
-    found = (entry for file in journal.files for entry in _entries(file))
-    return [entry for entry in found if (entry.line, entry.device) == (line, device)]
-
-
-def _entries(file: Path) -> Iterator[Entry]:
-    try:
-        lines = file.read_text(encoding="utf-8", errors="replace").splitlines()
-    except OSError:
-        return
-    names = {field.name for field in fields(Entry)}
-    for line in lines:
-        try:
-            told = json.loads(line)
-        except ValueError:
-            continue
-        # entries of the time before trips were kept have no kind
-        if isinstance(told, dict) and {*told, "kind"} == names:
-            yield Entry(**told)
 
 
 def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]) -> str:
@@ -71,7 +44,7 @@ def report_text(profile: Profile, values: ParameterSet, entries: Sequence[Entry]
         maker.seen(),
         maker.journal(),
     )
-    return "\n".join(line for part in parts for line in (*part, ""))
+    return plain("\n".join(line for part in parts for line in (*part, "")), lines=True)
 
 
 @dataclass(frozen=True, slots=True)

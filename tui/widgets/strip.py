@@ -84,6 +84,8 @@ class StripView(NamedTuple):
     load: float | None = None
     clock: str = ""
     read_only: bool = False
+    off_record: bool = False
+    """Whether the journal cannot be written."""
 
 
 def strip_line(view: StripView, width: int) -> Text:
@@ -146,12 +148,16 @@ def _values(drive: DriveNow) -> Text:
 def _right(view: StripView, *, narrow: bool) -> Text:
     """What concerns the whole line, and whether keys move this drive's motor."""
     text, drive = Text(no_wrap=True), view.drive
+    off_record = "J!" if narrow and drive is not None else "NO JOURNAL "
+    narrow = narrow or view.off_record
     if view.faults:
         count = f"■ {view.faults} fault{'' if view.faults == 1 else 's'}"
         count = f"■{view.faults}" if narrow else count
         style = FAULT_BLOCK if view.unseen else FAULT
         text.append(f" {count} " if view.unseen and not narrow else count, style)
         text.append(" ")
+    if view.off_record:
+        text.append(off_record, ALARM)
     if drive is not None and drive.armed is not None:
         armed = Text(f" ARM {drive.armed:2.0f} ", ATTENTION_BLOCK) if narrow else None
         text.append_text(armed or armed_text(drive.armed))
@@ -241,4 +247,5 @@ class FrameView(NamedTuple):
         armed = drive is not None and drive.armed is not None
         # figures in a message count seconds
         text = said and re.sub(r"\d+", "", said.text)
-        return who, armed, strip.faults, strip.unseen, self.place, self.marks, text
+        faults = strip.faults, strip.unseen
+        return who, armed, faults, strip.off_record, self.place, self.marks, text

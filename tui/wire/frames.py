@@ -45,17 +45,6 @@ def is_whole(data: bytes | bytearray) -> bool:
     return len(data) >= MIN_FRAME and crc16(data) == 0
 
 
-def frame_end(data: bytes | bytearray, start: int = 0) -> int | None:
-    """End of the shortest whole frame that begins at `start`; None where none does."""
-    table, crc = _CRC, 0xFFFF
-    shortest = start + MIN_FRAME
-    for at in range(start, min(len(data), start + MAX_FRAME)):
-        crc = (crc >> 8) ^ table[(crc ^ data[at]) & 0xFF]
-        if crc == 0 and at + 1 >= shortest:
-            return at + 1
-    return None
-
-
 def read_frame(device: int, address: int, count: int) -> bytes:
     """A read of so many words by function 3."""
     return frame(device, bytes([3]) + _words(address, count))

@@ -5,10 +5,14 @@ Knows no clock and no port: fed with bytes, told of silence and of the time-out.
 
 from __future__ import annotations
 
+from tui.wire.frames import MAX_FRAME
+
 from ..expectation import EXCEPTION, Expectation
 from ..result import ExchangeResult, Piece, ResultKind
 from .frames import Match, begins_reply, find_reply, pieces
 
+FLOOD = 4096
+"""Bytes of one exchange beyond which the older half is let go: no line says that much."""
 NOISE = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of a damaged reply."""
 
@@ -38,6 +42,8 @@ class RtuExchange:
         self._exceptions = exceptions
         self._skip = skip
         self._skipped_to = 0
+        self._looked_to = 0
+        """Up to where no reply can begin any more that was not found."""
         # a reply that repeats the request looks like an echo
         self._mirrored = expectation is not None and expectation.fits(frame[1:-2])
 
@@ -49,6 +55,8 @@ class RtuExchange:
     def feed(self, data: bytes) -> ExchangeResult | None:
         """Take received bytes; the result once the reply is whole."""
         self.buffer += data
+        if len(self.buffer) > FLOOD:
+            self._let_go(len(self.buffer) - FLOOD // 2)
         if self._expectation is None:
             return None
         while match := self._find(self._expectation):
@@ -57,7 +65,14 @@ class RtuExchange:
                 self._skipped_to = match.end
                 continue
             return self._answered(match)
+        self._looked_to = max(0, len(self.buffer) - MAX_FRAME)
         return None
+
+    def _let_go(self, count: int) -> None:
+        """Forget the oldest bytes."""
+        del self.buffer[:count]
+        self._skipped_to = max(0, self._skipped_to - count)
+        self._looked_to = max(0, self._looked_to - count)
 
     def pass_over(self, result: ExchangeResult) -> ExchangeResult | None:
         """The reply just found cannot be that of this request; the next one, if it is there."""
@@ -68,7 +83,7 @@ class RtuExchange:
     def _find(self, expectation: Expectation) -> Match | None:
         if self._is_too_short(expectation):
             return None
-        start = max(self._after_echo(), self._skipped_to)
+        start = max(self._after_echo(), self._skipped_to, self._looked_to)
         return find_reply(
             self.buffer, self._device, expectation, start=start, exceptions=self._exceptions
         )

@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from tui.wire.frames import frame_end, is_whole
+from tui.wire.frame_search import frame_ends
+from tui.wire.frames import is_whole
 
 from ..expectation import EXCEPTION, Expectation, exception_code, exception_extents
 from ..result import Piece
@@ -61,16 +62,14 @@ def _candidates(
 def pieces(data: bytes | bytearray) -> list[Piece]:
     """Received bytes taken apart into whole frames and what lies between them."""
     found: list[Piece] = []
-    loose = at = 0
-    while at < len(data):
-        end = frame_end(data, at)
-        if end is None:
-            at += 1
-            continue
+    loose = 0
+    for at, end in sorted(frame_ends(data).items()):
+        if at < loose:
+            continue  # inside the frame before
         if at > loose:
             found.append(Piece(bytes(data[loose:at]), whole=False))
         found.append(Piece(bytes(data[at:end]), whole=True))
-        loose = at = end
+        loose = end
     if len(data) > loose:
         found.append(Piece(bytes(data[loose:]), whole=False))
     return found

@@ -123,9 +123,15 @@ class RtuMaster:
             now = clock()
             until = max(self._last + self._silence - lead, self._hold)
             if now >= until or now >= give_up:
-                return
+                if lead:
+                    return
+                await self._transport.take_in()
+                if self._last + self._silence <= clock() or now >= give_up:
+                    break
+                continue  # more came meanwhile
             await self._transport.rest(min(until, give_up))
-        raise self.failure
+        if self.failure is not None:
+            raise self.failure
 
     async def exchange(self, sending: Sending) -> ExchangeResult:
         """Send a request and await its reply, its remains, or the end of its time."""

@@ -16,6 +16,8 @@ from ..transport.base import Transport
 
 HEADER_LENGTH = 7
 """Transaction id, protocol id, length, unit id."""
+SHOWN = 260
+"""Bytes of something else that are kept to be looked at."""
 MAX_LENGTH = 254
 """Unit id and the longest function and data."""
 
@@ -48,18 +50,19 @@ class TcpMaster:
         """Take the bytes apart by their headers; only the awaited transaction is looked at."""
         self._last = time
         self._around.tally.bytes_in += len(data)
-        self._buffer += data
-        while len(self._buffer) >= HEADER_LENGTH:
-            length = int.from_bytes(self._buffer[4:6], "big")
-            if self._buffer[2:4] != b"\0\0" or not 2 <= length <= MAX_LENGTH:
-                self._around.trace.add(time, "in", bytes(self._buffer), "no Modbus TCP")
+        buffer, at = bytes(self._buffer) + data, 0
+        while len(buffer) - at >= HEADER_LENGTH:
+            length = int.from_bytes(buffer[at + 4 : at + 6], "big")
+            if buffer[at + 2 : at + 4] != b"\0\0" or not 2 <= length <= MAX_LENGTH:
+                self._around.trace.add(time, "in", buffer[at : at + SHOWN], "no Modbus TCP")
                 self._reset("the other end sent something else than Modbus TCP")
                 return
-            if len(self._buffer) < 6 + length:
-                return
-            unit = bytes(self._buffer[: 6 + length])
-            del self._buffer[: 6 + length]
-            self._take(unit, time)
+            end = at + 6 + length
+            if len(buffer) < end:
+                break
+            self._take(buffer[at:end], time)
+            at = end
+        self._buffer[:] = buffer[at:]
 
     def _take(self, unit: bytes, time: float) -> None:
         sending = self._sending
@@ -101,6 +104,9 @@ class TcpMaster:
         clock, tally = self._around.clock, self._around.tally
         self._transaction = self._transaction % 0xFFFF + 1
         data = self._framer.encode(sending.pdu, sending.device, self._transaction)
+        await self._transport.take_in()
+        if self.failure is not None:
+            raise self.failure
         self._done = asyncio.get_running_loop().create_future()
         self._sending = sending
         begun = clock()

@@ -30,5 +30,8 @@ class Transport(Protocol):
     async def rest(self, until: float) -> None:
         """Wait until a time of the line's clock, exactly; shorter if bytes come in."""
 
+    async def take_in(self) -> None:
+        """Hand over what the system holds already: it came before what is sent next."""
+
     def close(self) -> None:
         """Give the port back; may be called twice."""

@@ -101,6 +101,12 @@ class PosixSerial:
                 self._take()
                 return
 
+    async def take_in(self) -> None:
+        """Hand over what the port holds already."""
+        # not without a look: a port that holds nothing reads as one that went away
+        if self._fd is not None and select.select([self._fd], [], [], 0)[0]:
+            self._take()
+
     def close(self) -> None:
         """Close the port; a lock on it ends with that."""
         if self._fd is None:

@@ -67,6 +67,10 @@ class ThreadedSerial:
         # what the thread has read in the meantime is handed over first
         await asyncio.sleep(0)
 
+    async def take_in(self) -> None:
+        """Let the loop hand over what the thread has read."""
+        await asyncio.sleep(0)
+
     def close(self) -> None:
         """End the thread and close the port."""
         self._closing.set()

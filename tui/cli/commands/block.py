@@ -22,7 +22,7 @@ from ..shared.options import (
 )
 from ..shared.say import say
 from ..shared.sets import dry_run_option, write_down
-from .orders import arm_option, close_journal, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.blocks.assignment import Assignment
@@ -176,7 +176,6 @@ def _save(session: DriveSession, line_text: str, views: list[BlockView], wanted:
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
     from tui.bus.errors import DeviceException
     from tui.session.blocks.write import AssignmentRefused, write_assignment
-    from tui.session.journal import Journal
     from tui.session.settings.write import NotTaken
 
     from ..shared.output import drive_json, print_json
@@ -188,7 +187,7 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
             head = drive_json(line_text, session)
             print_json({**head, "dry_run": True, "changes": changes})
         return DONE
-    journal = Journal()
+    journal = told_journal()
     try:
         for plan in plans:
             done = await write_assignment(
@@ -269,14 +268,17 @@ async def _plans(session: DriveSession, wanted: Wanted) -> tuple[dict[str, int],
 def _loaded(session: DriveSession, wanted: Wanted) -> dict[str, Assignment]:
     from tui.drive.blocks.assignment import MappingError
     from tui.drive.blocks.file import load_blocks
+    from tui.drive.small_file import read_small_text
 
     if wanted.action != "load":
         return {}
     file = wanted.words[0]
     try:
-        return load_blocks(Path(file).read_text(encoding="utf-8"), file, session.profile)
-    except (OSError, UnicodeDecodeError) as error:
-        raise Failure(f"{file} cannot be read: {error}.", USAGE) from error
+        return load_blocks(read_small_text(Path(file)), file, session.profile)
+    except OSError as error:
+        raise Failure(f"{file} cannot be read: {error.strerror}.", USAGE) from error
+    except UnicodeDecodeError as error:
+        raise Failure(f"{file}: byte {error.start} is not UTF-8 text.", USAGE) from error
     except MappingError as error:
         raise Failure(str(error), USAGE) from error
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -117,9 +118,10 @@ def _row_json(row: ComparedRow) -> dict[str, Any]:
 
 def _set_of(text: str, target: Target) -> ParameterSet:
     """The parameter set in a file, or that of a drive, read now."""
-    if Path(text).is_file():
-        return set_in(Path(text))
-    if Path(text).suffix == ".toml":
+    path = Path(text)
+    if path.is_file() or (path.suffix == ".toml" and os.path.lexists(path)):
+        return set_in(path)
+    if path.suffix == ".toml":
         raise Failure(f"{text} is not there.", USAGE)
     return set_of_drive(target)[1]
 

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.monitor.timeout import TimeoutWatch
     from tui.session.starts.keeper import StartKeeper
+    from tui.session.timeout_told import TimeoutWatch
     from tui.session.work import Permit
 
 COMMAND_POLL_INTERVAL = 0.02
@@ -52,10 +52,19 @@ def complain(text: str) -> None:
         say(f"drivepanel: {text}", err=True)
 
 
+def told_journal() -> Journal:
+    """A journal whose trouble is said at once, on standard error."""
+    from tui.session.journal import Journal
+
+    return Journal(on_trouble=lambda trouble: complain(f"{trouble} The command goes on."))
+
+
 def close_journal(journal: Journal) -> None:
-    """Close the journal, and say what keeps it from being written: nothing is lost unsaid."""
-    if not journal.close() and journal.trouble:
-        complain(journal.trouble)
+    """Close the journal, and say what is not on record: nothing is lost unsaid."""
+    if not journal.close() and (unkept := journal.unkept):
+        why = "" if journal.trouble else f": the disk does not answer: {journal.path}"
+        entries = "1 entry is" if unkept == 1 else f"{unkept} entries are"
+        complain(f"{entries} not in the journal{why}.")
 
 
 def moved(journal: Journal) -> bool:
@@ -79,12 +88,11 @@ async def watched(
     Raises Failure where it does not answer, and what `connect` raises.
     """
     from tui.session.fleet import Fleet
-    from tui.session.journal import Journal
 
     from .status import shown_codes
 
     session = await connect_drive(opened, target)
-    journal = Journal()
+    journal = told_journal()
     # the motors of a simulated line end with it
     fleet = Fleet(opened.line, journal, None if opened.simulation else starts)
     console = fleet.take(session)
@@ -102,9 +110,10 @@ async def watched(
 async def _first_look(console: DriveConsole) -> None:
     while True:
         latest = console.latest
-        if latest is not None and not latest.error:
-            return
-        if latest is not None and latest.cycle >= FIRST_TRIES:
+        tried = latest is not None and latest.cycle >= FIRST_TRIES
+        if latest is not None and not latest.error and (latest.state.kind != "unknown" or tried):
+            return  # what decides about its chart may come a cycle later
+        if latest is not None and tried:
             raise Failure(latest.error, LINE_TROUBLE)
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
 

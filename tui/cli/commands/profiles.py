@@ -123,6 +123,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     """Write the file of a new profile, a copy of another; never over a file."""
     from tui.drive.profile import library
     from tui.drive.profile.new_file import new_profile_text
+    from tui.drive.small_file import read_small_text
 
     from ..shared.output import print_json
 
@@ -134,7 +135,7 @@ def _begin(words: tuple[str, ...], origin: str | None, as_json: bool) -> None:
     if new_id in known:
         raise click.UsageError(f"There is a profile {new_id} already: {known[new_id].path}")
     source = known[origin.strip().lower()]
-    text = source.path.read_text(encoding="utf-8")
+    text = read_small_text(source.path)
     text = new_profile_text(text, source.id, new_id, library.rows_with_shared(source))
     path = library.user_folder() / f"{new_id}.toml"
     path.parent.mkdir(parents=True, exist_ok=True)

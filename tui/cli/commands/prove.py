@@ -16,6 +16,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.output import drive_json, print_json
 from ..shared.say import say
 from .orders import arm_drive, arm_option, carried_out, complain, need_arming, watched
 
@@ -54,17 +55,16 @@ def prove(
     """
     need_arming(arm, "prove lets the drive trip on its communication time-out")
 
-    async def work(opened: OpenLine) -> ProofResult:
+    async def work(opened: OpenLine) -> bool:
         async with watched(opened, target) as (fleet, console):
             arm_drive(console)
             result = await _proved(fleet, console, turning, quiet=as_json)
             if reset and result.fault:
                 await carried_out(console.commander, lambda: console.commander.order("reset"))
-            return result
+            _tell(drive_json(target.line_text, console.session), result, reset, as_json)
+            return result.as_set
 
-    result = on_line(target, work, read_only=read_only)
-    _tell(target, result, reset, as_json)
-    if not result.as_set:
+    if not on_line(target, work, read_only=read_only):
         raise click.exceptions.Exit(DIFFERENT)
 
 
@@ -93,12 +93,10 @@ async def _proved(
     return result
 
 
-def _tell(target: Target, result: ProofResult, reset: bool, as_json: bool) -> None:
+def _tell(about: dict[str, Any], result: ProofResult, reset: bool, as_json: bool) -> None:
     if as_json:
-        from ..shared.output import print_json
-
-        told: dict[str, Any] = {"line": target.line_text, "device": result.device}
-        print_json({**told, **result.json(), "reset": reset and bool(result.fault)})
+        was_reset = reset and bool(result.fault)
+        print_json({**about, **result.json(), "reset": was_reset})
         return
     say(f"Device {result.device}: {result.text}")
     if result.changed:

@@ -33,7 +33,7 @@ def report(target: Target, file: Path, force: bool, as_json: bool) -> None:
     reaction to a loss of communication, faults, and what was written to it from here.
     """
     from tui.session.journal import Journal
-    from tui.session.report import entries_of
+    from tui.session.journal_reading import entries_of
     from tui.session.report import report_text as text_of
 
     from ..shared.output import drive_json, print_json

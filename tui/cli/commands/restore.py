@@ -35,7 +35,7 @@ from ..shared.sets import (
     set_in,
     status_of_results,
 )
-from .orders import arm_option, close_journal, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.settings.parameter_set import ParameterSet
@@ -203,7 +203,6 @@ async def _restore(
     save: bool,
 ) -> tuple[dict[str, Any], int]:
     from tui.drive.profile import library
-    from tui.session.journal import Journal
     from tui.session.settings.eeprom import save_to_eeprom
     from tui.session.settings.restore import Mark
     from tui.session.settings.restore import restore_set as bring_back
@@ -211,7 +210,7 @@ async def _restore(
     source, messages = library.load(values.head.profile), telling.messages
     if told_before := Mark.of(session).interrupted:
         messages.tell(told_before)
-    journal, permit = Journal(), permit_of(session)
+    journal, permit = told_journal(), permit_of(session)
     try:
         done = await bring_back(
             session, journal, values, source, options, permit=permit,

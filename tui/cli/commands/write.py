@@ -31,7 +31,7 @@ from ..shared.sets import (
     say_afterwards,
     status_of_results,
 )
-from .orders import arm_option, close_journal, need_arming, permit_of
+from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.settings.edits import Edits
@@ -190,14 +190,13 @@ async def _write(
     save: bool,
 ) -> tuple[dict[str, Any], int]:
     """Write, tell each; what became of all for JSON, and the exit status."""
-    from tui.session.journal import Journal
     from tui.session.settings.apply import apply_edits
     from tui.session.settings.eeprom import save_to_eeprom
 
     messages = telling.messages
     if not len(edits):
         messages.tell("The drive holds these values already.")
-    journal, permit = Journal(), permit_of(session)
+    journal, permit = told_journal(), permit_of(session)
     try:
         done = await apply_edits(
             session, journal, edits, permit=permit, confirmed=confirmed, progress=telling

@@ -15,7 +15,9 @@ from .of_drives import (
     CommandTold,
     CycleTold,
     ErrorTold,
+    HoldTold,
     IdentityTold,
+    ProveTold,
     ReadTold,
     RunTold,
     StatusTold,
@@ -24,6 +26,7 @@ from .of_drives import (
 from .of_others import (
     CheckTold,
     InputsTold,
+    JournalTold,
     LinesTold,
     PortTold,
     ProfileBegun,
@@ -48,10 +51,11 @@ from .of_settings import (
 )
 
 DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
-    ErrorTold, ReadTold, CycleTold, IdentityTold, StatusTold, RunTold, CommandTold, StopTold,
-    WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold, BlockChangeTold,
-    BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold, ProfileShown,
-    WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold, LinesTold,
+    ErrorTold, ReadTold, CycleTold, IdentityTold, StatusTold, RunTold, HoldTold, ProveTold,
+    CommandTold, StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
+    BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
+    ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
+    JournalTold, LinesTold,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""
 

@@ -10,6 +10,7 @@ from msgspec import UNSET, UnsetType
 from .parts import (
     ControlTold,
     FaultTold,
+    FirstWordTold,
     ModelTold,
     OldTimeoutTold,
     StateTold,
@@ -109,6 +110,36 @@ class RunTold(DocumentTold, kw_only=True):
     timeout: TimeoutTold | UnsetType | None = UNSET
 
 
+class HoldTold(DocumentTold, kw_only=True):
+    """`hold`: one event."""
+
+    command: Literal["hold"]
+    time: str
+    line: str
+    device: int
+    event: Literal["holding", "lost", "back", "fault"]
+    text: str
+    timeout: TimeoutTold | UnsetType | None = UNSET
+
+
+class ProveTold(OfDriveTold, kw_only=True):
+    """`prove`: the silences between which the drive has reacted, and what is set; times in ms."""
+
+    command: Literal["prove"]
+    configured_ms: int
+    not_before_ms: int
+    not_after_ms: int | None
+    measured_ms: int | None
+    reaction: str | None
+    seen: str | None
+    fault: str | None
+    turning: bool
+    as_set: bool
+    text: str
+    changed: str | None
+    reset: bool
+
+
 class CommandTold(OfDriveTold, kw_only=True):
     """`reference`, `reset`: what the command came to."""
 
@@ -124,4 +155,5 @@ class StopTold(OfDriveTold, kw_only=True):
     stopped: bool
     text: str
     status: int
+    first: list[FirstWordTold] | UnsetType = UNSET
     given_back: str | UnsetType = UNSET

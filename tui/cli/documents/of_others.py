@@ -130,3 +130,40 @@ class InputsTold(DocumentTold, kw_only=True):
     command: Literal["simulate"]
     event: Literal["inputs"]
     text: str
+
+
+class JournalEntryTold(msgspec.Struct, kw_only=True):
+    """One write, or a trip that was seen; `read_back` is what the drive held then or later."""
+
+    time: str
+    line: str
+    device: int
+    profile: str
+    code: str
+    address: int
+    old_raw: int | None
+    old: str
+    new_raw: int
+    new: str
+    answer: str
+    read_back: int | None
+    why: str
+    kind: Literal["write", "fault", "read-back"]
+    of: str
+
+
+class DamagedLineTold(msgspec.Struct, kw_only=True):
+    """A line of the journal that is no entry, with its beginning."""
+
+    file: str
+    line: int
+    text: str
+
+
+class JournalTold(DocumentTold, kw_only=True):
+    """`journal`: what was written to drives from here, oldest first."""
+
+    command: Literal["journal"]
+    journal: str
+    entries: list[JournalEntryTold]
+    damaged: list[DamagedLineTold]

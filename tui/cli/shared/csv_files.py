@@ -14,6 +14,8 @@ from typing import TextIO
 
 import click
 
+from tui.drive.plain import plain_cells
+
 from .errors import USAGE, Failure
 
 _SIZE = re.compile(r"(\d+(?:\.\d+)?)\s*(k|M|G)i?B?", re.IGNORECASE)
@@ -58,7 +60,7 @@ class CsvFile:
         self.path = path
         self.rows = 0
         """Rows written by this command."""
-        self._titles = list(titles)
+        self._titles = plain_cells(titles)
         self._rotate = rotate
         refuse_unasked(path, append=append, force=force)
         self._day = date.today()
@@ -81,7 +83,7 @@ class CsvFile:
     def _begun(self) -> TextIO:
         file = self.path.open("w", newline="", encoding="utf-8")
         try:
-            csv.writer(file).writerow(self._titles)
+            csv.writer(file).writerow(plain_cells(self._titles))
             file.flush()
         except OSError:
             with suppress(OSError):
@@ -101,7 +103,7 @@ class CsvFile:
     def write(self, cells: Sequence[str]) -> None:
         """Write a row; raises Failure where the disk does not take it."""
         text = io.StringIO(newline="")
-        csv.writer(text).writerow(cells)
+        csv.writer(text).writerow(plain_cells(cells))
         row = text.getvalue()
         try:
             if self._due(len(row.encode())):

@@ -84,6 +84,17 @@ def status_of(error: Exception) -> int | None:
     return next((status for kind, status in table if isinstance(error, kind)), None)
 
 
+def _tell_lost_output(command: Callable[..., object]) -> None:
+    """Say that the output went nowhere; Failure where it is all that the command was for."""
+    from .standard_streams import acts, output_lost
+
+    if lost := output_lost():
+        text = f"What was printed is lost: standard output cannot be written: {lost}."
+        if not acts(command):
+            raise Failure(text, OWN_ERROR)
+        say(f"drivepanel: {text}", err=True)
+
+
 def failure_of(error: Exception) -> Failure:
     """A known error with its exit status; raises one that nobody foresaw."""
     if isinstance(error, click.ClickException):
@@ -102,6 +113,7 @@ def told(command: Callable[P, R]) -> Callable[P, R]:
         try:
             result = command(*args, **kwargs)
             sys.stdout.flush()  # here, where a closed pipe can still be told from an error
+            _tell_lost_output(command)
             return result
         except (click.ClickException, click.exceptions.Exit, click.Abort):
             raise

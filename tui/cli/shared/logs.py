@@ -4,13 +4,17 @@ from __future__ import annotations
 
 import atexit
 import logging
+import os
 from contextlib import suppress
+from io import TextIOWrapper
 from logging.handlers import QueueHandler, RotatingFileHandler
 from pathlib import Path
 from queue import Full, Queue
 from threading import Thread
 
+from tui.drive.plain import plain
 from tui.session.paths import state_folder
+from tui.session.stored import make_folder
 
 PANEL = "tui"
 """The logger above all others of the panel: each module logs to one by its own name."""
@@ -51,6 +55,32 @@ class Later(QueueHandler):
         self._to.close()
 
 
+class LogFile(RotatingFileHandler):
+    """The file, for its owner alone; a disk that takes nothing is no error of the command."""
+
+    def _open(self) -> TextIOWrapper:
+        def opener(path: str, flags: int) -> int:
+            return os.open(path, flags, 0o600)
+
+        return open(self.baseFilename, self.mode, encoding=self.encoding, opener=opener)  # type: ignore[return-value]
+
+    def handleError(self, record: logging.LogRecord) -> None:
+        """Lose the entry: logging's own way is a traceback on standard error."""
+
+    def close(self) -> None:
+        """Close the file, whatever of it the disk does not take."""
+        with suppress(OSError, ValueError):
+            super().close()
+
+
+class PlainFormatter(logging.Formatter):
+    """Lines that command no terminal on which somebody reads the log."""
+
+    def format(self, record: logging.LogRecord) -> str:
+        """The entry as text."""
+        return plain(super().format(record), lines=True)
+
+
 def log_file() -> Path:
     """Where the log is."""
     return state_folder() / "drivepanel.log"
@@ -61,14 +91,12 @@ def start_logging(verbose: int) -> None:
     logger = logging.getLogger(PANEL)
     logger.setLevel(LEVELS[min(verbose, len(LEVELS) - 1)])
     try:
-        log_file().parent.mkdir(parents=True, exist_ok=True)
-        file = RotatingFileHandler(
-            log_file(), maxBytes=1_000_000, backupCount=3, encoding="utf-8", delay=True
-        )
+        make_folder(log_file().parent)
+        file = LogFile(log_file(), maxBytes=1_000_000, backupCount=3, encoding="utf-8", delay=True)
     except OSError:
         handler: logging.Handler = logging.NullHandler()
     else:
-        file.setFormatter(logging.Formatter("%(asctime)s %(levelname)s %(message)s"))
+        file.setFormatter(PlainFormatter("%(asctime)s %(levelname)s %(message)s"))
         handler = Later(file)
     stop_logging()
     logger.addHandler(handler)

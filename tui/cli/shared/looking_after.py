@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from tui.session.sharing.guardian import Guardian
 
 
-def look_after(line: ModbusLine) -> None:
+def guard_motors(line: ModbusLine) -> None:
     """From now on stop the motors of a program that is gone, as far as this one owns the line."""
     guardians: list[Guardian] = []
 

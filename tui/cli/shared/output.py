@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from tui.drive.plain import commands, plain
+from tui.drive.plain import escaped_json, plain
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -73,10 +73,7 @@ def _command() -> str | None:
 
 def json_text(data: object, *, compact: bool = True) -> str:
     """JSON that a terminal may be given: every character that could command one is escaped."""
-    text = json.dumps(data, ensure_ascii=False, indent=None if compact else 2)
-    if text.replace("\n", "").isprintable():
-        return text
-    return "".join(json.dumps(c)[1:-1] if c != "\n" and commands(c) else c for c in text)
+    return escaped_json(json.dumps(data, ensure_ascii=False, indent=None if compact else 2))
 
 
 def readings_json(
@@ -89,7 +86,12 @@ def readings_json(
 
 def drive_json(line: str, session: DriveSession) -> dict[str, Any]:
     """Which drive, on which line as it was typed: how every document about one begins."""
-    return {"line": line, "device": session.device, "profile": session.profile.id}
+    from tui.session.monitor.timeout import timeout_now
+
+    from .left_alone import timeout_json
+
+    about = {"line": line, "device": session.device, "profile": session.profile.id}
+    return {**about, "timeout": timeout_json(timeout_now(session))}
 
 
 def reading_json(reading: Reading) -> dict[str, Any]:

@@ -10,8 +10,10 @@ from typing import Any
 import tomli
 
 from ..errors import DriveError
+from ..plain import plain
 from ..profile.profile import Profile
 from ..profile.schema import Block
+from ..toml_text import toml_tables
 from .assignment import UNUSED, Assignment, MappingError, slot_target
 from .picking import raw_named
 
@@ -25,7 +27,7 @@ _KEY = re.compile(r"\s*(?:\"([^\"]*)\"|'([^']*)'|([A-Za-z0-9_-]+))\s*=")
 
 def dump_blocks(profile: Profile, plans: Sequence[Assignment], note: str = "") -> str:
     """The text of a file with these assignments; `note` is put into its first lines."""
-    lines = [f"# {line}" for line in note.splitlines()]
+    lines = [f"# {plain(line)}" for line in note.splitlines()]
     lines += [f"[{HEAD}]", f"format = {BLOCK_FILE_FORMAT}", f"profile = {json.dumps(profile.id)}"]
     for plan in plans:
         lines += ["", f"[{plan.block.id}]"]
@@ -41,7 +43,7 @@ def load_blocks(text: str, file: str, profile: Profile) -> dict[str, Assignment]
     it, or nothing that the slot can stand for.
     """
     try:
-        tables = tomli.loads(text)
+        tables = toml_tables(text)
     except tomli.TOMLDecodeError as error:
         raise _syntax(text, file, error) from error
     lines = _lines(text)
@@ -67,7 +69,8 @@ def _line(profile: Profile, block: Block, slot: str, raw: int) -> str:
         return f'{slot} = "none"'
     if parameter is None:
         return f"{slot} = {raw}  # not known"
-    return f"{slot} = {json.dumps(parameter.code)}  # {parameter.number} {parameter.name}"
+    comment = plain(f"{parameter.number} {parameter.name}")
+    return f"{slot} = {json.dumps(parameter.code)}  # {comment}"
 
 
 def _assignment(

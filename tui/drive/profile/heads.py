@@ -15,6 +15,7 @@ from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from ..errors import ProfileError
+from ..small_file import open_regular, read_small_text
 
 HEAD_BYTES = 4096
 """Characters in which a head stands."""
@@ -61,11 +62,11 @@ def file_head(path: Path, own: bool, packaged: Path) -> ProfileFileHead:
 def quick_head(path: Path) -> ProfileFileHead:
     """The head of a file out of its first characters; empty where it is not there alone."""
     try:
-        with path.open(encoding="utf-8") as file:
+        with open(open_regular(path), encoding="utf-8") as file:
             text = file.read(HEAD_BYTES)
     except (OSError, UnicodeDecodeError):
         return ProfileFileHead()
-    return ProfileFileHead(_section(text, "profile") or {})
+    return ProfileFileHead(section(text, "profile") or {})
 
 
 def asked_of(path: Path, own: bool, packaged: Path) -> AskedOf:
@@ -85,12 +86,12 @@ def _stamp(path: Path) -> tuple[int, int]:
 @lru_cache(maxsize=256)
 def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> ProfileFileHead:
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_small_text(path)
     except OSError as error:
         return ProfileFileHead(fault=f"cannot be read: {error.strerror}")
     except UnicodeDecodeError as error:
         return ProfileFileHead(fault=f"byte {error.start} is not UTF-8 text")
-    head = _section(text, "profile") or {}
+    head = section(text, "profile") or {}
     if not own and head and (count := _counted(text, head, packaged)) is not None:
         return ProfileFileHead(head, count)
     try:
@@ -107,7 +108,7 @@ def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
     """How many parameters a packaged file has with those that it shares; None if not plain."""
     if "rows_from" not in head:
         return len(_PARAMETER.findall(text))
-    if "without" in head or (shared := _shared_texts(head, packaged)) is None:
+    if "without" in head or (shared := shared_texts(head, packaged)) is None:
         return None
     texts = (text, *shared)
     codes = [row[1] for one in texts for row in _CODE.findall(one)]
@@ -115,11 +116,11 @@ def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
     return len(set(codes)) if plain else None
 
 
-def _shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
+def shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
     """The texts of a packaged file's shared rows; None where they are not there."""
     names = head.get("rows_from")
     try:
-        return [(packaged / name).read_text(encoding="utf-8") for name in names or ()]
+        return [read_small_text(packaged / name) for name in names or ()]
     except (OSError, UnicodeDecodeError, TypeError):
         return None
 
@@ -145,15 +146,15 @@ def _told(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
     """The tables identification and functions, among others."""
     if own:
         return _whole(path, packaged)
-    text = path.read_text(encoding="utf-8")
-    head = _section(text, "profile")
-    shared = _shared_texts(head, packaged) if head is not None else None
+    text = read_small_text(path)
+    head = section(text, "profile")
+    shared = shared_texts(head, packaged) if head is not None else None
     if shared is None or any(
         header[1] != "parameters" for one in shared for header in _HEADER.finditer(one)
     ):
         return _whole(path, packaged)
-    found = {"identification": _section(text, "identification") or {}}
-    functions = _section(text, "functions")
+    found = {"identification": section(text, "identification") or {}}
+    functions = section(text, "functions")
     return {**found, "functions": functions} if functions else _whole(path, packaged)
 
 
@@ -163,9 +164,11 @@ def _whole(path: Path, packaged: Path) -> Mapping[str, Any]:
     return read_tables(path, packaged).tables
 
 
-def _section(text: str, name: str) -> Any:
+def section(text: str, name: str) -> Any:
     """A table of the top read by itself; None where that cannot be done."""
     import tomli
+
+    from ..toml_text import toml_tables
 
     headers = list(_HEADER.finditer(text))
     own = [n for n, header in enumerate(headers) if header[1] == name]
@@ -174,6 +177,6 @@ def _section(text: str, name: str) -> Any:
     last = own[-1] + 1
     end = headers[last].start() if last < len(headers) else len(text)
     try:
-        return tomli.loads(text[headers[own[0]].start() : end]).get(name)
+        return toml_tables(text[headers[own[0]].start() : end]).get(name)
     except tomli.TOMLDecodeError:
         return None

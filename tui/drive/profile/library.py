@@ -48,13 +48,16 @@ def packaged_folder() -> Path:
 def user_folder() -> Path:
     """The folder of the user's own profiles, in the configuration folder.
 
-    `DRIVEPANEL_CONFIG` names another configuration folder.
+    `DRIVEPANEL_CONFIG` names another configuration folder. Without a home there is none.
     """
     if configured := os.environ.get("DRIVEPANEL_CONFIG"):
         return Path(configured) / "profiles"
     from platformdirs import user_config_path
 
-    return user_config_path("drivepanel", appauthor=False) / "profiles"
+    try:
+        return user_config_path("drivepanel", appauthor=False) / "profiles"
+    except RuntimeError:
+        return Path(os.devnull) / "profiles"
 
 
 def profile_files() -> Iterator[tuple[Path, bool]]:

@@ -8,6 +8,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from ..errors import ProfileError
+from ..plain import escaped_toml
 
 _HEAD = re.compile(r"^\[profile\][^\n]*\n.*?(?=^\[|\Z)", re.MULTILINE | re.DOTALL)
 _ID = re.compile(r"""^id[ \t]*=[ \t]*(?:"[^"\n]*"|'[^'\n]*')""", re.MULTILINE)
@@ -62,6 +63,8 @@ def _written(value: Any) -> str:
             return "true" if value else "false"
         case int():
             return str(value)
+        case str():
+            return escaped_toml(value)
         case dict():
             return f"{{ {', '.join(f'{_key(key)} = {_written(value[key])}' for key in value)} }}"
         case list():
@@ -70,7 +73,7 @@ def _written(value: Any) -> str:
             if long:
                 return "[\n" + "".join(f"  {part},\n" for part in parts) + "]"
             return f"[{', '.join(parts)}]"
-    return json.dumps(value, ensure_ascii=False)
+    return json.dumps(value)
 
 
 def _key(key: str) -> str:

@@ -16,6 +16,8 @@ from typing import Any
 import tomli
 
 from ..errors import ProfileError
+from ..small_file import read_small_text
+from ..toml_text import toml_tables
 from .toml_lines import TomlPath, toml_lines
 
 ROW_KEYS: Mapping[TomlPath, str] = {
@@ -106,7 +108,7 @@ def read_tables(path: Path, packaged: Path) -> ProfileTables:
 def source_text(path: Path) -> SourceText:
     """The text of a file; raises ProfileError."""
     try:
-        return SourceText(str(path), path.read_text(encoding="utf-8"))
+        return SourceText(str(path), read_small_text(path))
     except OSError as error:
         raise ProfileError(f"{path}: cannot be read: {error.strerror}.") from error
     except UnicodeDecodeError as error:
@@ -116,7 +118,7 @@ def source_text(path: Path) -> SourceText:
 def parsed(source: SourceText) -> dict[str, Any]:
     """The tables of a text; raises ProfileError with the line where it is no TOML."""
     try:
-        return tomli.loads(source.text)
+        return toml_tables(source.text)
     except tomli.TOMLDecodeError as error:
         line = getattr(error, "lineno", 1)
         raise ProfileError(f"{source.file}:{line}: not valid TOML: {error}.") from error
@@ -141,6 +143,12 @@ def _word_order(tables: dict[str, Any]) -> dict[str, Any]:
             if isinstance(row, dict) and row.get("type") in ("uint32", "int32"):
                 row.setdefault("low_word_first", order)
     return tables
+
+
+def _told(row: Mapping[str, Any], key: str) -> object:
+    """What tells a row apart; a list or a table, which is a fault to be told later, by its text."""
+    value = row.get(key)
+    return repr(value) if isinstance(value, list | dict) else value
 
 
 class _Merging:
@@ -181,12 +189,12 @@ class _Merging:
     ) -> None:
         key = ROW_KEYS[at]
         # rows of one file do not change each other: two of one key are a fault to be told
-        index = {row.get(key): n for n, row in enumerate(rows) if isinstance(row, dict)}
+        index = {_told(row, key): n for n, row in enumerate(rows) if isinstance(row, dict)}
         order = list(range(len(rows)))
         above = -1
         for number, row in enumerate(value):
-            known = isinstance(row, dict) and row.get(key) in index
-            place = index[row[key]] if known else len(rows)
+            known = isinstance(row, dict) and _told(row, key) in index
+            place = index[_told(row, key)] if known else len(rows)
             if not known:
                 rows.append({} if isinstance(row, dict) else row)
                 order.insert(order.index(above) + 1 if above in order else len(order), place)

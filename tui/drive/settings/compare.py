@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Literal
 
+from ..plain import plain, plain_cells
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import shown
@@ -191,15 +192,16 @@ def _markdown(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
 
 
 def _bar(cells: Iterable[str]) -> str:
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(plain(cell).replace("|", "\\|") for cell in cells) + " |"
 
 
 def _csv(rows: Sequence[ComparedRow], labels: tuple[str, str]) -> str:
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
-    writer.writerow(["code", "name", "group", *labels, "raw a", "raw b", "differs", "remark"])
+    head = ["code", "name", "group", *labels, "raw a", "raw b", "differs", "remark"]
+    writer.writerow(plain_cells(head))
     for row in rows:
-        raws = ("" if raw is None else raw for raw in (row.a_raw, row.b_raw))
         differs = "yes" if row.differs else "no"
-        writer.writerow([row.code, row.name, row.group, row.a, row.b, *raws, differs, row.note])
+        told = (row.code, row.name, row.group, row.a, row.b, row.a_raw, row.b_raw)
+        writer.writerow(plain_cells((*told, differs, row.note)))
     return text.getvalue()

@@ -7,12 +7,12 @@ file that was cut short is noticed.
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from ..errors import DriveError
+from ..plain import escaped_toml
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import scale_sources, shown
@@ -123,5 +123,5 @@ def _key(text: str) -> str:
 
 
 def _text(text: str) -> str:
-    """A basic string of TOML: JSON's, with the one character more that TOML wants escaped."""
-    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+    """A basic string of TOML."""
+    return escaped_toml(text)

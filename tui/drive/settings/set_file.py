@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ..profile import library
+from ..small_file import read_small_text
 from .parameter_set import ParameterSet, SetError
 from .set_reading import load_set
 
@@ -22,7 +23,7 @@ def read_set(path: Path, name: str = "") -> ParameterSet:
     """
     name = name or str(path)
     try:
-        text = path.read_text(encoding="utf-8")
+        text = read_small_text(path)
     except OSError as error:
         raise SetError(f"{name}: cannot be read: {error.strerror or error}.") from error
     except UnicodeDecodeError as error:

@@ -14,6 +14,7 @@ from ..errors import ValueRefused
 from ..profile.profile import Profile
 from ..profile.schema import Parameter
 from ..shown import shown
+from ..toml_text import toml_tables
 from ..values import encode, type_range
 from .parameter_set import (
     ABSENT,
@@ -81,7 +82,7 @@ def load_set(text: str, file: str, profile_of: Callable[[str], Profile]) -> Para
 
 def _tables(text: str, fault: _Fault) -> dict[str, Any]:
     try:
-        return tomli.loads(text)
+        return toml_tables(text)
     except tomli.TOMLDecodeError as error:
         match = _AT.search(str(error))
         at_end = match is not None and match[1] is None
@@ -166,7 +167,7 @@ def _lines_of_codes(text: str) -> dict[tuple[str, str], int]:
             group = ""
             if _TABLE.match(line):
                 try:
-                    (group,) = tomli.loads(line)["parameters"]
+                    (group,) = toml_tables(line)["parameters"]
                 except (tomli.TOMLDecodeError, ValueError):
                     group = ""
         elif group and (match := _KEY.match(line)):

@@ -126,11 +126,14 @@ class BlockKeys(ArmingKeys):
     def _load(self, path: Path) -> None:
         from tui.drive.blocks.assignment import MappingError
         from tui.drive.blocks.file import load_blocks
+        from tui.drive.small_file import read_small_text
 
         try:
-            text = path.read_text(encoding="utf-8")
-        except (OSError, UnicodeDecodeError) as error:
-            raise MappingError(f"{path} cannot be read: {error}.") from error
+            text = read_small_text(path)
+        except OSError as error:
+            raise MappingError(f"{path} cannot be read: {error.strerror}.") from error
+        except UnicodeDecodeError as error:
+            raise MappingError(f"{path}: byte {error.start} is not UTF-8 text.") from error
         for plan in load_blocks(text, path.name, self.session.profile).values():
             self.block_editor.proposals.propose(plan)
 

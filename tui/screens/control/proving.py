@@ -12,9 +12,9 @@ from rich.text import Text
 from tui.bus.errors import LineClosed
 from tui.bus.link import SerialLink
 from tui.session.drive import DriveSession
-from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.proof.prover import Prover
 from tui.session.proof.record import proof_entry
+from tui.session.timeout_told import TimeoutWatch
 from tui.session.work import Permit, Task
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG

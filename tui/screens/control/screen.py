@@ -15,7 +15,7 @@ from tui.drive.chart import ENABLED_KINDS
 from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
 from tui.session.console import DriveConsole
-from tui.session.monitor.timeout import TimeoutWatch
+from tui.session.timeout_told import TimeoutWatch
 from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
 from tui.widgets.palette import FAINT, PLAIN, STRONG

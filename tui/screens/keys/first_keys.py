@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-import json
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from tui.session.paths import state_folder
+from tui.session.stored import store_json, stored_json
 
 OFFER = "First start on this terminal: press F12, a stop key, to see whether it arrives."
 ARRIVED = "F12 arrived: it stops motors from this terminal, as Space and F9 do."
@@ -19,28 +20,16 @@ def terminal_name() -> str:
 
 def was_tried() -> bool:
     """Whether F12 arrived on this kind of terminal before."""
-    try:
-        tried = json.loads(_file().read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return False
+    tried = stored_json(_file())
     return isinstance(tried, list) and terminal_name() in tried
 
 
 def remember() -> None:
     """F12 arrived; a folder that cannot be written is no error."""
-    file = _file()
-    try:
-        tried = json.loads(file.read_text(encoding="utf-8")) if file.is_file() else []
-    except (OSError, ValueError):
-        tried = []
+    tried = stored_json(_file())
     known = [*(tried if isinstance(tried, list) else []), terminal_name()]
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part")
-        part.write_text(json.dumps(sorted(set(map(str, known)))), encoding="utf-8")
-        part.replace(file)
-    except OSError:
-        return
+    with suppress(OSError):
+        store_json(_file(), sorted({one for one in known if isinstance(one, str)}))
 
 
 def unknown_text(data: bytes) -> str:

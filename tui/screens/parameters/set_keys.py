@@ -43,7 +43,8 @@ class SetKeys(ParameterKeys):
 
     def action_report(self) -> None:
         """Ask for a file, read everything, write what a customer may be given."""
-        from tui.session.report import entries_of, report_text
+        from tui.session.journal_reading import entries_of
+        from tui.session.report import report_text
 
         def text(values: ParameterSet) -> str:
             entries = entries_of(self.editor.journal, self.session.line_text, self.session.device)

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from tui.bus.api import Priority
-from tui.bus.errors import LineError, RequestRefused
+from tui.bus.errors import DeviceException, LineError, RequestRefused
 from tui.drive.blocks.assignment import UNUSED, Assignment, slot_target
 from tui.drive.blocks.wire_cost import span
 from tui.drive.profile.schema import Parameter
@@ -139,7 +139,7 @@ class _Exchange:
     ) -> tuple[tuple[int, ...], dict[str, int]]:
         """The words that came back, and what the drive holds then; all into the journal."""
         words = [to_words(parameter, raws[parameter.code])[0] for parameter in self.targets]
-        answer, back = "ok", dict[str, int]()
+        answer, back, lost = "ok", dict[str, int](), False
         image = self.session.image
         before = {p.code: image.get(p.code) for p in self.targets}
         for code in before:
@@ -153,12 +153,14 @@ class _Exchange:
                 image.believe(code, held_before)
             raise
         except LineError as error:
-            answer = str(error)
+            answer, lost = str(error), not isinstance(error, DeviceException)
             raise
         finally:
             self.session.note_command()
             for parameter in self.targets:
-                self._record(parameter, held, raws, answer, back)
+                entry = self._record(parameter, held, raws, answer, back)
+                if lost:
+                    self.writer.complete_later(entry, parameter)
         return reply, back
 
     async def _transmit(self, words: list[int]) -> tuple[int, ...]:
@@ -213,7 +215,7 @@ class _Exchange:
         raws: Mapping[str, int],
         answer: str,
         back: Mapping[str, int],
-    ) -> None:
+    ) -> Entry:
         session, code = self.session, parameter.code
         old, new = held.get(code), raws[code]
         if code in self._not_held(raws, back):
@@ -234,6 +236,7 @@ class _Exchange:
             why=f"through {self.outputs.block.name.lower()}",
         )
         self.writer.journal.add(entry)
+        return entry
 
     def _text(self, parameter: Parameter, raw: int | None) -> str:
         return self.writer.text(parameter, raw)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 
 from tui.bus.api import Priority
@@ -12,6 +11,7 @@ from tui.drive.blocks.user_words import COUNT, UserWord, UserWords, format_named
 
 from ..drive import DriveSession
 from ..paths import state_folder
+from ..stored import store_json, stored_json
 
 
 async def read_words(session: DriveSession, words: UserWords) -> list[int | None]:
@@ -56,22 +56,15 @@ def save_words(session: DriveSession, words: UserWords) -> str:
     """Keep them for this drive; returns why that failed, or nothing."""
     kept = _kept()
     kept[_key(session)] = [{"address": w.address, "format": w.format} for w in words]
-    file = _file()
     try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part")
-        part.write_text(json.dumps(kept, indent=1), encoding="utf-8")
-        part.replace(file)
+        store_json(_file(), kept)
     except OSError as error:
         return f"The user words cannot be kept: {error.strerror or error}."
     return ""
 
 
 def _kept() -> dict[str, object]:
-    try:
-        told = json.loads(_file().read_text(encoding="utf-8"))
-    except (OSError, ValueError):
-        return {}
+    told = stored_json(_file())
     return told if isinstance(told, dict) else {}
 
 

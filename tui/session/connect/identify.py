@@ -10,6 +10,7 @@ from tui.bus.api import IdentificationObjects, Priority, Reply
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
 from tui.bus.expectation import IDENTIFY
 from tui.drive.errors import DriveError
+from tui.drive.plain import plain
 from tui.drive.profile import library
 
 VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
@@ -77,7 +78,7 @@ async def identify_drive(
 
 async def identity_told(device: int, answer: IdentificationObjects) -> DriveIdentity:
     """Who a drive is by its answer to function 43; looks for fitting profiles in a thread."""
-    return await asyncio.to_thread(_identity, device, answer)
+    return await asyncio.to_thread(identity_from, device, answer)
 
 
 async def _ask(line: Askable, device: int, priority: Priority) -> IdentificationObjects:
@@ -94,9 +95,10 @@ def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:
     return DriveIdentity(device, "", "", "", "", None, candidates)
 
 
-def _identity(device: int, answer: IdentificationObjects) -> DriveIdentity:
+def identity_from(device: int, answer: IdentificationObjects) -> DriveIdentity:
+    """What a drive says of itself, as text that commands no terminal wherever it is shown."""
     texts = {
-        number: value.decode("ascii", errors="replace").strip("\0 ")
+        number: plain(value.decode("ascii", errors="replace").strip("\0 "))
         for number, value in answer.objects.items()
     }
     reference = texts.get(REFERENCE, "")

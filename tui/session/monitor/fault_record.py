@@ -12,6 +12,7 @@ from dataclasses import dataclass, field, replace
 from datetime import datetime
 
 from tui.drive.hints import hint_markdown, reset_text
+from tui.drive.plain import plain
 from tui.drive.profile.schema import FaultCode
 from tui.drive.values import NOT_AVAILABLE
 
@@ -156,7 +157,7 @@ def record_text(
         f"| {e.time[11:23]} | {e.code} | {e.old} | {e.new} | {e.answer} | {e.why} |"
         for e in record.writes
     ] or ["Nothing."]
-    return "\n".join(lines) + "\n"
+    return plain("\n".join(lines) + "\n", lines=True)
 
 
 def _pointed_at(

@@ -83,6 +83,7 @@ class ProofResult:
             "turning": self.turning,
             "as_set": self.as_set,
             "text": self.text,
+            "changed": self.changed or None,
         }
 
 

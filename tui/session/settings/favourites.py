@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterable
+from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from ..paths import state_folder
+from ..stored import store_json, stored_json
 
 RECENT_KEPT = 30
 
@@ -39,23 +40,19 @@ class Marks:
 
 def load_marks(profile_id: str) -> Marks:
     """What was kept; nothing where the file is missing or damaged."""
-    try:
-        told = json.loads(_file(profile_id).read_text(encoding="utf-8"))
-        return Marks(**{key: tuple(map(str, told.get(key, ()))) for key in asdict(Marks())})
-    except (OSError, ValueError, TypeError, AttributeError):
-        return Marks()
+    told = stored_json(_file(profile_id))
+    listed = {key: told.get(key) for key in asdict(Marks())} if isinstance(told, dict) else {}
+    return Marks(**{key: _texts(found) for key, found in listed.items()})
+
+
+def _texts(found: object) -> tuple[str, ...]:
+    return tuple(one for one in found if isinstance(one, str)) if isinstance(found, list) else ()
 
 
 def save_marks(profile_id: str, marks: Marks) -> None:
     """Keep them; a folder that cannot be written is no error."""
-    file = _file(profile_id)
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        part = file.with_suffix(".part")
-        part.write_text(json.dumps(asdict(marks), indent=1), encoding="utf-8")
-        part.replace(file)
-    except OSError:
-        return
+    with suppress(OSError):
+        store_json(_file(profile_id), asdict(marks))
 
 
 def _file(profile_id: str) -> Path:

@@ -6,8 +6,8 @@ resumed by starting it again. A mark in the state folder only tells that one was
 
 from __future__ import annotations
 
-import json
 import re
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -23,6 +23,7 @@ from ..drive import DriveSession
 from ..journal import Journal, now_text
 from ..paths import state_folder
 from ..read.upload import ReadProgress, Upload, setting_codes
+from ..stored import store_json, stored_json
 from ..work import Permit
 from .applied import Applied, Result, WriteProgress
 from .apply import apply_edits
@@ -165,11 +166,10 @@ class Mark:
     @property
     def interrupted(self) -> str:
         """What is known of a restoring that did not come to its end; else empty."""
-        try:
-            told = json.loads(self.path.read_text(encoding="utf-8"))
-            begun, of, taken = told["begun"], told["parameters"], told["set"]
-        except (OSError, ValueError, KeyError, TypeError):
+        told = stored_json(self.path)
+        if not isinstance(told, dict) or not {"begun", "parameters", "set"} <= set(told):
             return ""
+        begun, of, taken = (str(told[key])[:60] for key in ("begun", "parameters", "set"))
         return (
             f"A restoring of {of} settings (set of {taken}) began at {begun} and did not come to"
             " its end. The drive is read and what is missing is written."
@@ -178,13 +178,8 @@ class Mark:
     def begin(self, source: ParameterSet, count: int) -> None:
         """Leave the mark; a folder that cannot be written stops no restoring."""
         told = {"begun": now_text(), "parameters": count, "set": source.head.time or "no time"}
-        try:
-            self.path.parent.mkdir(parents=True, exist_ok=True)
-            part = self.path.with_suffix(".part")
-            part.write_text(json.dumps(told), encoding="utf-8")
-            part.replace(self.path)
-        except OSError:
-            return
+        with suppress(OSError):
+            store_json(self.path, told)
 
     def end(self) -> None:
         """Take the mark away."""

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 
 from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, LineError, RequestRefused, Superseded
@@ -55,7 +56,7 @@ class Writer:
             await self._read_scale(parameter)
         held = await self._held_word(parameter) if is_field(parameter) else None
         before = session.image.get(code)
-        answer, back = "ok", None
+        answer, back, lost = "ok", None, False
         session.image.doubt(code)
         try:
             await session.line.write(
@@ -78,15 +79,46 @@ class Writer:
             # never sent: what was known before still holds
             session.image.believe(code, before)
             raise
-        except LineError as error:
+        except DeviceException as error:
             answer = str(error)
             raise
+        except LineError as error:
+            answer, lost = str(error), True
+            raise
         except asyncio.CancelledError:
-            answer = "a stop came: not known whether it was taken"
+            answer, lost = "a stop came: not known whether it was taken", True
             raise
         finally:
             old = before.raw if before is not None else None
-            self.journal.add(self._entry(parameter, old, raw, answer, back, why))
+            entry = self._entry(parameter, old, raw, answer, back, why)
+            self.journal.add(entry)
+            if lost:
+                self.complete_later(entry, parameter, check if read_back else 0)
+
+    def complete_later(self, entry: Entry, parameter: Parameter, check: int = 0xFFFFFFFF) -> None:
+        """Put into the journal what a write came to whose answer was lost, once that is read.
+
+        It counts as taken where the bits of `check` are those that were written; with 0 a drive
+        may change the word as it likes.
+        """
+        self.session.image.tell_once(
+            parameter.code, partial(self._complete, entry, parameter, check)
+        )
+
+    def _complete(self, entry: Entry, parameter: Parameter, check: int, back: int) -> None:
+        taken = not (back ^ entry.new_raw) & check & 0xFFFFFFFF
+        came = f"{'Taken' if taken else 'Not taken'}: it" if check else "It"
+        answer = f"{came} holds {self.text(parameter, back)}, read back later."
+        self.journal.add(
+            replace(
+                entry,
+                time=now_text(),
+                kind="read-back",
+                of=entry.time,
+                answer=answer,
+                read_back=back,
+            )
+        )
 
     async def _read_scale(self, parameter: Parameter) -> None:
         """See what the parameter's scale and unit follow, so that the journal tells units."""

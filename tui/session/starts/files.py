@@ -11,11 +11,16 @@ from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from tui.drive.small_file import read_small
+
+from ..stored import make_folder
 from .record import StartRecord
 
 log = logging.getLogger(__name__)
 
 ENDING = ".json"
+LONGEST_RECORD = 100_000
+"""Bytes of a file that may be a record."""
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
 """What file systems say that cannot flush a folder; the file itself was flushed."""
 
@@ -85,7 +90,7 @@ class StartFiles:
 
     def _make_folder(self) -> None:
         if not self.folder.is_dir():
-            self.folder.mkdir(parents=True, exist_ok=True)
+            make_folder(self.folder)
             sync_folder(self.folder.parent)
 
 
@@ -101,12 +106,12 @@ def _read(path: Path) -> StartRecord | None:
     import msgspec
 
     try:
-        return msgspec.json.decode(path.read_bytes(), type=StartRecord)
+        return msgspec.json.decode(read_small(path, LONGEST_RECORD), type=StartRecord)
     except FileNotFoundError:
         return None  # its program has just removed it
     except OSError as error:
         log.error("the record of a start, %s, cannot be read: %s", path, error)
-    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+    except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
         log.error("the record of a start, %s, is damaged and set aside: %s", path, error)
         with suppress(OSError):
             path.replace(path.with_suffix(".damaged"))

@@ -16,10 +16,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from tui.drive.errors import DriveError, ValueRefused
+from tui.drive.small_file import read_small_text
 from tui.drive.teaching import LOOKS_KEPT, DisplayLook, parse_display
 
 from ..connect.line_key import line_key
 from ..paths import state_folder
+from ..stored import make_folder
 
 if TYPE_CHECKING:
     from ..connect.identify import DriveIdentity
@@ -90,9 +92,7 @@ def load_taught(drive: TaughtDrive) -> TaughtLooks:
     if path is None:
         return TaughtLooks()
     try:
-        if path.stat().st_size > LONGEST:
-            raise ValueRefused("it is too long")
-        return _looks_in(json.loads(path.read_text(encoding="utf-8")))
+        return _looks_in(json.loads(read_small_text(path, LONGEST)))
     except (OSError, ValueError, RecursionError, ValueRefused) as error:
         raise TaughtUnreadable(
             f"What was taught of this drive cannot be read, {path}: {_reason(error)}. Nothing"
@@ -107,7 +107,7 @@ def keep_taught(drive: TaughtDrive, kept: TaughtLooks) -> None:
     """
     path = drive.found() or drive.file
     try:
-        path.parent.mkdir(parents=True, exist_ok=True)
+        make_folder(path.parent)
         _set_aside_if_damaged(drive, path)
         part = path.with_suffix(f".{os.getpid()}.part")
         try:

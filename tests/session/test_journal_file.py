@@ -1,0 +1,287 @@
+"""The journal's file: shared with other programs, cut off by crashes, on disks that are full."""
+
+from __future__ import annotations
+
+import json
+import os
+import stat
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+
+from tests.programs import PATIENCE, wait_until
+from tui.drive.profile import library
+from tui.session import journal_file, paths
+from tui.session.journal import Entry, Journal
+from tui.session.journal_file import JOURNAL_NAME, JournalFile
+from tui.session.journal_reading import DamagedLine, read_journal
+
+from .test_journal import entry
+
+posix = pytest.mark.skipif(os.name != "posix", reason="modes, pipes and limits of POSIX")
+
+SEVERAL = """
+import sys
+from pathlib import Path
+from tests.session.test_journal import entry
+from tui.session import journal_file
+from tui.session.journal import Journal
+journal_file.LARGEST_FILE = 6000
+journal = Journal(Path(sys.argv[1]))
+print("ready", flush=True)
+sys.stdin.readline()
+first = int(sys.argv[2])
+for number in range(first, first + 40):
+    journal.add(entry(number))
+assert journal.close(60), journal.trouble
+"""
+
+FULL = """
+import resource, sys
+from pathlib import Path
+from tests.session.test_journal import entry
+from tui.session.journal import Journal
+journal = Journal(Path(sys.argv[1]))
+journal.add(entry(1))
+assert journal.flush(60)
+before = journal.path.read_bytes()
+soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+resource.setrlimit(resource.RLIMIT_FSIZE, (len(before) + 20, hard))
+journal.add(entry(2))
+assert not journal.flush(60)
+print(journal.trouble)
+assert journal.path.read_bytes() == before, journal.path.read_bytes()
+resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+assert journal.close(60)
+"""
+
+LEFT = """
+import sys, time
+from pathlib import Path
+from tests.session.test_journal import entry
+from tui.session.journal import Journal
+from tui.session.journal_file import JournalFile
+honest = JournalFile.append
+def slow(self, text):
+    time.sleep(0.2)
+    honest(self, text)
+JournalFile.append = slow
+journal = Journal(Path(sys.argv[1]))
+journal.add(entry(1))
+journal.add(entry(2))
+"""
+
+
+@pytest.fixture
+def journal(tmp_path: Path) -> Iterator[Journal]:
+    made = Journal(tmp_path / "state")
+    yield made
+    made.close(PATIENCE)
+
+
+def program(text: str, *arguments: object) -> subprocess.CompletedProcess[str]:
+    # without compiled modules: half a one would be left for others where there is no room
+    command = [sys.executable, "-B", "-c", text, *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+
+
+def told(journal: Journal) -> list[Entry | DamagedLine]:
+    return list(read_journal(journal.files))
+
+
+def numbers(journal: Journal) -> list[int]:
+    return [one.new_raw for one in told(journal) if isinstance(one, Entry)]
+
+
+@pytest.mark.parametrize("half", [b'{"time": "2026-01-01T00:00:00.000+00:00", "li', b"\0" * 700])
+def test_half_a_line_is_kept_and_marked(journal: Journal, half: bytes) -> None:
+    journal.path.parent.mkdir()
+    whole = json.dumps({"kind": "whatever"}).encode() + b"\n"
+    journal.path.write_bytes(whole + half)
+    journal.add(entry(1))
+    journal.add(entry(2))
+    assert journal.flush(PATIENCE)
+    data = journal.path.read_bytes()
+    assert data.startswith(whole + half + b"\n")
+    mark, first, second = data[len(whole + half) + 1 :].splitlines()
+    assert json.loads(mark)["kind"] == "mended"
+    assert "cut off" in json.loads(mark)["why"]
+    assert [json.loads(one)["new_raw"] for one in (first, second)] == [1, 2]
+    damaged = [one for one in told(journal) if isinstance(one, DamagedLine)]
+    assert [one.number for one in damaged] == [1, 2]
+    assert half.startswith(damaged[1].text.encode()[:10])
+
+
+def test_several_programs_lose_nothing_and_mix_no_lines(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", SEVERAL, str(tmp_path / "state")]
+    programs = [
+        subprocess.Popen(
+            [*command, str(first)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        for first in range(0, 400, 100)
+    ]
+    try:
+        for one in programs:
+            assert one.stdout is not None
+            assert one.stdout.readline() == "ready\n"
+        # all begin at a time
+        said = [one.communicate("\n", timeout=PATIENCE)[1] for one in programs]
+        assert [one.returncode for one in programs] == [0] * 4, said
+    finally:
+        for one in programs:
+            one.kill()
+            one.wait()
+    journal = Journal(tmp_path / "state")
+    assert len([file for file in journal.files if file.exists()]) > 3
+    assert not [one for one in told(journal) if isinstance(one, DamagedLine)]
+    wanted = [n for first in range(0, 400, 100) for n in range(first, first + 40)]
+    assert sorted(numbers(journal)) == wanted
+
+
+@posix
+def test_files_are_moved_by_one_program_at_a_time(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two that moved them at a time would move one over the other."""
+    import fcntl
+
+    monkeypatch.setattr(journal_file, "LARGEST_FILE", 10)
+    monkeypatch.setattr(journal_file, "TURN_PATIENCE", 0.05)
+    file = JournalFile(tmp_path)
+    file.append('{"one": 1}')
+    other = os.open(tmp_path, os.O_RDONLY)
+    try:
+        fcntl.flock(other, fcntl.LOCK_EX)
+        file.append('{"two": 2}')  # waits for nobody for long
+        assert file.path.read_text() == '{"one": 1}\n{"two": 2}\n'
+    finally:
+        os.close(other)
+    file.append('{"three": 3}')
+    assert file.path.read_text() == '{"three": 3}\n'
+    assert file.all[-2].read_text() == '{"one": 1}\n{"two": 2}\n'
+
+
+@posix
+def test_what_a_full_disk_took_of_a_line_is_taken_back(tmp_path: Path) -> None:
+    done = program(FULL, tmp_path / "state")
+    assert done.returncode == 0, done.stderr
+    assert "File too large" in done.stdout
+    assert JOURNAL_NAME in done.stdout
+    journal = Journal(tmp_path / "state")
+    assert numbers(journal) == [1, 2]
+    assert len(told(journal)) == 2
+
+
+def test_a_program_that_ends_puts_its_last_entries_down(tmp_path: Path) -> None:
+    done = program(LEFT, tmp_path / "state")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert numbers(Journal(tmp_path / "state")) == [1, 2]
+
+
+@posix
+def test_the_journal_is_its_owners_alone(tmp_path: Path) -> None:
+    before = os.umask(0)
+    try:
+        journal = Journal(tmp_path / "some" / "state")
+        journal.add(entry(1))
+        assert journal.flush(PATIENCE)
+    finally:
+        os.umask(before)
+    assert stat.S_IMODE(journal.path.stat().st_mode) == 0o600
+    for folder in (journal.path.parent, journal.path.parent.parent):
+        assert stat.S_IMODE(folder.stat().st_mode) == 0o700
+    # one that others could read so far
+    journal.path.chmod(0o644)
+    tmp_path.joinpath("some").chmod(0o755)
+    journal.add(entry(2))
+    assert journal.close(PATIENCE)
+    assert stat.S_IMODE(journal.path.stat().st_mode) == 0o600
+    assert stat.S_IMODE(tmp_path.joinpath("some").stat().st_mode) == 0o755
+
+
+def nowhere(*_: object, **__: object) -> Path:
+    raise RuntimeError("could not determine the home directory")
+
+
+@posix
+def test_what_is_no_file_is_told_and_holds_nobody_up(tmp_path: Path) -> None:
+    state = tmp_path / "state"
+    state.mkdir()
+    os.mkfifo(state / JOURNAL_NAME)
+    reader = os.open(state / JOURNAL_NAME, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        journal = Journal(state)
+        journal.add(entry(1))
+        assert not journal.close(PATIENCE)
+        assert "Not a regular file" in journal.trouble
+    finally:
+        os.close(reader)
+
+
+def test_trouble_is_told_at_once_and_once(tmp_path: Path) -> None:
+    said: list[str] = []
+    (tmp_path / "state").touch()
+    journal = Journal(tmp_path / "state", on_trouble=said.append)
+    journal.add(entry(1))
+    wait_until(lambda: bool(said), "it is told", patience=15)
+    journal.add(entry(2))
+    assert not journal.close(PATIENCE)
+    assert said == [
+        f"The journal cannot be written: Not a directory: {tmp_path / 'state' / JOURNAL_NAME}."
+    ]
+    assert journal.unkept == 2
+
+
+def test_who_cannot_be_told_costs_no_entry(tmp_path: Path) -> None:
+    def gone(text: str) -> None:
+        raise OSError(text)
+
+    (tmp_path / "state").touch()
+    journal = Journal(tmp_path / "state", on_trouble=gone)
+    journal.add(entry(1))
+    assert not journal.flush(PATIENCE)
+    (tmp_path / "state").unlink()
+    assert journal.close(PATIENCE)
+    assert numbers(journal) == [1]
+
+
+@pytest.mark.parametrize("home", [lambda *_, **__: Path("~/.local/state"), nowhere])
+def test_without_a_home_nothing_is_strewn_about(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, home: Callable[..., Path]
+) -> None:
+    """A user without an entry in the system's list: `~` stays, or platformdirs gives it up."""
+    monkeypatch.delenv("DRIVEPANEL_STATE")
+    monkeypatch.delenv("DRIVEPANEL_CONFIG")
+    monkeypatch.setattr("platformdirs.user_state_path", home)
+    monkeypatch.setattr("platformdirs.user_config_path", nowhere)
+    assert library.listings()
+    monkeypatch.chdir(tmp_path)
+    before = sorted(tmp_path.rglob("*"))
+    journal = Journal()
+    journal.add(entry(1))
+    assert not journal.close(PATIENCE)
+    assert "name a folder in DRIVEPANEL_STATE" in journal.trouble
+    paths.remember_line("sim:atv71")
+    assert paths.recent_lines() == []
+    assert sorted(tmp_path.rglob("*")) == before
+
+
+def test_a_line_that_could_not_be_flushed_is_not_put_down_twice(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    file = JournalFile(tmp_path / "state")
+    file.append('{"one": 1}')
+    honest = os.fsync
+    monkeypatch.setattr(os, "fsync", lambda _: (_ for _ in ()).throw(OSError(5, "Input/output")))
+    with pytest.raises(OSError, match="Input/output"):
+        file.append('{"two": 2}')
+    monkeypatch.setattr(os, "fsync", honest)
+    file.append('{"two": 2}')
+    assert file.path.read_text().splitlines() == ['{"one": 1}', '{"two": 2}']

@@ -1,0 +1,131 @@
+"""What is read of a journal of any content: every entry that is whole, and what is not."""
+
+from __future__ import annotations
+
+import json
+import os
+from dataclasses import asdict, replace
+from datetime import UTC, datetime
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.session import journal_reading
+from tui.session.journal import Entry
+from tui.session.journal_reading import DamagedLine, completed, read_journal, selected
+
+from .test_journal import entry
+
+
+def line_of(one: Entry) -> bytes:
+    return json.dumps(asdict(one)).encode() + b"\n"
+
+
+def told(file: Path) -> list[Entry | DamagedLine]:
+    return list(read_journal([file]))
+
+
+@given(garbage=st.lists(st.binary(max_size=80).filter(lambda b: b.strip()), max_size=6))
+def test_whole_entries_are_found_among_anything(
+    garbage: list[bytes], tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    file = tmp_path_factory.mktemp("journal") / "journal.jsonl"
+    parts = [line_of(entry(0))]
+    for number, data in enumerate(garbage, start=1):
+        parts += [data.replace(b"\n", b" ") + b"\n", line_of(entry(number))]
+    file.write_bytes(b"".join(parts))
+    numbers = [one.new_raw for one in told(file) if isinstance(one, Entry)]
+    assert numbers == list(range(len(garbage) + 1))
+
+
+ODD = {
+    "deep": b"[" * 200_000,
+    "deep table": b'{"a":' * 100_000,
+    "no table": b"[1, 2]",
+    "huge number": b'{"device": ' + b"9" * 10_000 + b"}",
+    "NUL": b"\0" * 5000,
+    "another type": line_of(entry(1)).strip().replace(b'"device": 1', b'"device": "1"'),
+    "a field less": b'{"time": "now", "line": "x"}',
+    "UTF-16": '{"time": "now"}'.encode("utf-16"),
+    "another kind": line_of(entry(1)).strip().replace(b'"write"', b'"lie"'),
+    "long": b"x" * 1_000_000,
+}
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_lines_are_told_and_hide_nothing(name: str, tmp_path: Path) -> None:
+    file = tmp_path / "journal.jsonl"
+    file.write_bytes(line_of(entry(1)) + ODD[name] + b"\n" + line_of(entry(2)) + b"half")
+    one, odd, two, half = told(file)
+    assert (one, two) == (entry(1), entry(2))
+    assert isinstance(odd, DamagedLine)
+    assert isinstance(half, DamagedLine)
+    assert (odd.number, half.number, half.text) == (2, 4, "half")
+    assert len(odd.text) <= journal_reading.DAMAGE_SHOWN
+
+
+def test_half_a_character_in_a_name_is_no_damage(tmp_path: Path) -> None:
+    file = tmp_path / "journal.jsonl"
+    odd = replace(entry(1), line="\ud83d\x1b]0;x\x07")
+    file.write_bytes(line_of(odd))
+    assert told(file) == [odd]
+
+
+def test_entries_of_earlier_versions_are_read(tmp_path: Path) -> None:
+    file = tmp_path / "journal.jsonl"
+    old = asdict(entry(1))
+    del old["kind"], old["of"]
+    file.write_text(json.dumps(old) + "\n" + json.dumps({**asdict(entry(2)), "new field": 1}))
+    assert told(file) == [entry(1), entry(2)]
+
+
+def test_a_file_without_end_is_read_at_its_end(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(journal_reading, "READ_MOST", 1000)
+    file = tmp_path / "journal.jsonl"
+    file.write_bytes(b"".join(line_of(entry(number)) for number in range(50)))
+    found = [one.new_raw for one in told(file) if isinstance(one, Entry)]
+    assert 0 < len(found) < 10
+    assert found == list(range(50 - len(found), 50))
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")
+def test_a_pipe_in_its_place_holds_nobody_up(tmp_path: Path) -> None:
+    os.mkfifo(tmp_path / "journal.jsonl")
+    with pytest.raises(OSError, match="no regular file"):
+        told(tmp_path / "journal.jsonl")
+
+
+def test_what_was_read_back_completes_its_own_write_only() -> None:
+    one = replace(entry(1), time="t1", answer="no answer.")
+    two = replace(entry(1), time="t2", answer="no answer.", device=2)
+    back = replace(one, time="t3", kind="read-back", of="t1", answer="Taken.", read_back=1)
+    lone = replace(back, of="t0")
+    assert completed([one, two, back, lone]) == [
+        replace(one, answer="no answer. Taken.", read_back=1),
+        two,
+        lone,
+    ]
+
+
+def test_a_drive_a_line_and_a_time_are_selected() -> None:
+    here = [
+        replace(entry(1), time="2026-03-01T08:00:00.000+00:00", line="tcp:Host:502"),
+        replace(entry(2), time="2026-03-01T09:00:00.000+00:00", line="tcp:host:502", device=2),
+        replace(entry(3), time="2026-03-01T10:00:00.000+00:00", line="other"),
+        replace(entry(4), time="no time"),
+    ]
+
+    def numbers(**how: object) -> list[int]:
+        return [one.new_raw for one in selected(here, **how)]  # type: ignore[arg-type]
+
+    assert numbers() == [1, 2, 3, 4]
+    assert numbers(device=2) == [2]
+    # however it was typed
+    assert numbers(line="tcp:HOST") == [1, 2]
+    assert numbers(line="tcp:host", device=1) == [1]
+    # what cannot be told is kept
+    assert numbers(since=datetime(2026, 3, 1, 9, tzinfo=UTC)) == [2, 3, 4]

@@ -1,0 +1,144 @@
+"""`drivepanel journal`: what was written to drives from here, and which trips were seen."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import asdict, dataclass
+from datetime import datetime, time, timedelta
+from typing import TYPE_CHECKING
+
+import click
+
+from ..shared.errors import USAGE, Failure, told
+from ..shared.options import json_option
+from ..shared.output import print_json
+from ..shared.say import say
+
+if TYPE_CHECKING:
+    from tui.session.journal import Entry
+    from tui.session.journal_reading import DamagedLine
+
+_SECONDS = {"s": 1, "m": 60, "h": 3600, "d": 86400, "w": 604800}
+_AGO = re.compile(r"(\d{1,9})\s*([smhdw])")
+
+
+@dataclass(frozen=True, slots=True)
+class WantedDrive:
+    """Which entries: of an address, of a line, or of both."""
+
+    device: int | None = None
+    line: str = ""
+
+
+def _wanted_drive(_ctx: click.Context, _option: click.Parameter, text: str) -> WantedDrive:
+    """What `2`, `2/LINE` or `LINE` means."""
+    number, slash, line = text.partition("/")
+    if not number.isdecimal() or (slash and not line):
+        return WantedDrive(line=text)
+    if not 1 <= (device := int(number[:9])) <= 247:
+        raise click.BadParameter(f"{number[:9]} is no slave address: they are 1 to 247.")
+    return WantedDrive(device, line)
+
+
+def _begin(_ctx: click.Context, _option: click.Parameter, text: str | None) -> datetime | None:
+    """The time that was typed, in the zone of here."""
+    if text is None:
+        return None
+    if (found := since(text, datetime.now().astimezone())) is None:
+        raise click.BadParameter(
+            f"{text!r} is no time. Write it like 2h, 30m, 7d, 08:30, 2026-03-01 or"
+            " 2026-03-01T08:30."
+        )
+    return found
+
+
+def since(text: str, now: datetime) -> datetime | None:
+    """The time that a text means; None where it means none. A time of day is the last one."""
+    text = text.strip()
+    try:
+        if ago := _AGO.fullmatch(text):
+            return now - timedelta(seconds=int(ago[1]) * _SECONDS[ago[2]])
+        if re.fullmatch(r"\d\d?:\d\d(:\d\d)?", text):
+            of_day = time.fromisoformat(text.rjust(5, "0") if len(text) < 6 else text.rjust(8, "0"))
+            then = datetime.combine(now.date(), of_day).astimezone()
+            return then if then <= now else then - timedelta(days=1)
+        return datetime.fromisoformat(text).astimezone()
+    except (ValueError, OverflowError, OSError):
+        return None
+
+
+@click.command()
+@click.option(
+    "--drive",
+    "wanted",
+    callback=_wanted_drive,
+    default="",
+    metavar="D/LINE",
+    help="Of one drive only: its slave address, like 2, or with its line, like 2/LINE.",
+)
+@click.option(
+    "--since",
+    "begin",
+    callback=_begin,
+    metavar="TIME",
+    help="From a time on: 2h, 30m or 7d ago, 08:30, 2026-03-01, 2026-03-01T08:30.",
+)
+@json_option
+@told
+def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
+    """Show what was written to drives from this computer, and the trips that were seen.
+
+    Of each write: when, which drive, from what to what, what the drive said, and why. What a
+    damaged journal still holds is shown, too.
+    """
+    from tui.session.journal import Entry, Journal
+    from tui.session.journal_reading import DamagedLine, completed, read_journal, selected
+
+    kept = Journal()
+    try:
+        lines = list(read_journal(kept.files))
+    except OSError as error:
+        raise Failure(f"{kept.path} cannot be read: {error.strerror or error}.", USAGE) from error
+    entries = completed(one for one in lines if isinstance(one, Entry))
+    shown = selected(entries, device=wanted.device, line=wanted.line, since=begin)
+    damaged = [one for one in lines if isinstance(one, DamagedLine)]
+    if as_json:
+        print_json(
+            {
+                "journal": str(kept.path),
+                "entries": [asdict(one) for one in shown],
+                "damaged": [
+                    {"file": str(one.file), "line": one.number, "text": one.text} for one in damaged
+                ],
+            }
+        )
+        return
+    _say(shown, damaged, str(kept.path), filtered=len(shown) < len(entries))
+
+
+def _say(entries: list[Entry], damaged: list[DamagedLine], path: str, *, filtered: bool) -> None:
+    for one in entries:
+        say(entry_line(one))
+    if not entries:
+        say("No entry of the journal fits." if filtered else f"The journal is empty: {path}")
+    for line in damaged:
+        say(
+            f"drivepanel: {line.file}, line {line.number} is no entry"
+            f" (cut off or damaged): {line.text[:60]}",
+            err=True,
+        )
+
+
+def entry_line(entry: Entry) -> str:
+    """An entry in a line: when, which drive, from what to what, the answer, why."""
+    from tui.session.journal_reading import time_of
+
+    when = time_of(entry)
+    told = f"{when:%Y-%m-%d %H:%M:%S}" if when is not None else entry.time
+    head = f"{told}  {entry.device}/{entry.line}"
+    if entry.kind == "fault":
+        return f"{head}  FAULT {entry.code} {entry.new}: {entry.answer}"
+    if entry.kind == "read-back":
+        return f"{head}  {entry.code}: {entry.answer}"
+    change = f"{entry.old} -> {entry.new}" if entry.old else f"-> {entry.new}"
+    return f"{head}  {entry.code}: {change}  {entry.answer}  ({entry.why})"

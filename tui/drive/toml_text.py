@@ -1,0 +1,54 @@
+"""TOML of any content read as tables, or refused in a sentence with its line.
+
+The parser itself lets Python's own limits through, and takes minutes for some texts that no person
+writes.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import tomli
+
+DEEPEST = 24
+"""Tables and lists within one another; a profile needs six."""
+_PARTS = re.compile(rf"""^[ \t]*\[{{0,2}}(?:[^=\n"'#.\]]*\.){{{DEEPEST}}}""", re.MULTILINE)
+_OPENED = re.compile(rf"(?:[\[{{][ \t\r\n]*(?:[\w-]+[ \t]*=[ \t\r\n]*)?){{{DEEPEST}}}")
+
+
+def toml_tables(text: str) -> dict[str, Any]:
+    """The tables of a text; raises tomli.TOMLDecodeError, whatever is wrong with it."""
+    for pattern in (_PARTS, _OPENED):
+        if found := pattern.search(text):
+            raise _too_deep(text, found.start())
+    try:
+        tables = tomli.loads(text)
+    except RecursionError:
+        raise _too_deep(text, 0) from None
+    except tomli.TOMLDecodeError:
+        raise
+    except (ValueError, OverflowError, ArithmeticError) as error:
+        # a number or a date that Python cannot hold
+        raise tomli.TOMLDecodeError(str(error).split(";")[0].rstrip("."), text, 0) from None
+    if _is_deep(tables):
+        raise _too_deep(text, 0)
+    return tables
+
+
+def _too_deep(text: str, at: int) -> tomli.TOMLDecodeError:
+    return tomli.TOMLDecodeError("Tables or lists are nested too deep", text, at)
+
+
+def _is_deep(tables: dict[str, Any]) -> bool:
+    level: list[Any] = [tables]
+    for _ in range(DEEPEST):
+        level = [
+            inner
+            for one in level
+            for inner in (one.values() if isinstance(one, dict) else one)
+            if isinstance(inner, dict | list)
+        ]
+        if not level:
+            return False
+    return True

@@ -1,0 +1,148 @@
+"""What the journal's files tell, line by line; any content of them is survived."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, replace
+from datetime import datetime
+from pathlib import Path
+
+from tui.drive.small_file import open_regular
+
+from .connect.line_key import line_key
+from .journal import Entry, Journal
+
+LONGEST_LINE = 64_000
+"""Bytes of a line that may be an entry."""
+READ_MOST = 20_000_000
+"""Bytes of a file that are read, the last ones; each is begun anew long before that."""
+DAMAGE_SHOWN = 200
+"""Characters of a damaged line that are told."""
+
+
+@dataclass(frozen=True, slots=True)
+class DamagedLine:
+    """A line that is no entry: half of one, or something else altogether."""
+
+    file: Path
+    number: int
+    text: str
+    """The beginning of it, as it stands there."""
+
+
+def entries_of(journal: Journal, line: str, device: int) -> list[Entry]:
+    """What the journal's files tell of a drive on a line, oldest first.
+
+    Waits a few seconds for entries that are not on the disk yet. Damaged lines are left out.
+    """
+    journal.flush()
+    found = [one for one in read_journal(journal.files) if isinstance(one, Entry)]
+    return completed(one for one in found if (one.line, one.device) == (line, device))
+
+
+def read_journal(files: Iterable[Path]) -> Iterator[Entry | DamagedLine]:
+    """Every entry of these files in their order; what is no entry is told as damaged.
+
+    Files that are not there are passed over. Raises OSError for one that cannot be read.
+    """
+    for file in files:
+        for number, line in _lines(file):
+            entry = _entry(line)
+            if entry is not None:
+                yield entry
+            elif not _is_mark(line):
+                text = line[: DAMAGE_SHOWN * 4].decode("utf-8", "replace")
+                yield DamagedLine(file, number, text[:DAMAGE_SHOWN])
+
+
+def completed(entries: Iterable[Entry]) -> list[Entry]:
+    """The entries, with those whose answer was lost completed by what was read back later."""
+    found: list[Entry] = []
+    places: dict[tuple[str, str, int, str], int] = {}
+    for one in entries:
+        if one.kind == "read-back":
+            place = places.get((one.of, one.line, one.device, one.code))
+            if place is not None:
+                before = found[place]
+                answer = f"{before.answer} {one.answer}"
+                found[place] = replace(before, answer=answer, read_back=one.read_back)
+                continue
+        else:
+            places[one.time, one.line, one.device, one.code] = len(found)
+        found.append(one)
+    return found
+
+
+def selected(
+    entries: Iterable[Entry],
+    *,
+    device: int | None = None,
+    line: str = "",
+    since: datetime | None = None,
+) -> list[Entry]:
+    """Entries of a drive, of a line however it was typed, and since a time.
+
+    One whose time cannot be told is kept: it may be what is looked for.
+    """
+    key = line_key(line) if line else ""
+    keys: dict[str, str] = {}
+
+    def fits(one: Entry) -> bool:
+        if device is not None and one.device != device:
+            return False
+        if key and keys.setdefault(one.line, line_key(one.line)) != key:
+            return False
+        when = time_of(one)
+        return since is None or when is None or when >= since
+
+    return [one for one in entries if fits(one)]
+
+
+def time_of(entry: Entry) -> datetime | None:
+    """When an entry was made; None where its text is no time."""
+    try:
+        return datetime.fromisoformat(entry.time).astimezone()
+    except (ValueError, OverflowError, OSError):
+        return None
+
+
+def _lines(file: Path) -> Iterator[tuple[int, bytes]]:
+    """The lines of a file with their numbers, none longer than may be an entry."""
+    try:
+        handle = open_regular(file)
+    except FileNotFoundError:
+        return
+    with os.fdopen(handle, "rb") as opened:
+        size = os.fstat(handle).st_size
+        number = 1
+        if size > READ_MOST:
+            opened.seek(size - READ_MOST)
+            opened.readline(LONGEST_LINE)
+        while line := opened.readline(LONGEST_LINE):
+            whole = line.endswith(b"\n")
+            if stripped := line.strip():
+                yield number, stripped
+            while not whole and (rest := opened.readline(LONGEST_LINE)):
+                whole = rest.endswith(b"\n")
+            number += 1
+
+
+def _entry(line: bytes) -> Entry | None:
+    import msgspec
+
+    try:
+        # not by msgspec alone: it takes no half of a character, which a drive's name may hold
+        return msgspec.convert(json.loads(line), Entry)
+    except (ValueError, RecursionError, msgspec.ValidationError):
+        return None
+
+
+def _is_mark(line: bytes) -> bool:
+    """Whether a line only says of the one before it that it was cut off."""
+    try:
+        told = json.loads(line)
+    except (ValueError, RecursionError):
+        return False
+    return isinstance(told, dict) and told.get("kind") == "mended"
