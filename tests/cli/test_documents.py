@@ -127,6 +127,7 @@ def test_what_a_stop_sent_first_is_told() -> None:
     (first,) = told["first"]
     assert (first["address"], first["word"], first["answer"]) == (8501, 7, "ok")
     assert "atv71" in first["families"]
+    assert told["timeout"]["begun"] is True
 
 
 async def test_a_drive_in_fault() -> None:

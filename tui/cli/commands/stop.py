@@ -11,7 +11,7 @@ import click
 from ..running.stop_targets import StoppableDrive, first_stopped, found_at, remembered
 from ..running.stop_telling import StopTelling
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
-from ..shared.left_alone import look_after
+from ..shared.left_alone import LeftAlone, look_after
 from ..shared.options import (
     Target,
     drives_options,
@@ -153,10 +153,12 @@ async def _seen_through(
     way: OrderId = order if order in INSTEAD or has_order(session, order) else "stop"
     stopper.stop([session], way, by="drivepanel stop")
     report = await ended(stopper, session.device)
+    if telling.as_json:
+        await LeftAlone(session, "", goes_on=True).learn()
     who = f"Device {session.device}, {found.name}"
     if report.phase is Phase.STOPPED:
         lacks = "" if way == order else f" (it has no {order}: ramp stop)"
-        telling.stopped(session.device, session.profile.id, f"{who}: {report.text}{lacks}.")
+        telling.stopped(session, f"{who}: {report.text}{lacks}.")
         return 0
     status = await _why(session)
     telling.failed(session.device, session.profile.id, f"{who}: {report.text}", status)

@@ -10,10 +10,12 @@ from tui.session.connect.addresses import addresses_text
 
 from ..commands.orders import complain
 from ..shared.errors import DONE
+from ..shared.left_alone import timeout_json
 from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.command.first_stop import SentFirst
+    from tui.session.drive import DriveSession
 
 
 class StopTelling:
@@ -41,12 +43,15 @@ class StopTelling:
             for one in sent
         ]
 
-    def stopped(self, device: int, profile: str | None, text: str) -> None:
+    def stopped(self, session: DriveSession, text: str) -> None:
         """A motor stands."""
+        from tui.session.monitor.timeout import timeout_now
+
         if not self.as_json:
             with suppress(OSError):  # a reader that went away must not end the other stops
                 say(text)
-        self._keep(device, profile, text, DONE)
+        self._keep(session.device, session.profile.id, text, DONE)
+        self.documents[-1]["timeout"] = timeout_json(timeout_now(session))
 
     def failed(self, device: int, profile: str | None, text: str, status: int) -> None:
         """A motor is not known to stand."""
