@@ -57,7 +57,7 @@ def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
         yield f"{name}: take {MADE_ELSEWHERE[name]}"
     if name == "Console" and not off:
         yield "a console with markup"
-    if ast.unparse(call.func) in PRINTING and path not in PRINTS:
+    if _dotted(call.func) in PRINTING and path not in PRINTS:
         yield f"{name}: take say"
     if name == "add_row" and PACKAGE / "cli" not in path.parents:
         for cell in call.args:
@@ -71,6 +71,13 @@ def _name(node: ast.expr) -> str:
         node = node.func
     if isinstance(node, ast.Attribute):
         return node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _dotted(node: ast.expr) -> str:
+    """The name of what is called: `click.echo`; empty where it is no name of one or two parts."""
+    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+        return f"{node.value.id}.{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
 
 

@@ -51,7 +51,7 @@ PALETTE = {"all": "", "elsewhere": "eeprom", "stop": "stop", "nothing": "xyz"}
 @pytest.mark.parametrize("query", PALETTE)
 def test_palette(snap_compare: Compare, query: str, size: tuple[int, int]) -> None:
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
-    app = fakes.app_of()
+    app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     console = fakes.console_of(snapshot)
     app.fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, console))
@@ -78,7 +78,7 @@ LONG_REFUSAL = (
 @pytest.mark.parametrize("screen", OVER_MONITOR)
 def test_over_monitor(snap_compare: Compare, screen: str, size: tuple[int, int]) -> None:
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
-    app = fakes.app_of()
+    app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     console = fakes.console_of(snapshot)
     app.fleet = that_trip(console)

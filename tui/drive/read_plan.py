@@ -241,18 +241,27 @@ def _cheapest(
 ) -> list[tuple[float, int]]:
     """For every beginning of the row: its least time in seconds, and where its last run starts."""
     best: list[tuple[float, int]] = [(0.0, 0)]
+    longest = _longest(profile, ordered[0])
     for end in range(1, len(ordered) + 1):
-        choices = [
-            (best[start][0] + timing.read(count), start)
-            for start in range(end)
-            if (count := run_length(profile, ordered[start:end], unreadable)) is not None
-        ]
+        last = ordered[end - 1].address
+        choices = []
+        for start in reversed(range(end)):
+            if start < end - 1 and last - ordered[start].address >= longest:
+                break  # too long, and so is all that begins before
+            if (count := run_length(profile, ordered[start:end], unreadable)) is not None:
+                choices.append((best[start][0] + timing.read(count), start))
         best.append(min(choices))
     return best
 
 
 def _span(run: Sequence[Parameter]) -> int:
     return max(p.address + word_count(p) for p in run) - run[0].address
+
+
+def _longest(profile: Profile, parameter: Parameter) -> int:
+    """The most words that one read brings by the function that reads this parameter."""
+    function = profile.function(parameter.function)
+    return (function.max_read if function else None) or 1
 
 
 def request_of(run: Sequence[Parameter]) -> ReadRequest:
@@ -277,8 +286,7 @@ def run_length(
     if longest is None:
         if len(run) == 1 or count == 1:
             return count
-        function = profile.function(run[0].function)
-        longest = (function.max_read if function else None) or 1
+        longest = _longest(profile, run[0])
     if reading.single_words_only or count > longest:
         return None
     if not reading.gaps_readable and not _all_known(profile, run[0], count, unreadable):
