@@ -38,7 +38,7 @@ DEFECTS: tuple[Defect, ...] = (
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
 """What became of each defect when it was planted last; `--table` tells it."""
-PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60")
+PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60", "-m", "")
 LONGEST = 300.0
 """Seconds for the tests of one defect; what hangs for longer is noticed, too."""
 SURVIVED, STALE = "SURVIVED", "STALE"

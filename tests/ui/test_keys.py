@@ -215,7 +215,18 @@ async def stage(made: Bench) -> None:
     await until(made.pilot, lambda: "proposed otherwise" in shown(made.app, "detail"))
 
 
-@pytest.mark.parametrize("screen", [name for name in EVERYWHERE if name != OPENING])
+SWEPT = {"faults", "frames", "messages", "wiring"}
+"""Screens on which nothing waits to be written: looked at in the layer of sweeps."""
+
+
+@pytest.mark.parametrize(
+    "screen",
+    [
+        pytest.param(name, marks=pytest.mark.sweep if name in SWEPT else ())
+        for name in EVERYWHERE
+        if name != OPENING
+    ],
+)
 async def test_no_letter_writes_without_a_question_or_a_line(screen: str) -> None:
     """Armed, with work that waits to be written; a question that comes is left unanswered."""
     async with bench("atv71") as made:
