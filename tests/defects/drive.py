@@ -150,6 +150,22 @@ DEFECTS = (
         ("tests/drive/test_channels.py",),
     ),
     Defect(
+        "channel-read-from-the-bits-beside-it",
+        "tui/drive/channel.py",
+        "value = (raws[row.parameter] & row.mask) >> row.shift",
+        "value = raws[row.parameter]",
+        "The wrong one is said to command a drive, or nobody.",
+        ("tests/drive/test_channels.py",),
+    ),
+    Defect(
+        "what-switches-the-channel-untold",
+        "tui/drive/channel.py",
+        "if raw is None or raw in switch.fixed or",
+        "if raw is None or raw not in switch.fixed or",
+        "Nobody is warned that an input takes a running motor from the line.",
+        ("tests/drive/test_channels.py",),
+    ),
+    Defect(
         "unread-channel-word-passes",
         "tui/drive/held_back.py",
         "if found is not None and not found.by_line:",
