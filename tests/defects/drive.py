@@ -214,6 +214,14 @@ DEFECTS = (
         ("tests/drive/test_read_plan.py",),
     ),
     Defect(
+        "longest-read-not-looked-for",
+        "tui/drive/read_plan.py",
+        "if start < end - 1 and last - ordered[start].address >= longest:",
+        "if start < end - 1 and last - ordered[start].address > longest // 2:",
+        "A screen of a drive is read in twice as many requests as it takes.",
+        ("tests/drive/test_read_plan.py",),
+    ),
+    Defect(
         "gap-read-over",
         "tui/drive/read_plan.py",
         "if not reading.gaps_readable and not _all_known(",
