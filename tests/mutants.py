@@ -25,7 +25,18 @@ from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
 
-from tests.defects import bus, commanding, drive, identity, lines, records, scripts, watching
+from tests.defects import (
+    bus,
+    commanding,
+    drive,
+    identity,
+    lines,
+    records,
+    scripts,
+    teaching,
+    terminal,
+    watching,
+)
 from tests.defects.defect import Defect
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -39,10 +50,12 @@ DEFECTS: tuple[Defect, ...] = (
     *scripts.DEFECTS,
     *identity.DEFECTS,
     *lines.DEFECTS,
+    *teaching.DEFECTS,
+    *terminal.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
 """What became of each defect when it was planted last; `--table` tells it."""
-PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60")
+PYTEST = ("-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "--timeout", "60", "-m", "")
 LONGEST = 300.0
 """Seconds for the tests of one defect; what hangs for longer is noticed, too."""
 SURVIVED, STALE = "SURVIVED", "STALE"

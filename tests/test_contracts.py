@@ -188,6 +188,16 @@ def test_every_folder_of_tests_is_run_by_one_of_the_two_commands() -> None:
     assert re.search(rf"PEERS=required {layer}.* tests/line$", CI.read_text("utf-8"), re.MULTILINE)
 
 
+def test_what_the_test_command_leaves_out_is_run_by_the_gate() -> None:
+    settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+    options = settings["tool"]["pytest"]["ini_options"]
+    assert options["addopts"].endswith(" -m 'not sweep'")
+    assert [marker.partition(":")[0] for marker in options["markers"]] == ["sweep"]
+    layer = ".venv/bin/python -m pytest -q -n 6"
+    assert f"{layer} -m sweep" in README
+    assert re.search(rf"PEERS=required {layer} .*-m sweep$", CI.read_text("utf-8"), re.MULTILINE)
+
+
 def test_links_of_readme_lead_somewhere() -> None:
     targets = [t for t in re.findall(r"\]\(([^)]+)\)", README) if "://" not in t]
     assert targets

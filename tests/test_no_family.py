@@ -33,9 +33,8 @@ SPOKEN = re.compile(r"\b(HSP|LSP|TFR|FRH|RFR|ETA|CMD|LFRD?|CMI|CHCF|DOTD|FA\d\d|
 """Codes that would be said to a person."""
 
 
-def texts(path: Path) -> Iterator[tuple[int, str]]:
+def texts(tree: ast.Module) -> Iterator[tuple[int, str]]:
     """Line and text of every string that is no docstring."""
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     alone = {
         id(node.value)
         for node in ast.walk(tree)
@@ -49,20 +48,20 @@ def texts(path: Path) -> Iterator[tuple[int, str]]:
 def known_families(path: Path) -> list[str]:
     """What a module knows of a family, each with its line."""
     found = []
-    for line, text in texts(path):
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    for line, text in texts(tree):
         name = NAMES.search(text)
         code = text.casefold() in CODES - WORDS and len(text) > 1
         spoken = SPOKEN.search(text)
         if name or code or spoken:
             found.append(f"{path.relative_to(TUI)}:{line}: {text!r}")
-    tree = ast.parse(path.read_text(encoding="utf-8"))
     for node in ast.walk(tree):
         # a name of a group in a comparison with one, or in a set of them
-        if isinstance(node, ast.Compare | ast.Set | ast.Dict | ast.Call) and (
-            "group" in ast.unparse(node) or isinstance(node, ast.Set)
-        ):
+        if isinstance(node, ast.Compare | ast.Set | ast.Dict | ast.Call):
             inside = (n for n in ast.walk(node) if isinstance(n, ast.Constant))
-            found += [f"{path.name}:{n.lineno}: {n.value!r}" for n in inside if n.value in GROUPS]
+            groups = [f"{path.name}:{n.lineno}: {n.value!r}" for n in inside if n.value in GROUPS]
+            if groups and (isinstance(node, ast.Set) or "group" in ast.unparse(node)):
+                found += groups
     return found
 
 

@@ -70,7 +70,7 @@ def _of_call(call: ast.Call, path: Path) -> Iterator[str]:
         yield f"{name}: take {MADE_ELSEWHERE[name]}"
     if name == "Console" and not off:
         yield "a console with markup"
-    if ast.unparse(call.func) in PRINTING and path not in (*PRINTS, *PRINTS_THEMSELVES):
+    if _dotted(call.func) in PRINTING and path not in (*PRINTS, *PRINTS_THEMSELVES):
         yield f"{name}: take say"
     if name in ("read_text", "read_bytes") and path not in READS_ITSELF:
         yield f"{name} waits for a pipe, and takes files of any length: take read_small_text"
@@ -88,6 +88,13 @@ def _name(node: ast.expr) -> str:
         node = node.func
     if isinstance(node, ast.Attribute):
         return node.attr
+    return node.id if isinstance(node, ast.Name) else ""
+
+
+def _dotted(node: ast.expr) -> str:
+    """The name of what is called: `click.echo`; empty where it is no name of one or two parts."""
+    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
+        return f"{node.value.id}.{node.attr}"
     return node.id if isinstance(node, ast.Name) else ""
 
 

@@ -10,15 +10,20 @@ from pathlib import Path
 
 from click.testing import CliRunner, Result
 
-from tests.programs import drivepanel, port_of, simulated
+from tests.programs import drivepanel
+from tui.cli.commands.simulate import simulate, simulation_of
 from tui.cli.main import main
 
 
 @contextmanager
 def tcp_line(*arguments: str) -> Iterator[str]:
-    """`drivepanel simulate` at work with these arguments; the LINE to its drives."""
-    with simulated(*arguments, "--tcp", "127.0.0.1:0") as simulation:
-        yield f"tcp:127.0.0.1:{port_of(simulation.ready)}"
+    """What `drivepanel simulate` serves with these arguments, in this process; the LINE to it."""
+    with simulate.make_context("simulate", [*arguments]) as context:
+        places = ("pty", "serial", "tcp", "rtu_tcp")
+        options = {name: given for name, given in context.params.items() if name not in places}
+        with simulation_of(**options) as simulation:
+            host, port = simulation.serve_tcp()
+            yield f"tcp:{host}:{port}"
 
 
 def invoked(*arguments: str | Path) -> Result:

@@ -12,7 +12,7 @@ from tests.programs import drivepanel
 from tui.drive.profile import library
 from tui.session.monitor.rates import monitoring_codes
 
-from .commands import tcp_line
+from .commands import ended, tcp_line
 
 LINE = ("sim:atv71@2", "-d", "2")
 HEAD = {"schema", "command"}
@@ -21,8 +21,7 @@ VALUE_KEYS = {"address", "raw", "value", "unit", "text", "taught", "quality"}
 
 def told(*arguments: str, status: int = 0) -> Any:
     """The one JSON document on standard output."""
-    done = drivepanel(*arguments, "--json")
-    assert done.returncode == status, done.stderr
+    done = ended(status, *arguments, "--json")
     if status == 0:
         assert done.stderr == ""
     return json.loads(done.stdout)

@@ -14,7 +14,7 @@ from tui.cli.shared.errors import told
 from tui.cli.shared.logs import log_file, start_logging, stop_logging
 from tui.drive.errors import ValueRefused
 
-from .commands import tcp_line
+from .commands import ended, tcp_line
 
 SIM = "sim:atv71@2"
 
@@ -146,10 +146,8 @@ def test_read_only_lines_can_be_read() -> None:
 
 def expect(status: int, *arguments: str) -> None:
     """The command ends so, says why in one or two lines, and prints nothing else."""
-    done = drivepanel(*arguments)
-    assert done.returncode == status, done.stdout + done.stderr
+    done = ended(status, *arguments)
     assert done.stdout == ""
     lines = done.stderr.splitlines()
     assert 1 <= len(lines) <= 2, done.stderr
     assert lines[0].startswith("drivepanel: ")
-    assert "Traceback" not in done.stderr

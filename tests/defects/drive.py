@@ -150,6 +150,22 @@ DEFECTS = (
         ("tests/drive/test_channels.py",),
     ),
     Defect(
+        "channel-read-from-the-bits-beside-it",
+        "tui/drive/channel.py",
+        "value = (raws[row.parameter] & row.mask) >> row.shift",
+        "value = raws[row.parameter]",
+        "The wrong one is said to command a drive, or nobody.",
+        ("tests/drive/test_channels.py",),
+    ),
+    Defect(
+        "what-switches-the-channel-untold",
+        "tui/drive/channel.py",
+        "if raw is None or raw in switch.fixed or",
+        "if raw is None or raw not in switch.fixed or",
+        "Nobody is warned that an input takes a running motor from the line.",
+        ("tests/drive/test_channels.py",),
+    ),
+    Defect(
         "unread-channel-word-passes",
         "tui/drive/held_back.py",
         "if found is not None and not found.by_line:",
@@ -195,6 +211,14 @@ DEFECTS = (
         "if reading.single_words_only or count > longest:",
         "if reading.single_words_only or count > longest + 1:",
         "A drive refuses, or leaves unanswered, a read that is one word too long.",
+        ("tests/drive/test_read_plan.py",),
+    ),
+    Defect(
+        "longest-read-not-looked-for",
+        "tui/drive/read_plan.py",
+        "if start < end - 1 and last - ordered[start].address >= longest:",
+        "if start < end - 1 and last - ordered[start].address > longest // 2:",
+        "A screen of a drive is read in twice as many requests as it takes.",
         ("tests/drive/test_read_plan.py",),
     ),
     Defect(

@@ -25,8 +25,9 @@ def profile_of(
     single: bool = False,
     blocks: Sequence[dict[str, object]] = (),
     write_only: Sequence[int] = (),
+    wide: Sequence[int] = (),
 ) -> Profile:
-    """A profile with a word P<address> at each address."""
+    """A profile with a word P<address> at each address; `wide` ones take the next word as well."""
     tables = {
         "profile": {"id": "plan", "name": "Plan", "vendor": "Nobody", "version": "1"},
         "link": {"baud": 19200, "format": "8E1"},
@@ -45,6 +46,7 @@ def profile_of(
                 "number": f"W{a}",
                 "address": a,
                 "access": "w" if a in write_only else "rw",
+                "type": "uint32" if a in wide else "uint16",
                 "group": "All",
                 "source": "manual",
                 "confidence": "manual",
@@ -86,6 +88,13 @@ def test_the_longest_read_is_kept() -> None:
     profile = profile_of(range(100, 160), longest=20)
     plan = plan_reads(profile, codes(range(100, 160)), TIMING)
     assert sorted(count for _, count in spans(plan)) == [20, 20, 20]
+
+
+def test_the_second_word_of_the_last_counts_too() -> None:
+    profile = profile_of([1, 2, 3, 4], longest=4, wide=[4])
+    plan = plan_reads(profile, codes([1, 2, 3, 4]), TIMING)
+    assert covered(plan) == codes([1, 2, 3, 4])
+    assert sorted(count for _, count in spans(plan)) in ([1, 4], [2, 3])
 
 
 def test_single_words_only() -> None:

@@ -6,6 +6,7 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from textual import _wait
 from textual.css.stylesheet import Stylesheet
 
 from tui.screens.dialogs.question import Question
@@ -32,6 +33,12 @@ def patience(patient_lines: None) -> None:
 def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A fifth of the time of a test of the panel would go into the same style sheets."""
     monkeypatch.setattr(Stylesheet, "_parse_rules", parse_once)
+
+
+@pytest.fixture(autouse=True)
+def idle_beside_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A panel that watches a line is idle, too: the pilot waited up to 1 s behind each key."""
+    monkeypatch.setattr("textual._wait.SLEEP_IDLE", _wait.SLEEP_GRANULARITY / 4)
 
 
 @pytest.fixture(autouse=True)

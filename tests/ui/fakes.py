@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
+from textual.events import Mount
 from textual.pilot import Pilot
 
 from tui.app import DrivePanelApp
@@ -24,6 +25,7 @@ from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import decode
+from tui.screens.lookout import FRAME_LOOK
 from tui.session.arming import Arming
 from tui.session.clock import Clock
 from tui.session.connect.identify import DriveIdentity
@@ -316,12 +318,23 @@ async def press(pilot: Pilot[None], *keys: str) -> None:
             await pilot.press(key)
 
 
+class Easel(DrivePanelApp):
+    """The panel for one picture: without Line below it, which would be drawn before and hidden."""
+
+    def on_mount(self, event: Mount) -> None:  # type: ignore[override]
+        """Look around as ever, and leave the rest of the panel's beginning out."""
+        event.prevent_default()
+        self.set_interval(FRAME_LOOK, self.look_around)
+
+
 def app_of(
-    open_line: Callable[..., OpenLine] | None = None, abilities: Abilities = EVERYTHING
+    open_line: Callable[..., OpenLine] | None = None,
+    abilities: Abilities = EVERYTHING,
+    kind: type[DrivePanelApp] = DrivePanelApp,
 ) -> DrivePanelApp:
     """The panel with a clock that stands still."""
 
     def closed(*_: Any, **__: Any) -> OpenLine:
         raise AssertionError("no line is opened in this picture")
 
-    return DrivePanelApp(open_line=open_line or closed, clock=StillClock(), abilities=abilities)
+    return kind(open_line=open_line or closed, clock=StillClock(), abilities=abilities)

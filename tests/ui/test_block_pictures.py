@@ -184,7 +184,7 @@ def test_blocks(
     monkeypatch.setenv("TEXTUAL_ANIMATIONS", "none")
     block_editor = make()
     prepare(block_editor)
-    app = fakes.app_of()
+    app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     block_editor.session.arming = block_editor.session.work.arming = fakes.StillArming(
         block_editor.session.line, armed

@@ -120,7 +120,7 @@ def panel(name: str) -> tuple[Any, MonitorScreen]:
         console.session.image.confirm("CMD", 0, fakes.NOW)
     record = trip() if unseen else None
     console.recorder = Recorder(console.session, console.journal, record, not unseen)
-    app = fakes.app_of()
+    app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     found = FoundDrive(fakes.ATV71, console)
     app.fleet = fakes.StillFleet(found, line_watch=fakes.FakeLineWatch(WATCH))

@@ -112,7 +112,7 @@ def panel(
         snapshot = fakes.snapshot_of(
             profile, scene.raws, scene.line, age=scene.age, error=scene.error, block=scene.block
         )
-    app = fakes.app_of(abilities=abilities)
+    app = fakes.app_of(abilities=abilities, kind=fakes.Easel)
     app.opened, app.read_only = fakes.opened(scene.line), scene.read_only
     app.low_bandwidth = scene.low_bandwidth
     console = fakes.console_of(snapshot, scene.line, family=scene.family, armed=scene.armed)

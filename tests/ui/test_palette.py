@@ -23,6 +23,7 @@ from tui.screens.parameters.screen import ParametersScreen
 from .test_command_flows import Bench, bench, told
 from .test_flows import shown, until
 from .test_questions import writes
+from .walk import every_step
 
 SCREENS = {
     "line": ConnectionScreen,
@@ -170,13 +171,13 @@ async def test_an_action_of_this_screen_is_done() -> None:
 
 async def test_every_screen_leads_to_every_other() -> None:
     async with bench("atv71") as made:
-        for start in SCREENS:
-            for to, kind in SCREENS.items():
-                for place in (start, to):
-                    made.app.action_goto(place)
-                    await until(made.pilot, lambda: bool(made.app.screen.query("#keys")))
-                    assert made.app.place == place
-                assert isinstance(made.app.screen, kind)
+        before = ""
+        for place in every_step(SCREENS):
+            made.app.action_goto(place)
+            await until(made.pilot, lambda: bool(made.app.screen.query("#keys")))
+            assert made.app.place == place, before
+            assert isinstance(made.app.screen, SCREENS[place]), before
+            before = f"from {place}"
 
 
 async def test_over_a_question_there_is_no_palette() -> None:

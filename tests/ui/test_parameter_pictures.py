@@ -84,7 +84,7 @@ SAID: list[tuple[str, str]] = []
 
 def panel(console: DriveConsole) -> DrivePanelApp:
     """The panel on that drive, whose events all bear the same time."""
-    app = fakes.app_of()
+    app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     app.events = EventLog(lambda: WALL)
     for kind, text in SAID:

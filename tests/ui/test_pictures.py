@@ -17,7 +17,10 @@ from tui.session.timeout_told import TimeoutWatch
 
 from . import fakes
 
-SIZES = pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
+BOTH_SIZES = pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
+LARGE = pytest.param((120, 40), id="120x40", marks=pytest.mark.sweep)
+SIZES = pytest.mark.parametrize("size", [pytest.param((80, 24), id="80x24"), LARGE])
+"""Both sizes too; the larger one in the layer of sweeps."""
 Compare = Callable[..., bool]
 
 
@@ -47,11 +50,11 @@ def that_trip(shown: DriveConsole) -> fakes.StillFleet:
 PALETTE = {"all": "", "elsewhere": "eeprom", "stop": "stop", "nothing": "xyz"}
 
 
-@SIZES
+@BOTH_SIZES
 @pytest.mark.parametrize("query", PALETTE)
 def test_palette(snap_compare: Compare, query: str, size: tuple[int, int]) -> None:
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
-    app = fakes.app_of()
+    app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     console = fakes.console_of(snapshot)
     app.fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, console))
@@ -74,11 +77,11 @@ LONG_REFUSAL = (
 )
 
 
-@SIZES
+@BOTH_SIZES
 @pytest.mark.parametrize("screen", OVER_MONITOR)
 def test_over_monitor(snap_compare: Compare, screen: str, size: tuple[int, int]) -> None:
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
-    app = fakes.app_of()
+    app = fakes.app_of(kind=fakes.Easel)
     app.opened = fakes.opened()
     console = fakes.console_of(snapshot)
     app.fleet = that_trip(console)

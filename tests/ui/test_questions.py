@@ -379,7 +379,12 @@ QUESTIONS: dict[str, tuple[Callable[[Bench], Awaitable[None]], type[ModalScreen[
     "take control": (take, Confirm),
     "outputs": (outputs, Confirm),
 }
-FAMILY = {"hand back": "powerdrive", "take control": "powerdrive", "brake": "atv21"}
+FAMILY = {
+    "write": "atv312",
+    "hand back": "powerdrive",
+    "take control": "powerdrive",
+    "brake": "atv21",
+}
 """The drive that is asked about, where it is not an Altivar 71."""
 
 
@@ -416,7 +421,7 @@ async def back_to_monitor(made: Bench) -> None:
 
 
 async def test_the_panel_is_not_left_past_a_question() -> None:
-    async with bench("atv71") as made:
+    async with bench("atv312") as made:
         await write_parameters(made)
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         asked = made.app.screen

@@ -187,7 +187,7 @@ WAYS: dict[str, tuple[str, Way]] = {
     "rating": ("atv21", rating),
     "teaching": ("powerdrive", teaching),
     "inputs": ("atv21", inputs),
-    "parameters": ("atv71", parameters),
+    "parameters": ("atv312", parameters),
     "scanner": ("atv71", blocks),
     "faults": ("atv71", faults),
     "line": ("atv71", connection),

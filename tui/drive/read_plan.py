@@ -241,25 +241,27 @@ def _cheapest(
 ) -> list[tuple[float, int]]:
     """For every beginning of the row: its least time in seconds, and where its last run starts."""
     best: list[tuple[float, int]] = [(0.0, 0)]
-    ends = [parameter.address + word_count(parameter) for parameter in ordered]
+    longest = _longest(profile, ordered[0])
     for end in range(1, len(ordered) + 1):
-        choices = [
-            (best[start][0] + timing.read(count), start)
-            for start in range(end)
-            if _allows(
-                profile,
-                ordered[start],
-                end - start,
-                count := max(ends[start:end]) - ordered[start].address,
-                unreadable,
-            )
-        ]
+        last = ordered[end - 1].address
+        choices = []
+        for start in reversed(range(end)):
+            if start < end - 1 and last - ordered[start].address >= longest:
+                break  # too long, and so is all that begins before
+            if (count := run_length(profile, ordered[start:end], unreadable)) is not None:
+                choices.append((best[start][0] + timing.read(count), start))
         best.append(min(choices))
     return best
 
 
 def _span(run: Sequence[Parameter]) -> int:
     return max(p.address + word_count(p) for p in run) - run[0].address
+
+
+def _longest(profile: Profile, parameter: Parameter) -> int:
+    """The most words that one read brings by the function that reads this parameter."""
+    function = profile.function(parameter.function)
+    return (function.max_read if function else None) or 1
 
 
 def request_of(run: Sequence[Parameter]) -> ReadRequest:
@@ -280,29 +282,16 @@ def run_length(
     `longest` is the limit of a function other than 3.
     """
     count = _span(run)
-    return count if _allows(profile, run[0], len(run), count, unreadable, longest) else None
-
-
-def _allows(
-    profile: Profile,
-    first: Parameter,
-    many: int,
-    count: int,
-    unreadable: Collection[str],
-    longest: int | None = None,
-) -> bool:
-    """Whether the drive allows a read of so many words over so many parameters."""
     reading = profile.data.reading
     if longest is None:
-        if many == 1 or count == 1:
-            return True
-        if reading.single_words_only:
-            return False
-        function = profile.function(first.function)
-        longest = (function.max_read if function else None) or 1
+        if len(run) == 1 or count == 1:
+            return count
+        longest = _longest(profile, run[0])
     if reading.single_words_only or count > longest:
-        return False
-    return reading.gaps_readable or _all_known(profile, first, count, unreadable)
+        return None
+    if not reading.gaps_readable and not _all_known(profile, run[0], count, unreadable):
+        return None
+    return count
 
 
 def _all_known(profile: Profile, first: Parameter, count: int, unreadable: Collection[str]) -> bool:

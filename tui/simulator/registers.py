@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping
 
 from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import Parameter
-from tui.drive.values import from_words, to_words, type_range, word_count
+from tui.drive.values import from_words, is_field, to_words, type_range, word_count
 
 from .errors import SimulatorError
 
@@ -40,6 +40,12 @@ class Registers:
         self._held: set[str] = set()
         self._protected: set[int] = set()
         self._folded = {p.code.casefold(): p for p in profile.parameters}
+        self._whole = {
+            p.code: (_addresses(p)[0], *type_range(p))
+            for p in profile.parameters
+            if word_count(p) == 1 and not is_field(p)
+        }
+        """Address and range of each parameter that is one word, all of it: nearly every one."""
         for parameter in profile.parameters:
             for address in _addresses(parameter):
                 self._owner.setdefault(address, parameter)
@@ -82,6 +88,9 @@ class Registers:
 
     def in_force(self, parameter: Parameter) -> int:
         """The raw value the drive acts on."""
+        if (whole := self._whole.get(parameter.code)) is not None:
+            word = self._in_force[whole[0]]
+            return word if word <= whole[2] else word - 0x10000
         return from_words(parameter, [self._in_force[a] for a in _addresses(parameter)])
 
     def put(self, parameter: Parameter, raw: int) -> None:
@@ -136,6 +145,11 @@ class Registers:
             self._words[address] = self._in_force[address] = self._factory[address]
 
     def _store(self, parameter: Parameter, raw: int) -> None:
+        if (whole := self._whole.get(parameter.code)) is not None:
+            # the drive shows some twenty values at each step of its time
+            address, low, high = whole
+            self._words[address] = self._in_force[address] = min(max(raw, low), high) & 0xFFFF
+            return
         low, high = type_range(parameter)
         for words in (self._words, self._in_force):
             _put_words(words, parameter, min(max(raw, low), high))

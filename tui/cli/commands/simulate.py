@@ -106,28 +106,17 @@ def simulate(
     Lines such as "2: LI1=1, AI1=5V" on standard input set the inputs of the drive at address 2;
     "2:" tells them.
     """
-    from tui.drive.profile.library import load
-    from tui.simulator import LineTiming, Simulation, parse_drives
-
     if sum(way is not None for way in (pty, serial, tcp, rtu_tcp)) != 1:
         raise click.UsageError("Say where: one of --pty, --serial, --tcp, --rtu-tcp.")
-    specs = [
-        replace(spec, run_hz=run_hz, wander=bool(run_hz))
-        for spec in _configured(parse_drives(",".join(drives)), sets, protects)
-    ]
-    own = load(specs[0].profile).data.link
-    simulation = Simulation(
-        specs,
-        timing=LineTiming(baud or own.baud, (form or own.format).upper(), real_time),
-        faults=_rates(faults),
-        seed=seed,
-        any_settings=any_settings,
+    simulation = simulation_of(
+        drives, baud, form, any_settings, real_time, sets, protects, faults, seed, run_hz
     )
     stop = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: stop.set())
     with simulation:
         where = _serve(simulation, pty, serial, tcp, rtu_tcp)
+        specs = [drive.spec for drive in simulation.drives]
         names = ", ".join(f"{spec.profile}@{spec.address}" for spec in specs)
         if as_json:
             found = [{"profile": spec.profile, "device": spec.address} for spec in specs]
@@ -138,6 +127,36 @@ def simulate(
         inputs = (simulation, as_json)
         threading.Thread(target=_follow, args=inputs, name="inputs", daemon=True).start()
         stop.wait()
+
+
+def simulation_of(
+    drives: tuple[str, ...],
+    baud: int | None,
+    form: str | None,
+    any_settings: bool,
+    real_time: bool,
+    sets: tuple[str, ...],
+    protects: tuple[str, ...],
+    faults: tuple[str, ...],
+    seed: int,
+    run_hz: float,
+) -> Simulation:
+    """The simulated drives that these options describe, served nowhere as yet."""
+    from tui.drive.profile.library import load
+    from tui.simulator import LineTiming, Simulation, parse_drives
+
+    specs = [
+        replace(spec, run_hz=run_hz, wander=bool(run_hz))
+        for spec in _configured(parse_drives(",".join(drives)), sets, protects)
+    ]
+    own = load(specs[0].profile).data.link
+    return Simulation(
+        specs,
+        timing=LineTiming(baud or own.baud, (form or own.format).upper(), real_time),
+        faults=_rates(faults),
+        seed=seed,
+        any_settings=any_settings,
+    )
 
 
 def _follow(simulation: Simulation, as_json: bool) -> None:

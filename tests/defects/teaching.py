@@ -1,0 +1,75 @@
+"""Defects of what a drive's own display teaches: scales, what is kept of them, the reference."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+LEARNT = ("tests/drive/test_teaching.py",)
+KEPT = ("tests/session/test_teaching.py",)
+
+DEFECTS = (
+    Defect(
+        "one-look-teaches",
+        "tui/drive/teaching.py",
+        "if len({look.word for look in looks}) < 2:\n        return None",
+        "if not looks:\n        return None",
+        "One chance fit decides what a current is shown as.",
+        LEARNT,
+    ),
+    Defect(
+        "look-that-disagrees-unheard",
+        "tui/drive/teaching.py",
+        "    if not scales_that_fit(looks):\n",
+        "    if known is None and not scales_that_fit(looks):\n",
+        "A value is shown in a scale that the drive's own display contradicts.",
+        LEARNT,
+    ),
+    Defect(
+        "sign-that-nobody-told-guessed",
+        "tui/drive/teaching.py",
+        "        if self.signed is None:\n            return None\n",
+        "",
+        "A motor that turns backwards is shown at a speed that it cannot have.",
+        (*LEARNT, *KEPT),
+    ),
+    Defect(
+        "taught-of-another-drive-used",
+        "tui/session/teaching/kept.py",
+        "        if self.said:\n            others =",
+        "        if not self.said:\n            others =",
+        "A drive that was put in the place of another is shown in the other's scale.",
+        KEPT,
+    ),
+    Defect(
+        "damaged-file-written-over",
+        "tui/session/teaching/kept.py",
+        "        _set_aside_if_damaged(drive, path)\n",
+        "",
+        "All that was taught of a drive is lost since its file could not be read once.",
+        KEPT,
+    ),
+    Defect(
+        "taught-by-another-program-lost",
+        "tui/session/teaching/teacher.py",
+        "        if not self._unkept:\n            self._known = on_disk\n",
+        "",
+        "What a colleague taught meanwhile is written over.",
+        KEPT,
+    ),
+    Defect(
+        "preset-takes-the-reference-unconfirmed",
+        "tui/session/teaching/teacher.py",
+        "self._told(), self._known.reference)",
+        "self._told(), self._known.reference or self.proposal())",
+        "A word of which no manual says what it does gives a motor its reference.",
+        KEPT,
+    ),
+    Defect(
+        "confirmation-outlives-its-scale",
+        "tui/session/teaching/teacher.py",
+        "            self._known = TaughtLooks(self._known.looks)\n",
+        "            pass\n",
+        "A reference goes out in a scale for which nobody has confirmed it.",
+        KEPT,
+    ),
+)

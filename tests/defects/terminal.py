@@ -1,0 +1,58 @@
+"""Defects of the way to the terminal: when a frame goes out, and how much of it."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+PACE = ("tests/terminal/test_pacing.py",)
+
+DEFECTS = (
+    Defect(
+        "frames-not-waited-for",
+        "tui/terminal/pacing.py",
+        "        if on_its_way and sum(on_its_way) > ahead and",
+        "        if len(on_its_way) > 8 and sum(on_its_way) > ahead and",
+        "Over a slow link the panel shows what the motor did seconds ago.",
+        PACE,
+    ),
+    Defect(
+        "what-hurries-waits-too",
+        "tui/terminal/pacing.py",
+        "AHEAD_OF_REST if rest else AHEAD if hurry else 0",
+        "AHEAD_OF_REST if rest else 0",
+        "Over a slow link a stop is not told until the picture before it has come.",
+        PACE,
+    ),
+    Defect(
+        "lost-answer-waited-for-for-ever",
+        "tui/terminal/pacing.py",
+        "for at, size in self._asked if now < at + self._patience]",
+        "for at, size in self._asked]",
+        "A panel stands still for good on a terminal that never answers.",
+        PACE,
+    ),
+    Defect(
+        "mute-terminal-taken-for-slow",
+        "tui/terminal/pacing.py",
+        "return not self._answers and bool(self._asked) and",
+        "return False and bool(self._asked) and",
+        "On a terminal that never answers a stop is shown seconds late.",
+        PACE,
+    ),
+    Defect(
+        "slow-link-never-learnt",
+        "tui/terminal/pacing.py",
+        "self._piece = max(PIECE_LEAST, int(size * PIECE_TIME / took))",
+        "self._piece = WHOLE",
+        "Over a slow link every key waits behind a whole picture.",
+        PACE,
+    ),
+    Defect(
+        "fast-link-never-learnt",
+        "tui/terminal/pacing.py",
+        "            self._piece = min(WHOLE, GROWTH * self._piece)\n",
+        "            self._piece = PIECE_LEAST\n",
+        "A fast link gets its pictures in small pieces, one answer after the other.",
+        PACE,
+    ),
+)
