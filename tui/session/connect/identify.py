@@ -73,7 +73,7 @@ async def identify_drive(
         return _nameless(device)
     except (NoAnswer, RequestRefused):
         return _nameless(device, await _nameless_families(line, device, priority))
-    return await asyncio.to_thread(identity_of, device, answer)
+    return await asyncio.to_thread(identity_from, device, answer)
 
 
 async def _ask(line: Askable, device: int, priority: Priority) -> IdentificationObjects:
@@ -90,7 +90,7 @@ def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:
     return DriveIdentity(device, "", "", "", "", None, candidates)
 
 
-def identity_of(device: int, answer: IdentificationObjects) -> DriveIdentity:
+def identity_from(device: int, answer: IdentificationObjects) -> DriveIdentity:
     """What a drive says of itself, as text that commands no terminal wherever it is shown."""
     texts = {
         number: plain(value.decode("ascii", errors="replace").strip("\0 "))

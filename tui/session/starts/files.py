@@ -19,7 +19,7 @@ from .record import StartRecord
 log = logging.getLogger(__name__)
 
 ENDING = ".json"
-LONGEST = 100_000
+LONGEST_RECORD = 100_000
 """Bytes of a file that may be a record."""
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
 """What file systems say that cannot flush a folder; the file itself was flushed."""
@@ -106,7 +106,7 @@ def _read(path: Path) -> StartRecord | None:
     import msgspec
 
     try:
-        return msgspec.json.decode(read_small(path, LONGEST), type=StartRecord)
+        return msgspec.json.decode(read_small(path, LONGEST_RECORD), type=StartRecord)
     except FileNotFoundError:
         return None  # its program has just removed it
     except OSError as error:
