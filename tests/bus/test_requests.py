@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from tui.bus.errors import DeviceException
 from tui.bus.expectation import exception_code
 from tui.bus.limits import CAUTIOUS, Limits, Window, send_refusal
 from tui.bus.requests import (
@@ -199,3 +200,9 @@ def test_limits_of_a_device(request_: Request, limits: Limits, allowed: bool) ->
 )
 def test_read_only(request_: Request, allowed: bool) -> None:
     assert (send_refusal(request_, WIDE, read_only=True) == "") is allowed
+
+
+def test_a_refusal_ends_with_one_point() -> None:
+    refusal = DeviceException(1, 6, 64001, 3, "Value not allowed: it is out of range.")
+    assert str(refusal).endswith("out of range.")
+    assert not str(refusal).endswith("..")

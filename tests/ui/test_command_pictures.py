@@ -158,6 +158,8 @@ OVER = {
     "faults-none": ("armed", ["5"]),
     "save": ("tripped", ["5", "ctrl+s"]),
     "leave-running": ("done", ["q"]),
+    "wiring": ("armed", ["I"]),
+    "wiring-pins": ("armed", ["I", "tab", "tab"]),
 }
 
 

@@ -151,7 +151,8 @@ class DeviceException(ExchangeError):
     ) -> None:
         self.code = code
         self.meaning = meaning
-        why = f": {meaning}" if meaning else ""
+        # a sentence of a profile has its point already
+        why = f": {meaning.rstrip('.')}" if meaning else ""
         super().__init__(
             device,
             function,
