@@ -13,7 +13,7 @@ from .app_port import Panel
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.monitor.timeout import TimeoutWatch
+    from tui.session.timeout_told import TimeoutWatch
 
     from .dialogs.confirm import Confirm
     from .dialogs.leave import LeaveChoice

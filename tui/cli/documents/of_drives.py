@@ -10,6 +10,7 @@ from msgspec import UNSET, UnsetType
 from .parts import (
     ControlTold,
     FaultTold,
+    FirstWordTold,
     ModelTold,
     OldTimeoutTold,
     StateTold,
@@ -109,6 +110,18 @@ class RunTold(DocumentTold, kw_only=True):
     timeout: TimeoutTold | UnsetType | None = UNSET
 
 
+class HoldTold(DocumentTold, kw_only=True):
+    """`hold`: one event."""
+
+    command: Literal["hold"]
+    time: str
+    line: str
+    device: int
+    event: Literal["holding", "lost", "back", "fault"]
+    text: str
+    timeout: TimeoutTold | UnsetType | None = UNSET
+
+
 class CommandTold(OfDriveTold, kw_only=True):
     """`reference`, `reset`: what the command came to."""
 
@@ -124,4 +137,5 @@ class StopTold(OfDriveTold, kw_only=True):
     stopped: bool
     text: str
     status: int
+    first: list[FirstWordTold] | UnsetType = UNSET
     given_back: str | UnsetType = UNSET

@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
 from tui.bus.errors import LinkSyntaxError
 
@@ -20,6 +20,14 @@ if TYPE_CHECKING:
     from tui.simulator import DriveSpec, Simulation
 
     from .known_line import KnownLine
+
+
+class Farewell(Protocol):
+    """What is to be said of a drive before its line is closed."""
+
+    async def tell(self) -> None:
+        """Say it; never raises the line's errors."""
+        ...
 
 
 @dataclass(slots=True)
@@ -34,6 +42,8 @@ class OpenLine:
     """Addresses known to be taken: those of a simulated line, else none."""
     known: KnownLine | None = None
     """Whether it is still what it was, where that is looked at; None for a simulated line."""
+    farewells: dict[int, Farewell] = field(default_factory=dict)
+    """By address, what is to be said of each drive at the end."""
 
     @property
     def label(self) -> str:
