@@ -30,7 +30,7 @@ def told(*arguments: str, status: int = 0) -> Any:
 
 def test_read() -> None:
     read = told("read", *LINE, "ETA", "ACC", "LFT")
-    assert set(read) == {*HEAD, "line", "device", "profile", "values"}
+    assert set(read) == {*HEAD, "line", "device", "profile", "timeout", "values"}
     assert (read["line"], read["device"], read["profile"]) == ("sim:atv71@2", 2, "atv71")
     assert list(read["values"]) == ["ETA", "ACC", "LFT"]
     for value in read["values"].values():
@@ -65,7 +65,7 @@ def test_watch_prints_one_object_a_cycle() -> None:
     assert len(cycles) == 3
     for cycle in cycles:
         keys = {"time", "line", "device", "profile", "values", "state", "direction", "error"}
-        assert set(cycle) == HEAD | keys
+        assert set(cycle) == HEAD | keys | {"timeout"}
         assert list(cycle["values"]) == ["RFR", "ETA"]
         assert all(
             set(value) == VALUE_KEYS | {"time", "error"} for value in cycle["values"].values()
@@ -86,7 +86,7 @@ def test_watch_takes_the_monitoring_set_of_the_profile() -> None:
 def test_identify() -> None:
     who = told("identify", *LINE)
     keys = {"line", "device", "vendor", "reference", "version", "name", "profile", "model"}
-    assert set(who) == HEAD | keys
+    assert set(who) == HEAD | keys | {"timeout"}
     assert (who["device"], who["profile"]) == (2, "atv71")
     assert who["reference"].startswith("ATV71")
 

@@ -101,15 +101,15 @@ DEFECTS = (
     Defect(
         "time-out-not-fed",
         "tui/session/monitor",
-        "period = kept.watch.timeout / ASKED_PER_TIMEOUT",
-        "period = kept.watch.timeout * ASKED_PER_TIMEOUT",
+        "period = timeout / ASKED_PER_TIMEOUT",
+        "period = timeout * ASKED_PER_TIMEOUT",
         "Drives trip by their communication time-out while the panel is open.",
         ("tests/session/test_line_watch.py",),
     ),
     Defect(
         "fed-behind-the-polls",
         "tui/session/monitor",
-        "priority = Priority.FEED if silent < kept.watch.timeout else Priority.POLL",
+        "priority = Priority.FEED if silent < timeout else Priority.POLL",
         "priority = Priority.POLL",
         "On a busy line drives trip by their communication time-out.",
         ("tests/session/test_line_watch.py",),

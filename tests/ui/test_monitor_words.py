@@ -14,7 +14,7 @@ from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
 from tui.screens.monitor.state import state_lines
 from tui.screens.monitor.words import word_line
-from tui.session.monitor.timeout import TimeoutWatch
+from tui.session.timeout_told import TimeoutWatch
 
 from . import fakes
 from .test_monitor_pictures import AT_TERMINALS, AT_ZERO, NO_SUPPLY, SPEEDING_UP

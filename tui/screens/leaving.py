@@ -16,7 +16,7 @@ from .dialogs.now import MotorsNow
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
-    from tui.session.monitor.timeout import TimeoutWatch
+    from tui.session.timeout_told import TimeoutWatch
 
 STOPPED_WITHIN = 60.0
 """Seconds that a motor may take to its standstill before the panel gives up waiting."""

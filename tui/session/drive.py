@@ -17,6 +17,7 @@ from .connect.limits import limits_of
 from .image import RegisterImage
 from .reading import Rating
 from .starts.keeper import StartKeeper
+from .timeout_told import Timeout
 from .work import WorkQueue
 
 OWN_PROFILE = "Nothing is written by a profile that is not the drive's own."
@@ -60,6 +61,10 @@ class DriveSession:
         """What 100 % is, by code, where a person has told it from the nameplate."""
         self.commanded_at: float | None = None
         """When a command or reference was last sent to the drive from here (monotonic)."""
+        self.timeout: Timeout | None = None
+        """What it has told of its communication time-out; None while it was not asked."""
+        self.told_by_line = False
+        """Whether a command or reference word was written to it from here, a stop among them."""
         self.followed: tuple[str, ...] = ()
         """Codes of words that were written from here and are polled on."""
         self.starts: StartKeeper | None = None
@@ -87,6 +92,7 @@ class DriveSession:
 
     def note_command(self) -> None:
         """A command or reference was sent."""
+        self.told_by_line = True
         self.commanded_at = self.clock.monotonic()
 
     def stir(self) -> None:

@@ -12,9 +12,11 @@ from tui.drive.plain import plain
 
 from ..shared.devices import several_devices_option
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, told
+from ..shared.errors import DONE, REFUSED_HERE, Failure, told
+from ..shared.left_alone import look_after
 from ..shared.options import (
     Target,
+    hold_option,
     json_option,
     line_argument,
     on_line,
@@ -25,37 +27,79 @@ from ..shared.say import say_row
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
 
-TITLES = 11
+IDENTITY_KEYS = ("device", "vendor", "reference", "version", "name", "profile")
+"""What JSON tells of an identity, by its own names."""
+IDENTITY_TITLES = 11
 """Width of the column of titles, with its gap."""
 
 
 @click.command()
 @line_argument
 @several_devices_option
+@hold_option
 @read_only_option
 @json_option
 @told
-def identify(line_text: str, device: tuple[int, ...], read_only: bool, as_json: bool) -> None:
+def identify(
+    line_text: str,
+    device: tuple[int, ...],
+    hold: float | None,
+    read_only: bool,
+    as_json: bool,
+) -> None:
     """Ask a drive who it is (function 43)."""
     from tui.session.connect.identify import identify_drive as ask
 
+    from ..running.holding import hold_on
+    from ..shared.output import drive_json
+
     target = Target(line_text, device[0], None, others=device[1:])
+    sessions: list[DriveSession] = []
 
     async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
         identity = await ask(opened.line, drive.device)
-        words = await _model_words(opened, identity)
+        session = await asyncio.to_thread(_session, opened, identity)
+        words = await _model_words(session)
         if not as_json:
             _say_identity(identity, words)
-        keys = ("device", "vendor", "reference", "version", "name", "profile")
-        told = {key: getattr(identity, key) for key in keys}
-        return {"line": line_text, **told, "model": _model(identity, words)}, DONE
+        told = {"line": line_text, "timeout": None}
+        if session is not None:
+            sessions.append(session)
+            await look_after(opened, session, line_text).learn()
+            told = drive_json(line_text, session)
+        elif hold:
+            raise Failure(
+                f"Device {drive.device} does not say what it is, so nothing is known to ask it on"
+                " by. 'drivepanel hold' with -p does.",
+                REFUSED_HERE,
+            )
+        told |= {key: getattr(identity, key) for key in IDENTITY_KEYS}
+        return {**told, "model": _model(identity, words)}, DONE
 
     async def work(opened: OpenLine) -> int:
-        return await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        await hold_on(opened, sessions, hold)
+        return status
 
     if status := on_line(line_text, work, read_only=read_only):
         raise click.exceptions.Exit(status)
+
+
+def _session(opened: OpenLine, identity: DriveIdentity) -> DriveSession | None:
+    """A session with the drive, by the likeliest family of several alike; None where none fits."""
+    from tui.drive.errors import DriveError
+    from tui.drive.profile import library
+    from tui.session.drive import DriveSession
+
+    named = identity.profile or next(iter(identity.candidates), None)
+    if named is None:
+        return None
+    try:
+        return DriveSession(opened.line, identity.device, library.load(named), identity)
+    except DriveError:
+        return None  # who it is was asked for and is known
 
 
 def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
@@ -68,25 +112,22 @@ def _say_identity(found: DriveIdentity, words: Mapping[str, int]) -> None:
         ("Profile", found.profile or _choices(found)),
         *_model_row(found, words),
     ):
-        say_row(title, plain(text) or "-----", TITLES)
+        say_row(title, plain(text) or "-----", IDENTITY_TITLES)
 
 
-async def _model_words(opened: OpenLine, identity: DriveIdentity) -> Mapping[str, int]:
+async def _model_words(session: DriveSession | None) -> Mapping[str, int]:
     """Raw values of the words that tell the model, where its family has them."""
-    if identity.profile is None:
-        return {}
     from tui.bus.errors import LineError
     from tui.drive.errors import DriveError
     from tui.drive.model import model_codes
-    from tui.drive.profile import library
-    from tui.session.drive import DriveSession
     from tui.session.read.reader import Reader
 
+    if session is None or session.known_identity.profile is None:
+        return {}
+    if not (codes := model_codes(session.profile)):
+        return {}
     try:
-        profile = await asyncio.to_thread(library.load, identity.profile)
-        if not (codes := model_codes(profile)):
-            return {}
-        found = await Reader(DriveSession(opened.line, identity.device, profile)).read(codes)
+        found = await Reader(session).read(codes)
     except (DriveError, LineError):
         return {}  # who it is was asked for and is known; its model is more than that
     return {code: one.raw for code, one in found.items() if one.raw is not None}

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.monitor.timeout import TimeoutWatch
     from tui.session.starts.keeper import StartKeeper
+    from tui.session.timeout_told import TimeoutWatch
     from tui.session.work import Permit
 
 COMMAND_POLL_INTERVAL = 0.02
@@ -102,9 +102,10 @@ async def watched(
 async def _first_look(console: DriveConsole) -> None:
     while True:
         latest = console.latest
-        if latest is not None and not latest.error:
-            return
-        if latest is not None and latest.cycle >= FIRST_TRIES:
+        tried = latest is not None and latest.cycle >= FIRST_TRIES
+        if latest is not None and not latest.error and (latest.state.kind != "unknown" or tried):
+            return  # what decides about its chart may come a cycle later
+        if latest is not None and tried:
             raise Failure(latest.error, LINE_TROUBLE)
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
 

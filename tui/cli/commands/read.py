@@ -14,6 +14,7 @@ from ..shared.options import (
     connect_drive,
     drives_options,
     force_profile_option,
+    hold_option,
     json_option,
     line_argument,
     on_line,
@@ -23,6 +24,7 @@ from ..shared.say import say
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
 
 
 @click.command()
@@ -30,12 +32,14 @@ if TYPE_CHECKING:
 @click.argument("codes", nargs=-1, required=True, metavar="CODE...", shell_complete=complete_code)
 @drives_options
 @force_profile_option
+@hold_option
 @read_only_option
 @json_option
 @told
 def read(
     target: Target,
     codes: tuple[str, ...],
+    hold: float | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
@@ -46,10 +50,14 @@ def read(
     """
     from tui.session.read.reader import Reader
 
+    from ..running.holding import hold_on
     from ..shared.output import print_readings, readings_json
+
+    sessions: list[DriveSession] = []
 
     async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
         session = await connect_drive(opened, drive)
+        sessions.append(session)
         wanted = [session.profile.find(code).code for code in codes]
         readings = await Reader(session).read(wanted)
         if not as_json:
@@ -61,7 +69,9 @@ def read(
         return told, DRIVE_REFUSED if refused else DONE
 
     async def work(opened: OpenLine) -> int:
-        return await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        await hold_on(opened, sessions, hold)
+        return status
 
     if status := on_line(target, work, read_only=read_only):
         raise click.exceptions.Exit(status)

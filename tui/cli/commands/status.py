@@ -19,6 +19,7 @@ from ..shared.options import (
     connect_drive,
     drives_options,
     force_profile_option,
+    hold_option,
     json_option,
     line_argument,
     on_line,
@@ -32,8 +33,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.drive_state import DriveState
-    from tui.session.monitor.timeout import TimeoutWatch
     from tui.session.reading import Reading
+    from tui.session.timeout_told import TimeoutWatch
 
 SHOWN_QUANTITIES: dict[Quantity, str] = {
     "output_frequency": "Output frequency",
@@ -46,7 +47,7 @@ CHANNEL_NAMES: dict[Quantity, str] = {
     "reference_channel": "Reference from",
 }
 
-TITLES = 18
+STATUS_TITLES = 18
 """Width of the column of titles, with its gap."""
 
 
@@ -174,11 +175,11 @@ def _refused(session: DriveSession) -> str:
 
 def status_json(line_text: str, status: Status) -> dict[str, Any]:
     """The object that `status --json` prints."""
+    from ..shared.output import drive_json
+
     state, watch = status.state, status.watch
     return {
-        "line": line_text,
-        "device": status.session.device,
-        "profile": status.session.profile.id,
+        **drive_json(line_text, status.session),
         "state": {"id": state.id, "name": state.name, "kind": state.kind},
         "direction": state.direction,
         "fault": fault_json(state, status.finding),
@@ -258,25 +259,35 @@ def _watch_text(status: Status) -> str:
 @line_argument
 @drives_options
 @force_profile_option
+@hold_option
 @read_only_option
 @json_option
 @told
 def status(
     target: Target,
+    hold: float | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
     """Tell what a drive does, who commands it, and what it does when the line falls silent."""
 
+    from ..running.holding import hold_on
+
+    sessions: list[DriveSession] = []
+
     async def one(opened: OpenLine, drive: Target) -> tuple[dict[str, Any], int]:
-        found = await status_of_drive(await connect_drive(opened, drive), opened)
+        session = await connect_drive(opened, drive)
+        sessions.append(session)
+        found = await status_of_drive(session, opened)
         if not as_json:
             for title, text in status_table(found):
-                say_row(title, plain(text) or "-----", TITLES)
+                say_row(title, plain(text) or "-----", STATUS_TITLES)
         return status_json(target.line_text, found), DONE
 
     async def work(opened: OpenLine) -> int:
-        return await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        await hold_on(opened, sessions, hold)
+        return status
 
     if status := on_line(target, work, read_only=read_only):
         raise click.exceptions.Exit(status)

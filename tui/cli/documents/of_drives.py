@@ -10,6 +10,7 @@ from msgspec import UNSET, UnsetType
 from .parts import (
     ControlTold,
     FaultTold,
+    FirstWordTold,
     ModelTold,
     OldTimeoutTold,
     StateTold,
@@ -124,4 +125,5 @@ class StopTold(OfDriveTold, kw_only=True):
     stopped: bool
     text: str
     status: int
+    first: list[FirstWordTold] | UnsetType = UNSET
     given_back: str | UnsetType = UNSET

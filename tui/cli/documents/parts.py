@@ -43,12 +43,21 @@ class WatchedValueTold(PartTold):
 
 
 class TimeoutTold(PartTold):
-    """The communication time-out of a drive."""
+    """The communication time-out of a drive; all null where the drive does not tell it."""
 
-    seconds: float
+    seconds: float | None
     reaction: str | None
     fault: str | None
-    begun: bool
+    begun: bool | None
+
+
+class FirstWordTold(PartTold):
+    """A word that a stop sent before the drive had said what it is."""
+
+    address: int
+    word: int
+    families: list[str]
+    answer: str
 
 
 class ModelTold(PartTold):

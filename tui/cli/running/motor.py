@@ -35,7 +35,7 @@ if TYPE_CHECKING:
     from tui.session.console import DriveConsole
     from tui.session.fleet import Fleet
     from tui.session.monitor.snapshot import Snapshot
-    from tui.session.monitor.timeout import TimeoutWatch
+    from tui.session.timeout_told import TimeoutWatch
 
 RUN_POLL_INTERVAL = 0.05
 CYCLES_AT_REST = 2

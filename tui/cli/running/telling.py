@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..commands.orders import complain
 from ..commands.status import shown_values, values_json
+from ..shared.left_alone import timeout_json
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
@@ -53,6 +54,8 @@ class RunTelling:
 
     def tell(self, event: str, text: str, latest: Snapshot | None = None) -> None:
         """One line, or one JSON object a line, about an event."""
+        from tui.session.monitor.timeout import timeout_now
+
         from ..shared.output import document, iso_time, json_text
 
         now = time.time()
@@ -61,6 +64,7 @@ class RunTelling:
             return
         data: dict[str, Any] = {"time": iso_time(now), "device": self._session.device}
         data |= {"event": event, "text": text}
+        data["timeout"] = timeout_json(timeout_now(self._session))
         if latest is not None:
             state = latest.state
             data |= {

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 HEADINGS = ("Slot", "Mapped to", "Name", "Number", "Wire address", "Brings", "Direct", "", "")
-LEFT_OUT = ("Wire address", "Number", "Name")
+COLUMNS_LEFT_OUT = ("Wire address", "Number", "Name")
 """Columns that a narrow terminal goes without, in this order."""
 AFTER_RESET = (
     "What counts since the last reset cannot be read: it is told by comparison with direct reads."
@@ -55,7 +55,9 @@ def show_blocks(
 
 
 def _head(session: DriveSession, line_text: str) -> dict[str, Any]:
-    return {"line": line_text, "device": session.device, "profile": session.profile.id}
+    from .output import drive_json
+
+    return drive_json(line_text, session)
 
 
 def _costs(session: DriveSession, views: list[BlockView]) -> tuple[int, int]:
@@ -124,7 +126,7 @@ def _table(session: DriveSession, view: BlockView, width: int) -> Table:
         rows.append((unused, "unused", *[""] * (len(HEADINGS) - 2)))
     widths = [max(len(cell) for cell in column) for column in zip(HEADINGS, *rows, strict=True)]
     shown = list(range(len(HEADINGS)))
-    for heading in LEFT_OUT:
+    for heading in COLUMNS_LEFT_OUT:
         if sum(widths[at] + 2 for at in shown) <= width + 2:
             break
         shown.remove(HEADINGS.index(heading))

@@ -74,6 +74,14 @@ force_profile_option = click.option(
 )
 """For commands that read, watch or write; it reaches them in their Target."""
 
+hold_option = click.option(
+    "--hold",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Then ask the drive on for S seconds, so that its communication time-out does not run"
+    " out; its own protection against a lost line is off meanwhile.",
+)
+
 
 def never_forced(command: CommandFunction) -> CommandFunction:
     """The same option, refused: for commands after which a wrong profile moves a motor."""
@@ -140,13 +148,34 @@ def on_line(
     usual = None if isinstance(where, str) else _usual_settings(where.profile_id)
     opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual)
     try:
-        return asyncio.run(work(opened))
+        return asyncio.run(_to_its_end(opened, work))
     except NoAnswer as error:
         if not (hint := _about_silence(opened, text, usual is not None)):
             raise
         raise NoAnswer(error.device, error.function, error.address, f"{error} {hint}") from error
     finally:
         opened.close()
+
+
+async def _to_its_end(opened: OpenLine, work: Callable[[OpenLine], Coroutine[Any, Any, T]]) -> T:
+    """Do the work; whatever becomes of it, say what drives do that are asked no more.
+
+    Raises Exit with 128 and the number of a signal that ended it.
+    """
+    from .left_alone import say_farewells
+    from .signals import cancelled_by_signal
+
+    task = asyncio.current_task()
+    assert task is not None
+    with cancelled_by_signal(task) as came:
+        try:
+            return await work(opened)
+        except asyncio.CancelledError:
+            if not came:
+                raise
+            raise click.exceptions.Exit(128 + came[0]) from None
+        finally:
+            await say_farewells(opened)
 
 
 def _usual_settings(profile_id: str | None) -> UsualSettings | None:
@@ -192,6 +221,8 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     from tui.session.connect.identify import identify_drive
     from tui.session.drive import DriveSession
 
+    from .left_alone import look_after
+
     if target.profile_id is not None:
         profile = library.load(target.profile_id)
         told = await own_words(opened.line, target.device, profile)
@@ -203,6 +234,7 @@ async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     session = DriveSession(opened.line, target.device, profile, told)
     if session.contradiction:
         _believe_the_person(session, target)
+    await look_after(opened, session, target.line_text).learn()
     await asyncio.to_thread(_recall, session)
     _rate(session, target.rated_current)
     return session

@@ -1,7 +1,8 @@
-"""The end of the panel by a signal: the terminal hangs up, or the system asks it to go."""
+"""The end by a signal: the terminal hangs up, or the system asks the panel or a command to go."""
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import signal
@@ -52,6 +53,42 @@ def ending_by_signal(panel: Stoppable, *, stop: bool) -> Iterator[None]:
     before = {number: signal.signal(number, handle) for number in numbers}
     try:
         yield
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+LAST_WORDS = 5.0
+"""Seconds that a command has to end after a signal; an output that takes nothing may keep it."""
+
+
+@contextmanager
+def cancelled_by_signal(task: asyncio.Task[object]) -> Iterator[list[int]]:
+    """While inside, SIGHUP and SIGTERM cancel a task; the number of the signal is handed out.
+
+    A second one ends the process at once, as it would have. A hangup that the person ignores on
+    purpose (nohup) stays ignored.
+    """
+    came: list[int] = []
+    loop = task.get_loop()
+
+    def handle(number: int, _frame: FrameType | None) -> None:
+        came.append(number)
+        signal.signal(number, signal.SIG_DFL)
+        last_resort = threading.Timer(LAST_WORDS, os._exit, (128 + number,))
+        last_resort.daemon = True
+        last_resort.start()
+        loop.call_soon_threadsafe(task.cancel)
+
+    if threading.current_thread() is not threading.main_thread():
+        yield came
+        return
+    numbers = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+    before = {n: signal.getsignal(n) for n in numbers if signal.getsignal(n) != signal.SIG_IGN}
+    for number in before:
+        signal.signal(number, handle)
+    try:
+        yield came
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)

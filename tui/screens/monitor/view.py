@@ -11,9 +11,9 @@ from tui.screens.command.control import UNARMED, Control
 from tui.session.command.stop_report import StopReport
 from tui.session.drive_state import with_direction
 from tui.session.monitor.snapshot import Snapshot, stale_after
-from tui.session.monitor.timeout import TimeoutWatch
 from tui.session.monitor.trend import TrendPoint
 from tui.session.reading import Reading
+from tui.session.timeout_told import TimeoutWatch
 from tui.widgets.drive_signs import age_text
 
 USUAL_SPAN = 60.0

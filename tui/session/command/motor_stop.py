@@ -118,6 +118,7 @@ class MotorStop:
         if (held := session.image.get(parameter.code)) is not None:
             self.held[parameter.code] = held
         kept = {code: one.raw for code, one in self.held.items() if one.raw is not None}
+        session.told_by_line = True
         for word in with_options(chart, order, kept):
             raw = from_words(parameter, [word])
             why = f"stopped: {order.name}"

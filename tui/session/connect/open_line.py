@@ -7,8 +7,8 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Protocol
 
 from tui.bus.errors import LinkSyntaxError
 
@@ -18,6 +18,14 @@ if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
     from tui.bus.link import Link, UsualSettings
     from tui.simulator import DriveSpec, Simulation
+
+
+class Farewell(Protocol):
+    """What is to be said of a drive before its line is closed."""
+
+    async def tell(self) -> None:
+        """Say it; never raises the line's errors."""
+        ...
 
 
 @dataclass(slots=True)
@@ -30,6 +38,8 @@ class OpenLine:
     simulation: Simulation | None = None
     devices: tuple[int, ...] = ()
     """Addresses known to be taken: those of a simulated line, else none."""
+    farewells: dict[int, Farewell] = field(default_factory=dict)
+    """By address, what is to be said of each drive at the end."""
 
     @property
     def label(self) -> str:

@@ -23,10 +23,11 @@ from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..read.reader import Reader
 from ..reading import Reading
+from ..timeout_told import TimeoutWatch
 from .load import unread_limit
 from .monitor import Monitor
 from .rates import monitoring_codes
-from .timeout import TOLD_SHARE, TimeoutWarning, TimeoutWatch, timeout_seconds
+from .timeout import TOLD_SHARE, TimeoutWarning, has_begun, read_timeout
 
 log = logging.getLogger(__name__)
 
@@ -42,6 +43,8 @@ GLANCE = 3.0
 GLANCE_EACH = 0.15
 """Seconds of that for each drive of the line."""
 ASKED_PER_TIMEOUT = 4.0
+UNKNOWN_TIMEOUT = 2.0
+"""Seconds that a time-out is taken for which a drive refuses to tell."""
 LEARN_AGAIN = 20.0
 """Seconds after which a drive's time-out and reaction are read anew: they may be changed."""
 SHORTEST = 0.02
@@ -69,6 +72,8 @@ class _Kept:
     reader: Reader
     since: float
     watch: TimeoutWatch | None = None
+    unknown: bool = False
+    """Whether the drive refuses to tell its time-out."""
     learned: float | None = None
     workers: tuple[LineWorker, ...] = ()
 
@@ -95,7 +100,7 @@ class LineWatch:
         rules, watch = kept.session.profile.data.communication_fault, kept.watch
         if watch is None or rules is None:
             return None
-        begun = not rules.needs_write or kept.session.commanded or self._runs_by_the_line(kept)
+        begun = has_begun(kept.session) or self._runs_by_the_line(kept)
         return replace(watch, active=begun)
 
     def _runs_by_the_line(self, kept: _Kept) -> bool:
@@ -221,14 +226,15 @@ class LineWatch:
         now = kept.session.clock.monotonic()
         if kept.learned is None or now - kept.learned > LEARN_AGAIN:
             await self._learn(kept)
-        if kept.watch is None:
+        if kept.watch is None and not kept.unknown:
             return LEARN_AGAIN
-        period = kept.watch.timeout / ASKED_PER_TIMEOUT
+        timeout = kept.watch.timeout if kept.watch else UNKNOWN_TIMEOUT
+        period = timeout / ASKED_PER_TIMEOUT
         silent = kept.session.clock.monotonic() - self._heard(kept)
         if silent < period:
             return period - silent
         # past its time-out it has acted: it need no longer go before the others
-        priority = Priority.FEED if silent < kept.watch.timeout else Priority.POLL
+        priority = Priority.FEED if silent < timeout else Priority.POLL
         word = _any_word(kept.session.profile)
         await self._line.read(
             kept.session.device, word.address, 1, priority=priority, function=word.function
@@ -269,17 +275,10 @@ class LineWatch:
 
     async def _learn(self, kept: _Kept) -> None:
         """Read the drive's time-out and its reaction."""
-        rules = kept.session.profile.data.communication_fault
-        if rules is None or not rules.timeout:
-            kept.learned, kept.watch = kept.session.clock.monotonic(), None
-            return
-        codes = [code for code in (rules.timeout, rules.reaction) if code]
-        codes += deciding_codes(kept.session.profile)
-        readings = await kept.reader.read(codes, priority=Priority.POLL)
-        timeout = timeout_seconds(readings[rules.timeout], rules.off)
-        raw = readings[rules.reaction].raw if rules.reaction else None
-        reaction = next((one for one in rules.reactions if one.raw == raw), None)
-        kept.watch = None if timeout is None else TimeoutWatch(timeout, reaction)
+        deciding = deciding_codes(kept.session.profile)
+        found = await read_timeout(kept.reader, Priority.POLL, deciding)
+        kept.session.timeout = found
+        kept.watch, kept.unknown = found.watch, not found.known
         kept.learned = kept.session.clock.monotonic()
 
 

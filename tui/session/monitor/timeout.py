@@ -3,31 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from tui.bus.api import Priority
+from tui.bus.errors import NoAnswer
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Reaction
+from tui.drive.profile.schema import CommunicationFault
 
 from ..drive import DriveSession
+from ..read.reader import Reader
 from ..reading import Reading
+from ..timeout_told import Timeout, TimeoutWatch
 
 TOLD_SHARE = 0.5
 """Share of its time-out after which a drive that was not heard is told of."""
-
-
-@dataclass(frozen=True, slots=True)
-class TimeoutWatch:
-    """A drive's watch over the line: seconds to its time-out, and what it does then."""
-
-    timeout: float
-    reaction: Reaction | None
-    active: bool = True
-    """False where it begins only with a first command, and none was sent from here."""
-
-    @property
-    def trips(self) -> bool:
-        """Whether the drive may end in a fault; a reaction that is not known may be one."""
-        return self.reaction is None or self.reaction.trips
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,6 +48,80 @@ def names_of(sessions: Sequence[DriveSession]) -> str:
     """Drives of one family as a person calls them: by device, and the family."""
     word = "Device" if len(sessions) == 1 else "Devices"
     return f"{word} {', '.join(str(one.device) for one in sessions)}, {sessions[0].profile.name}"
+
+
+async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str] = ()) -> Timeout:
+    """What a drive tells of its watch over the line now; raises the line's errors.
+
+    Codes named `besides` are read with it.
+    """
+    session = reader.session
+    rules = session.profile.data.communication_fault
+    if rules is None or not rules.timeout:
+        return Timeout(known=True)
+    readings = await _of_its_ports(reader, rules, priority)
+    found = await reader.read([*_told_with_it(session, rules), *besides], priority=priority)
+    told = [one for one in readings if one.raw is not None]
+    running = [(timeout_seconds(one, rules.off), one.parameter.code) for one in told]
+    shortest = min(((s, code) for s, code in running if s is not None), default=None)
+    if shortest is None:
+        return Timeout(known=bool(told))
+    raw = found[rules.reaction].raw if rules.reaction else None
+    reaction = next((one for one in rules.reactions if one.raw == raw), None)
+    faults = {one.raw: one.code for one in session.profile.data.faults.codes}
+    trips = reaction is None or reaction.trips
+    fault = faults.get(rules.fault, "") if trips and rules.fault is not None else ""
+    begun, sure = has_begun(session), rules.starts_confidence != "unverified"
+    return Timeout(True, TimeoutWatch(shortest[0], reaction, begun, shortest[1], fault, sure))
+
+
+async def _of_its_ports(
+    reader: Reader, rules: CommunicationFault, priority: Priority
+) -> list[Reading]:
+    """The time-out of each port of a drive; a port that it does not have may meet silence."""
+    found: list[Reading] = []
+    silent: NoAnswer | None = None
+    absent: dict[str, Reading] = {}
+    for code in (rules.timeout, *rules.other_timeouts):
+        try:
+            found += (await reader.read([code], priority=priority)).values()
+        except NoAnswer as error:
+            silent = error
+            now = reader.session.clock.monotonic()
+            absent[code] = Reading.bad(reader.profile[code], now, str(error), silent=True)
+    if silent is not None and not found:
+        raise silent
+    reader.session.image.take(absent)  # not asked for again by polls
+    return found
+
+
+def _told_with_it(session: DriveSession, rules: CommunicationFault) -> list[str]:
+    """Codes of what tells the reaction, and whether the watch has begun."""
+    codes = [rules.reaction] if rules.reaction else []
+    if rules.needs_write and not session.told_by_line:
+        codes += [chart.command for chart in session.profile.data.charts if chart.command]
+    return list(dict.fromkeys(codes))
+
+
+def timeout_now(session: DriveSession) -> Timeout:
+    """What a drive has told of its time-out, and whether that has begun by now."""
+    found = session.timeout or Timeout(known=False)
+    if found.watch is not None and has_begun(session):
+        return replace(found, watch=replace(found.watch, active=True))
+    return found
+
+
+def has_begun(session: DriveSession) -> bool:
+    """Whether a drive watches the line now, as far as is known.
+
+    Some do so once a command or reference was written to them by anybody: the command word that
+    the drive holds tells it, and what was written from here.
+    """
+    rules = session.profile.data.communication_fault
+    if rules is None or not rules.needs_write or session.told_by_line:
+        return True
+    raws = session.image.trusted
+    return any(raws.get(chart.command) for chart in session.profile.data.charts)
 
 
 def timeout_seconds(reading: Reading, off: int | None) -> float | None:

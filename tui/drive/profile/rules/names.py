@@ -123,6 +123,8 @@ def _of_tables(data: ProfileData) -> Iterator[NamedPlace]:
         yield ("link", "settings", place, "parameter"), setting.parameter
     if watch := data.communication_fault:
         yield ("communication_fault", "timeout"), watch.timeout
+        for place, code in enumerate(watch.other_timeouts):
+            yield ("communication_fault", "other_timeouts", place), code
         yield ("communication_fault", "reaction"), watch.reaction
     for key, order in (("save", data.memory.save), ("factory", data.memory.factory)):
         if order is not None:

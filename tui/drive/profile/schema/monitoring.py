@@ -90,12 +90,16 @@ class CommunicationFault(Table, frozen=True, kw_only=True):
     """The drive's watch over the line."""
 
     timeout: str
+    other_timeouts: list[str] = []
+    """Time-outs of other ports of the drive; which port the line is on, nobody knows."""
     off: int | None = None
     """Raw time-out at which the watch is off."""
     reaction: str = ""
     reactions: list[Reaction] = []
     starts: str
     """When the watch begins, in words."""
+    starts_confidence: Confidence = "manual"
+    """How sure that is; `unverified` where no document says it."""
     needs_write: bool = False
     """True where it begins only after a command or reference was written."""
     fault: int | None = None

@@ -1,0 +1,168 @@
+"""What every command says at its end of a communication time-out that it leaves running."""
+
+from __future__ import annotations
+
+import json
+import signal
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, served
+
+from .commands import ended, held, put, refused, run, tcp_line
+
+CMD, STATUS_21, F803 = 8501, 0xFD01, 2051
+ERR5 = {"seconds": 3.0, "reaction": "Coast stop", "fault": "Err5", "begun": True}
+
+
+@pytest.fixture(scope="module")
+def atv21() -> Iterator[str]:
+    with tcp_line("atv21@1") as line:
+        yield line
+
+
+READING: dict[str, tuple[str, ...]] = {
+    "read": ("read", "{line}", "FD01"),
+    "status": ("status", "{line}"),
+    "identify": ("identify", "{line}"),
+    "watch": ("watch", "{line}", "FD01", "--count", "1"),
+    "block": ("block", "{line}"),
+}
+OTHERS: dict[str, tuple[str, ...]] = {
+    "write": ("write", "{line}", "F803=3s", "--arm"),
+    "a trial of write": ("write", "{line}", "ACC=5s", "--dry-run"),
+    "backup": ("backup", "{line}", "{folder}/b.toml"),
+    "report": ("report", "{line}", "{folder}/r.md"),
+    "compare": ("compare", "{line}", "{line}"),
+    "teach": ("teach", "{line}"),
+}
+
+
+@pytest.mark.parametrize("command", [*READING, *OTHERS])
+def test_it_is_told_which_drive_how_long_what_follows_and_what_to_do(
+    atv21: str, command: str, tmp_path: object
+) -> None:
+    words = (READING | OTHERS)[command]
+    done = ended(0, *(one.format(line=atv21, folder=tmp_path) for one in words))
+    assert (
+        "Device 1, Altivar 21: its communication time-out F803 runs. After 3 s without a request:"
+        " Switches the output off and trips with Err5; the motor coasts.\n"
+        f"To ask it on: drivepanel hold {atv21} -d 1." in done.stderr
+    )
+    assert done.stderr.endswith("After a trip: drivepanel reset.\n")
+
+
+@pytest.mark.parametrize("command", READING)
+def test_one_object_of_json_everywhere(atv21: str, command: str) -> None:
+    words = [one.format(line=atv21) for one in READING[command]]
+    told = json.loads(run(0, *words, "--json"))
+    assert told["timeout"] == ERR5
+    if command == "status":
+        assert told["watch"]["timeout_s"] == told["timeout"]["seconds"]
+
+
+def test_it_is_told_where_the_command_failed(atv21: str) -> None:
+    done = ended(5, "write", atv21, "ACC=99999s", "--arm")
+    assert "F803 runs" in done.stderr
+
+
+def test_a_drive_that_was_never_heard_leaves_nothing_running(atv21: str) -> None:
+    assert "time-out" not in refused(3, "read", atv21, "FD01", "-d", "9", "-p", "atv21")
+
+
+def test_none_where_it_is_off() -> None:
+    with tcp_line("atv21@1", "--set", "F803=0") as line:
+        done = ended(0, "read", line, "FD01", "--json")
+        assert (json.loads(done.stdout)["timeout"], done.stderr) == (None, "")
+
+
+def test_a_drive_that_refuses_the_words_fails_no_command() -> None:
+    with tcp_line("atv21@1", "--protect", "F803") as line:
+        done = ended(0, "read", line, "FD01", "--json")
+        told = json.loads(done.stdout)["timeout"]
+        assert set(told.values()) == {None}
+        assert "it does not tell its communication time-out; it may act" in done.stderr
+
+
+def test_a_watch_that_begins_with_a_command_is_told_of_once_one_was_written() -> None:
+    with tcp_line("atv71@1", "--set", "TTO=300") as line:
+        done = ended(0, "read", line, "ETA", "--json")
+        assert done.stderr == ""
+        assert json.loads(done.stdout)["timeout"]["begun"] is False
+        put(line, CMD, 6)  # by somebody else
+        done = ended(0, "read", line, "ETA", "--json")
+        assert "time-out TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
+        assert json.loads(done.stdout)["timeout"]["begun"] is True
+
+
+def test_a_lost_line_that_goes_unnoticed_is_not_told_as_an_act() -> None:
+    with tcp_line("atv71@1", "--set", "SLL=0") as line:
+        put(line, CMD, 6)
+        done = ended(0, "read", line, "ETA", "--json")
+        assert done.stderr == ""
+        told = json.loads(done.stdout)["timeout"]
+        assert (told["reaction"], told["fault"]) == ("Ignored", None)
+
+
+def test_what_no_document_says_is_not_told_as_sure() -> None:
+    with tcp_line("atv31@1") as line:
+        said = ended(0, "read", line, "ETA").stderr
+        assert "time-out ttO runs (when it begins is in no document). After 10 s" in said
+
+
+def test_a_family_that_was_named_is_named_again() -> None:
+    with tcp_line("powerdrive@1", "--set", "11.63=20") as line:
+        said = ended(0, "read", line, "10.40", "-p", "powerdrive").stderr
+        assert f"drivepanel hold {line} -d 1 -p powerdrive." in said
+        assert "time-out 11.63 runs" in said
+
+
+def test_run_does_not_end_in_a_trip_without_a_word() -> None:
+    with tcp_line("atv71@1", "--set", "TTO=300") as line:
+        done = drivepanel("run", line, "--reference", "10Hz", "--for", "0.5", "--arm", "--json")
+        assert done.returncode == 0, done.stderr
+        assert "time-out TTO runs. After 30 s without a request: Fault SLF1" in done.stderr
+        told: list[dict[str, Any]] = [json.loads(text) for text in done.stdout.splitlines()]
+        last = {"seconds": 30.0, "reaction": "Freewheel", "fault": "SLF1", "begun": True}
+        assert told[-1]["timeout"] == last
+        assert told[-1]["event"] == "stopped"
+
+
+@pytest.mark.parametrize("command", ["reference", "reset"])
+def test_commands_are_told_of(command: str) -> None:
+    with tcp_line("atv71@1", "--set", "TTO=300") as line:
+        more = ["10Hz"] if command == "reference" else []
+        done = drivepanel(command, line, *more, "--arm")
+        # a reset of no fault is refused, and nothing was written
+        assert ("time-out TTO runs" in done.stderr) is (command == "reference")
+
+
+# Holding
+
+
+def in_fault(line: str) -> bool:
+    return bool(held(line, STATUS_21) & 2)
+
+
+def test_hold_prints_at_once_asks_on_and_tells_what_follows() -> None:
+    with tcp_line("atv21@1", "--set", "F803=2") as line:
+        hold = (*DRIVEPANEL, "read", line, "FD01", "--hold", "6")
+        with served(hold, ready="Code") as program:
+            assert program.process.poll() is None, "the value comes before the end"
+            _, said = program.process.communicate(timeout=PATIENCE)
+        assert program.process.returncode == 0
+        assert "After 2 s without a request" in said
+        assert "is in fault" not in said
+        assert not in_fault(line)
+
+
+SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
+def test_what_a_signal_ends_says_it_too(atv21: str, number: signal.Signals) -> None:
+    with served((*DRIVEPANEL, "watch", atv21, "FD01"), ready="FD01") as program:
+        status, said = program.end(number)
+    assert (status, "F803 runs" in said) == (SIGNALS[number], True)

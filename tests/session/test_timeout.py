@@ -1,0 +1,155 @@
+"""What a drive tells of its communication time-out, and whether that runs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import pytest
+
+from tui.bus.api import Priority, Reply
+from tui.bus.errors import DeviceException, NoAnswer
+from tui.drive.profile import library
+from tui.session.drive import DriveSession
+from tui.session.monitor.timeout import has_begun, read_timeout
+from tui.session.read.reader import Reader
+from tui.session.timeout_told import Timeout
+
+from .fakes import OneDrive, parameter, profile_of
+
+TTO, SLL, CMD, PORT, STATE = 50, 51, 60, 70, 10
+RULES: dict[str, Any] = {
+    "timeout": "TTO",
+    "off": 0,
+    "reaction": "SLL",
+    "reactions": [
+        {"raw": 0, "name": "Ignored", "does": "Nothing", "trips": False, "never_set": True},
+        {"raw": 1, "name": "Freewheel", "does": "The motor coasts; SLF", "trips": True},
+        {"raw": 2, "name": "Stop", "does": "Stops, no fault", "trips": False},
+    ],
+    "starts": "With the first request.",
+    "fault": 5,
+    "source": "manual",
+}
+
+
+class Ports(OneDrive):
+    """A drive that is silent, or refuses, at some addresses."""
+
+    def __init__(self, registers: dict[int, int], *, silent: int = 0, refused: int = 0) -> None:
+        super().__init__({STATE: 1, SLL: 1, CMD: 0, **registers})
+        self.silent, self.refused = silent, refused
+        self.read_so_far: list[int] = []
+
+    async def read(
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
+    ) -> Reply:
+        self.read_so_far.append(address)
+        if self.silent in range(address, address + count):
+            raise NoAnswer(device, function, address)
+        if self.refused in range(address, address + count):
+            raise DeviceException(device, function, address, code=2)
+        return await super().read(device, address, count, priority=priority, function=function)
+
+
+def session_of(line: OneDrive, **rules: Any) -> DriveSession:
+    profile = profile_of(
+        parameter("STATE", STATE),
+        parameter("TTO", TTO, unit="s", scale="0.1"),
+        parameter("SLL", SLL),
+        parameter("CMD", CMD),
+        parameter("PORT", PORT, unit="s", scale="0.1"),
+        communication_fault=RULES | rules,
+        faults={"codes": [{"raw": 5, "code": "SLF", "name": "Line"}]},
+        charts=[
+            {
+                "id": "drivecom",
+                "name": "Drivecom",
+                "kind": "drivecom",
+                "status": "STATE",
+                "command": "CMD",
+                "states": [{"id": "run", "name": "Run", "kind": "running", "mask": 3, "value": 1}],
+            }
+        ],
+    )
+    return DriveSession(line, 1, profile)
+
+
+async def told(session: DriveSession) -> Timeout:
+    return await read_timeout(Reader(session), Priority.OPERATOR_READ)
+
+
+async def test_seconds_reaction_and_fault() -> None:
+    watch = (await told(session_of(Ports({TTO: 30})))).watch
+    assert watch is not None
+    assert (watch.timeout, watch.code, watch.fault, watch.active) == (3.0, "TTO", "SLF", True)
+    assert watch.reaction is not None
+    assert watch.reaction.name == "Freewheel"
+
+
+async def test_a_reaction_without_a_trip_names_no_fault() -> None:
+    watch = (await told(session_of(Ports({TTO: 30, SLL: 2})))).watch
+    assert watch is not None
+    assert watch.fault == ""
+
+
+async def test_off_and_refused_are_two_things() -> None:
+    assert await told(session_of(Ports({TTO: 0}))) == Timeout(known=True)
+    assert await told(session_of(Ports({TTO: 30}, refused=TTO))) == Timeout(known=False)
+
+
+async def test_the_shortest_of_several_ports_counts() -> None:
+    for mine, other, shortest in ((0, 20, 2.0), (30, 0, 3.0), (30, 20, 2.0), (10, 20, 1.0)):
+        line = Ports({TTO: mine, PORT: other})
+        watch = (await told(session_of(line, other_timeouts=["PORT"]))).watch
+        assert watch is not None
+        assert watch.timeout == shortest
+
+
+async def test_a_port_that_is_not_there_is_asked_for_once() -> None:
+    line = Ports({PORT: 20}, silent=TTO)
+    session = session_of(line, other_timeouts=["PORT"])
+    for _ in range(2):
+        found = await read_timeout(Reader(session), Priority.POLL)
+        assert found.watch is not None
+        assert found.watch.code == "PORT"
+    assert line.read_so_far.count(TTO) == 1
+
+
+async def test_a_drive_that_answers_nothing_is_told() -> None:
+    with pytest.raises(NoAnswer):
+        await told(session_of(Ports({TTO: 30}, silent=TTO)))
+
+
+@pytest.mark.parametrize(
+    ("needs_write", "held", "told_by_line", "begun"),
+    [
+        (False, 0, False, True),
+        (True, 0, False, False),
+        (True, 7, False, True),  # somebody has written a command
+        (True, 0, True, True),
+    ],
+)
+async def test_a_watch_that_begins_with_a_command(
+    needs_write: bool, held: int, told_by_line: bool, begun: bool
+) -> None:
+    session = session_of(Ports({TTO: 30, CMD: held}), needs_write=needs_write)
+    session.told_by_line = told_by_line
+    watch = (await told(session)).watch
+    assert watch is not None
+    assert watch.active is begun
+    assert has_begun(session) is begun
+
+
+@pytest.mark.parametrize("family", ["atv21", "atv31", "atv312", "atv71", "powerdrive"])
+async def test_few_words_are_read(family: str) -> None:
+    """A command that ends asks for the words of the profile's table, no more."""
+    profile = library.load(family)
+    line = OneDrive({one.address: 1 for one in profile.parameters})
+    await told(DriveSession(line, 1, profile))
+    assert sum(count for _, count in line.asked) <= 3

@@ -1,0 +1,118 @@
+"""Asking drives on, so that their communication time-out does not run out: --hold and hold."""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import signal
+import sys
+from collections.abc import AsyncIterator, Callable, Sequence
+from contextlib import asynccontextmanager, suppress
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import click
+
+from ..commands.orders import complain
+from .ending import Ending
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
+    from tui.session.monitor.line_watch import Look
+
+Tell = Callable[[str, int, str], None]
+"""Is given an event, a device and a sentence."""
+
+HOLD_POLL_INTERVAL = 0.2
+BY_SIGNAL = 128
+"""The exit status of a command that a signal ended, less the signal's number."""
+
+
+@dataclass(slots=True)
+class Holding:
+    """Drives that are asked on, from the moment in which each is taken."""
+
+    fleet: Fleet
+    tell: Tell
+    lost: set[int] = field(default_factory=set)
+    faults: dict[int, str] = field(default_factory=dict)
+    """The fault that each drive was last seen in; empty for none."""
+
+    def take(self, session: DriveSession) -> None:
+        """Ask a drive on from now on."""
+        self.fleet.take(session)
+
+    async def until(self, ending: Ending, seconds: float | None = None) -> None:
+        """Go on until the command is to end, at most so many seconds."""
+        loop = asyncio.get_running_loop()
+        end = math.inf if seconds is None else loop.time() + seconds
+        while not ending.event.is_set() and loop.time() < end:
+            self.look()
+            with suppress(TimeoutError):
+                left = min(HOLD_POLL_INTERVAL, max(0.0, end - loop.time()))
+                await asyncio.wait_for(ending.event.wait(), left)
+
+    def look(self) -> None:
+        """Tell what has changed: drives that do not answer, or do again, and faults."""
+        looks = self.fleet.line_watch.looks
+        for device, look in looks.items():
+            self._compare(device, look)
+
+    def _compare(self, device: int, look: Look) -> None:
+        if look.error:
+            if device not in self.lost:
+                self.lost.add(device)
+                self.tell("lost", device, f"{look.error} It is tried on.")
+            return
+        if device in self.lost:
+            self.lost.discard(device)
+            self.tell("back", device, f"Device {device} answers again.")
+        fault = look.state.fault if look.state else None
+        text = f"{fault.code}, {fault.name}" if fault else ""
+        before = self.faults.get(device)
+        self.faults[device] = text
+        if text != (before or "") and (text or before):
+            now = f"is in fault: {text}" if text else "is in fault no more"
+            self.tell("fault", device, f"Device {device} {now}.")
+
+
+async def hold_on(
+    opened: OpenLine, sessions: Sequence[DriveSession], seconds: float | None
+) -> None:
+    """Ask drives on for so many seconds; nothing is done where none are named.
+
+    Raises Exit with 128 and the number of the signal that ended it before.
+    """
+    if seconds is None:
+        return
+    sys.stdout.flush()  # what was printed is for now, whoever reads it
+    async with kept_asked(opened, _complain) as (holding, ending):
+        for session in sessions:
+            holding.take(session)
+        await holding.until(ending, seconds)
+
+
+@asynccontextmanager
+async def kept_asked(opened: OpenLine, tell: Tell) -> AsyncIterator[tuple[Holding, Ending]]:
+    """Whoever asks drives on, and its end by a signal.
+
+    Raises Exit with 128 and the number of the signal, once the block has ended.
+    """
+    from tui.session.fleet import Fleet
+    from tui.session.journal import Journal
+
+    fleet, ending = Fleet(opened.line, Journal()), Ending()
+    with ending.by_signals():
+        try:
+            yield Holding(fleet, tell), ending
+        finally:
+            fleet.forget()
+    name = ending.why.removeprefix("ended by ")
+    if name in signal.Signals.__members__:
+        raise click.exceptions.Exit(BY_SIGNAL + signal.Signals[name])
+
+
+def _complain(_event: str, _device: int, text: str) -> None:
+    complain(text)

@@ -1,0 +1,124 @@
+"""What drives do when a command no longer asks them: their communication time-out."""
+
+from __future__ import annotations
+
+import asyncio
+import shlex
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from .say import say
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
+    from tui.session.timeout_told import Timeout, TimeoutWatch
+
+TOLD_WITHIN = 3.0
+"""Seconds in which a drive tells its time-out at the end of a command."""
+
+
+@dataclass(slots=True)
+class LeftAlone:
+    """A drive that a command asks, and what it does afterwards."""
+
+    session: DriveSession
+    line_text: str
+    goes_on: bool
+    """Whether the drive is there afterwards: a simulated one ends with its line."""
+
+    async def learn(self) -> None:
+        """Have the drive tell its time-out, unless it has; no answer fails nothing."""
+        from tui.bus.api import Priority
+        from tui.bus.errors import LineError
+        from tui.session.monitor.timeout import read_timeout
+        from tui.session.read.reader import Reader
+        from tui.session.timeout_told import Timeout
+
+        session = self.session
+        heard = session.line.device_state(session.device).heard is not None
+        if not heard or (session.timeout is not None and session.timeout.known):
+            return
+        session.timeout = Timeout(known=False)
+        with suppress(LineError, TimeoutError):
+            reading = read_timeout(Reader(session), Priority.OPERATOR_READ)
+            session.timeout = await asyncio.wait_for(reading, TOLD_WITHIN)
+
+    async def tell(self) -> None:
+        """Say on standard error that its time-out runs, and what follows."""
+        from tui.session.monitor.timeout import timeout_now
+
+        session = self.session
+        heard = session.line.device_state(session.device).heard is not None
+        if not heard or not self.goes_on or session.profile.data.communication_fault is None:
+            return
+        if session.arming.times:
+            session.timeout = None  # it may have been written
+        await self.learn()
+        if text := left_alone(session, timeout_now(session), self.line_text):
+            with suppress(OSError):
+                say(f"drivepanel: {text}", err=True)
+
+
+def left_alone(session: DriveSession, found: Timeout, line_text: str) -> str:
+    """What a drive does when nobody asks it any more, and what to do about it; empty if nothing."""
+    who = f"Device {session.device}, {session.profile.name}"
+    if not found.known:
+        return (
+            f"{who}: it does not tell its communication time-out; it may act when nobody asks it."
+            f"\nTo ask it on: {hold_text(session, line_text)}."
+        )
+    watch = found.watch
+    if watch is None or not watch.active or not _acts(watch):
+        return ""
+    does = watch.reaction.does.rstrip(".") if watch.reaction else "its own reaction follows"
+    runs = "" if watch.sure else " (when it begins is in no document)"
+    after = " After a trip: drivepanel reset." if watch.trips else ""
+    return (
+        f"{who}: its communication time-out {watch.code} runs{runs}. After {watch.timeout:g} s"
+        f" without a request: {does}.\nTo ask it on: {hold_text(session, line_text)}.{after}"
+    )
+
+
+def hold_text(session: DriveSession, line_text: str) -> str:
+    """The command that asks a drive on."""
+    words = ["drivepanel", "hold", shlex.quote(line_text), "-d", str(session.device)]
+    if session.known_identity.profile != session.profile.id:
+        words += ["-p", session.profile.id]
+    return " ".join(words)
+
+
+def _acts(watch: TimeoutWatch) -> bool:
+    """Whether anything follows: a lost line may be set to go unnoticed."""
+    return watch.reaction is None or not watch.reaction.never_set
+
+
+def timeout_json(found: Timeout) -> dict[str, Any] | None:
+    """The object `timeout` of every command: null where a drive has none or it is off.
+
+    Its fields are null where the drive does not tell it.
+    """
+    if not found.known:
+        return {"seconds": None, "reaction": None, "fault": None, "begun": None}
+    if (watch := found.watch) is None:
+        return None
+    return {
+        "seconds": watch.timeout,
+        "reaction": watch.reaction.name if watch.reaction else None,
+        "fault": watch.fault or None,
+        "begun": watch.active,
+    }
+
+
+def look_after(opened: OpenLine, session: DriveSession, line_text: str) -> LeftAlone:
+    """Have it told at the end what a drive does then."""
+    found = LeftAlone(session, line_text, goes_on=opened.simulation is None)
+    opened.farewells[session.device] = found
+    return found
+
+
+async def say_farewells(opened: OpenLine) -> None:
+    """Say what each drive does that was asked, the line being open yet."""
+    for farewell in list(opened.farewells.values()):
+        await farewell.tell()

@@ -1,0 +1,38 @@
+"""What a drive has told of its communication time-out: how long it is, and what follows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tui.drive.profile.schema import Reaction
+
+
+@dataclass(frozen=True, slots=True)
+class TimeoutWatch:
+    """A drive's watch over the line: seconds to its time-out, and what it does then."""
+
+    timeout: float
+    reaction: Reaction | None
+    active: bool = True
+    """False where it begins only with a first command, and none was sent from here."""
+    code: str = ""
+    """The parameter that sets the time-out."""
+    fault: str = ""
+    """The fault in which its reaction ends; empty where it ends in none, or it is not known."""
+    sure: bool = True
+    """Whether a document says when it begins; it is taken to have begun where none does."""
+
+    @property
+    def trips(self) -> bool:
+        """Whether the drive may end in a fault; a reaction that is not known may be one."""
+        return self.reaction is None or self.reaction.trips
+
+
+@dataclass(frozen=True, slots=True)
+class Timeout:
+    """What is known of a drive's communication time-out."""
+
+    known: bool
+    """Whether the drive has told it."""
+    watch: TimeoutWatch | None = None
+    """None where there is none, where it is off, or where it is not known."""
