@@ -38,6 +38,9 @@ def test_the_commands_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
         assert name == "drivepanel"
         if words[:1] == ["run"]:
             assert drivepanel(*words).returncode == status, line
+        elif words[:1] == ["hold"]:
+            with served([*DRIVEPANEL, *words], ready="Device 1"):
+                pass
         elif words[:1] == ["simulate"]:
             with served([*DRIVEPANEL, *words], ready="Ready"):
                 pass

@@ -113,6 +113,13 @@ def test_a_motor_that_runs_and_its_stop() -> None:
     assert {"reference", "order", "state", "stopping", "stopped"} <= set(events)
 
 
+def test_a_drive_that_is_held() -> None:
+    with served([*DRIVEPANEL, "hold", *DRIVE, "--json"], ready="{") as holding:
+        (told,) = documents(holding.ready)
+    assert (told["event"], told["timeout"]["seconds"]) == ("holding", 10.0)
+    assert "HoldTold" in SEEN
+
+
 async def test_a_drive_in_fault() -> None:
     async with fault_status.line("atv71") as opened:
         fault_status.provoke(opened, "ObF")
@@ -132,7 +139,7 @@ def test_a_simulated_line() -> None:
 
 
 def test_every_command_has_json() -> None:
-    tried = {words[0] for _, words, _ in RUNS.values()} | {"run", "reset", "simulate"}
+    tried = {words[0] for _, words, _ in RUNS.values()} | {"run", "reset", "simulate", "hold"}
     assert tried == set(COMMANDS) - NO_JSON
     for name in tried:
         assert "--json" in invoked(name, "--help").stdout

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, served
+from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, served, wait_until
 
 from .commands import ended, held, put, refused, run, tcp_line
 
@@ -161,8 +161,54 @@ def test_hold_prints_at_once_asks_on_and_tells_what_follows() -> None:
 SIGNALS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGHUP: 129}
 
 
+@pytest.mark.parametrize("number", SIGNALS, ids=lambda number: number.name)
+def test_hold_ends_by_a_signal_and_tells_what_follows(number: signal.Signals) -> None:
+    with tcp_line("atv21@1", "atv71@2") as line:
+        hold = (*DRIVEPANEL, "hold", line, "-d", "1", "-d", "2")
+        with served(hold, ready="Device 2, Altivar 71: kept from") as program:
+            status, said = program.end(number)
+        assert status == SIGNALS[number], said
+        assert "the communication time-out protects nobody" in said
+        assert "Device 1, Altivar 21: its communication time-out F803 runs. After 3 s" in said
+        assert "Device 2" not in said, "nobody has commanded it"
+
+
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGHUP], ids=lambda number: number.name)
 def test_what_a_signal_ends_says_it_too(atv21: str, number: signal.Signals) -> None:
     with served((*DRIVEPANEL, "watch", atv21, "FD01"), ready="FD01") as program:
         status, said = program.end(number)
     assert (status, "F803 runs" in said) == (SIGNALS[number], True)
+
+
+def test_hold_in_json() -> None:
+    with tcp_line("atv21@1") as line:
+        with served((*DRIVEPANEL, "hold", line, "--json"), ready='"holding"') as program:
+            told = json.loads(program.ready)
+            program.end()
+        assert (told["device"], told["event"], told["timeout"]) == (1, "holding", ERR5)
+
+
+def test_hold_tells_of_a_drive_that_is_lost_and_of_one_that_never_was() -> None:
+    with (
+        tcp_line("atv21@1") as line,
+        served((*DRIVEPANEL, "hold", line, "-d", "1", "-d", "9"), ready="Device 1") as program,
+    ):
+        lines = iter(program.process.stderr or ())
+        assert any("Device 9 did not answer" in text for text in lines)
+        assert program.process.poll() is None, "the others are held"
+
+
+def test_3_nobody_to_hold() -> None:
+    with tcp_line("atv21@1") as line:
+        assert "protects nobody" not in refused(3, "hold", line, "-d", "9")
+
+
+def test_hold_keeps_a_short_time_out_from_running_out_while_others_are_looked_for() -> None:
+    """An address at which nobody answers takes seconds."""
+    with tcp_line("atv21@1", "--set", "F803=2") as line:
+        silent = [word for device in range(10, 14) for word in ("-d", str(device))]
+        hold = (*DRIVEPANEL, "hold", line, "-d", "1", *silent)
+        with served(hold, ready="Device 1") as program:
+            lines = iter(program.process.stderr or ())
+            wait_until(lambda: "Device 13" in next(lines), "all were asked")
+            assert not in_fault(line)

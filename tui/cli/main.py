@@ -22,6 +22,7 @@ COMMANDS = {
     "block": ("block", "Show or change a drive's blocks or scanner."),
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
     "demo": ("panel", "Open the panel on five simulated drives that run."),
+    "hold": ("hold", "Ask drives on, against their communication time-out."),
     "identify": ("identify", "Ask a drive who it is."),
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),

@@ -15,6 +15,7 @@ from .of_drives import (
     CommandTold,
     CycleTold,
     ErrorTold,
+    HoldTold,
     IdentityTold,
     ReadTold,
     RunTold,
@@ -47,10 +48,10 @@ from .of_settings import (
 )
 
 DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
-    ErrorTold, ReadTold, CycleTold, IdentityTold, StatusTold, RunTold, CommandTold, StopTold,
-    WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold, BlockChangeTold,
-    BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold, ProfileShown,
-    WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
+    ErrorTold, ReadTold, CycleTold, IdentityTold, StatusTold, RunTold, HoldTold, CommandTold,
+    StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
+    BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
+    ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""
 

@@ -110,6 +110,18 @@ class RunTold(DocumentTold, kw_only=True):
     timeout: TimeoutTold | UnsetType | None = UNSET
 
 
+class HoldTold(DocumentTold, kw_only=True):
+    """`hold`: one event."""
+
+    command: Literal["hold"]
+    time: str
+    line: str
+    device: int
+    event: Literal["holding", "lost", "back", "fault"]
+    text: str
+    timeout: TimeoutTold | UnsetType | None = UNSET
+
+
 class CommandTold(OfDriveTold, kw_only=True):
     """`reference`, `reset`: what the command came to."""
 

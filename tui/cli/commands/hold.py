@@ -1,0 +1,151 @@
+"""`drivepanel hold`: drives asked on, so that their communication time-out does not run out."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Protocol
+
+import click
+
+from ..running.holding import Holding, kept_asked
+from ..shared.devices import several_devices_option
+from ..shared.errors import LINE_TROUBLE, Failure, status_of, told
+from ..shared.left_alone import timeout_json
+from ..shared.options import (
+    Target,
+    connect_drive,
+    force_profile_option,
+    json_option,
+    line_argument,
+    on_line,
+    profile_option,
+    read_only_option,
+)
+from ..shared.say import say
+from .orders import complain
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
+    from tui.session.timeout_told import Timeout
+
+DISARMS = (
+    "While this runs, the communication time-out protects nobody: if whoever commands the drive"
+    " is lost, the motor runs on. Ctrl-C ends it."
+)
+
+
+class HeldTeller(Protocol):
+    """Tells an event of a drive, at the beginning with what it is kept from."""
+
+    def __call__(
+        self, event: str, device: int, text: str, found: Timeout | None = None, /
+    ) -> None: ...
+
+
+@click.command()
+@line_argument
+@several_devices_option
+@profile_option
+@force_profile_option
+@read_only_option
+@json_option
+@told
+def hold(
+    line_text: str,
+    device: tuple[int, ...],
+    profile_id: str | None,
+    force_profile: bool,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Ask drives on until Ctrl-C, so that their communication time-out does not run out.
+
+    It reads, and writes nothing. A drive that is asked cannot tell that its controller is lost:
+    its own protection is off meanwhile. At the end it is told what each drive does then, and when.
+    """
+    wanted = list(dict.fromkeys(device))
+    targets = [Target(line_text, d, profile_id, force_profile=force_profile) for d in wanted]
+    tell = _json_teller(line_text) if as_json else _teller
+
+    async def work(opened: OpenLine) -> None:
+        async with kept_asked(opened, tell) as (holding, ending):
+            taking = asyncio.create_task(_take_all(opened, targets, holding, tell))
+            end = asyncio.create_task(ending.event.wait())
+            try:
+                # drives that answer are asked on while others are looked for
+                await asyncio.wait({taking, end}, return_when=asyncio.FIRST_COMPLETED)
+                if taking.done():
+                    await taking
+                    await holding.until(ending)
+            finally:
+                taking.cancel()
+                end.cancel()
+
+    on_line(targets[0], work, read_only=read_only)
+
+
+async def _take_all(
+    opened: OpenLine, targets: Sequence[Target], holding: Holding, tell: HeldTeller
+) -> None:
+    """Ask each drive on as soon as it has answered; raises where none does."""
+    from tui.session.monitor.timeout import timeout_now
+
+    failure: Exception | None = None
+    for target in targets:
+        try:
+            session = await _connected(opened, target)
+        except Exception as error:
+            known = isinstance(error, click.ClickException) or status_of(error) is not None
+            if len(targets) == 1 or not known:
+                raise
+            failure = error
+            complain(str(error))
+            continue
+        if not holding.fleet.found:
+            complain(DISARMS)
+        holding.take(session)
+        found = timeout_now(session)
+        tell("holding", target.device, held_text(session, found), found)
+    if failure is not None and not holding.fleet.found:
+        raise failure
+
+
+async def _connected(opened: OpenLine, target: Target) -> DriveSession:
+    """A drive that answers, with what it tells of its time-out."""
+    session = await connect_drive(opened, target)
+    if opened.line.device_state(target.device).heard is None:
+        raise Failure(f"Device {target.device} does not answer.", LINE_TROUBLE)
+    return session
+
+
+def held_text(session: DriveSession, found: Timeout) -> str:
+    """What a drive is kept from."""
+    who = f"Device {session.device}, {session.profile.name}"
+    if not found.known:
+        return f"{who}: it does not tell its communication time-out; it is asked often."
+    if (watch := found.watch) is None:
+        return (
+            f"{who}: it has no communication time-out, or it is off; it is asked on all the same."
+        )
+    does = watch.reaction.does.rstrip(".") if watch.reaction else "its own reaction follows"
+    return f"{who}: kept from its communication time-out of {watch.timeout:g} s ({does})."
+
+
+def _teller(_event: str, _device: int, text: str, _found: Timeout | None = None) -> None:
+    say(f"{time.strftime('%H:%M:%S')}  {text}")
+
+
+def _json_teller(line_text: str) -> HeldTeller:
+    from ..shared.output import iso_time, print_json
+
+    def tell(event: str, device: int, text: str, found: Timeout | None = None) -> None:
+        data = {"time": iso_time(time.time()), "line": line_text, "device": device}
+        data |= {"event": event, "text": text}
+        if found is not None:
+            data["timeout"] = timeout_json(found)
+        print_json(data, compact=True)
+
+    return tell
