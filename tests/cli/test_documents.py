@@ -120,6 +120,14 @@ def test_a_drive_that_is_held() -> None:
     assert "HoldTold" in SEEN
 
 
+def test_what_a_stop_sent_first_is_told() -> None:
+    (told,) = documents(ended(0, "stop", *DRIVE, "--json").stdout)
+    (first,) = told["first"]
+    assert (first["address"], first["word"], first["answer"]) == (8501, 7, "ok")
+    assert "atv71" in first["families"]
+    assert told["timeout"]["begun"] is True
+
+
 async def test_a_drive_in_fault() -> None:
     async with fault_status.line("atv71") as opened:
         fault_status.provoke(opened, "ObF")

@@ -37,6 +37,7 @@ OTHERS: dict[str, tuple[str, ...]] = {
     "report": ("report", "{line}", "{folder}/r.md"),
     "compare": ("compare", "{line}", "{line}"),
     "teach": ("teach", "{line}"),
+    "stop": ("stop", "{line}"),
 }
 
 

@@ -210,5 +210,5 @@ def test_several_drives_are_stopped() -> None:
     assert "Device 1, Altivar 71: stopped" in told
     assert "Device 2, Altivar 312: stopped" in told
     done = ended(3, "stop", *line, "-d", "9")
-    assert "No answer at 9" in done.stderr
+    assert "no answer at 9" in done.stderr
     refused(2, "stop", *line, "--give-back", "--arm")

@@ -3,23 +3,22 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import click
 
+from ..running.stop_targets import StoppableDrive, first_stopped, found_at, remembered
 from ..running.stop_telling import StopTelling
 from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, REFUSED_HERE, Failure, told
+from ..shared.left_alone import LeftAlone, look_after
 from ..shared.options import (
     Target,
-    connect_drive,
     drives_options,
     json_option,
     line_argument,
     on_line,
     read_only_option,
-    unidentified,
 )
 from ..shared.output import print_json
 from .orders import close_journal
@@ -28,7 +27,6 @@ if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
     from tui.session.command.stop import Stopper
     from tui.session.command.stop_report import StopReport
-    from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
 
@@ -79,24 +77,18 @@ def stop(
     if read_only:
         raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
-    devices = _devices(addresses) if every else None
+    devices = _devices(addresses) if every else [one.device for one in target.each()]
     telling = StopTelling(target.line_text, as_json=as_json)
 
     async def work(opened: OpenLine) -> int:
-        if not (every or target.others):
-            found = await _wanted(opened, target)
-            status = await _stop_one(opened, found, order, telling)
-            if give_back and not status:
-                from ..running.giving_back import give_control_back
+        if every or target.others:
+            return await _stop_all(opened, devices, order, target.profile_id, telling)
+        status, session = await _stop_one(opened, target, order, telling)
+        if give_back and not status:
+            from ..running.giving_back import give_control_back
 
-                text = await give_control_back(found.session, arm=arm)
-                telling.gave_back(text)
-            return status
-        wanted = devices or opened.devices or tuple(_devices(USUAL_ADDRESSES))
-        if not every:
-            wanted = tuple(one.device for one in target.each())
-        profile_id = target.profile_id
-        return await _stop_all(opened, wanted, order, profile_id, telling, named=not every)
+            telling.gave_back(await give_control_back(session, arm=arm))
+        return status
 
     worst = on_line(target, work)
     if as_json:
@@ -129,44 +121,23 @@ async def ended(stopper: Stopper, device: int) -> StopReport:
         await asyncio.sleep(STOP_POLL_INTERVAL)
 
 
-@dataclass(frozen=True, slots=True)
-class StoppableDrive:
-    """A drive that can be stopped, and what it is called."""
-
-    session: DriveSession
-    name: str
-
-
-async def _wanted(opened: OpenLine, target: Target) -> StoppableDrive:
-    """The wanted drive; raises UsageError where it is not known what stops it."""
-    from tui.drive.profile import library
-    from tui.session.connect.identify import identify_drive
-
-    if target.profile_id is None:
-        identity = await identify_drive(opened.line, target.device)
-        found = await asyncio.to_thread(_session, opened, identity, None)
-        if found is None:
-            raise unidentified(identity)
-        return found
-    session = await connect_drive(opened, target)
-    return StoppableDrive(session, library.load(target.profile_id).name)
-
-
 async def _stop_one(
-    opened: OpenLine, found: StoppableDrive, order: OrderId, telling: StopTelling
-) -> int:
+    opened: OpenLine, target: Target, order: OrderId, telling: StopTelling
+) -> tuple[int, DriveSession]:
+    """Stop one drive: first by the word that stops whatever it may be, then by its own.
+
+    Returns the exit status, and the session with it. Raises UsageError where it is not known what
+    stops it, NoAnswer where it is not there.
+    """
     from tui.session.command.stop import Stopper
     from tui.session.journal import Journal
 
-    if not has_order(found.session, order):
-        raise Failure(
-            f"Device {found.session.device}, {found.name}, has no {order.replace('-', ' ')};"
-            " stop it without that option.",
-            REFUSED_HERE,
-        )
     journal = Journal()
     try:
-        return await _seen_through(Stopper(opened.line, journal), found, order, telling)
+        found = await first_stopped(opened, target, order, journal, telling)
+        look_after(opened, found.session, target.line_text)
+        stopper = Stopper(opened.line, journal)
+        return await _seen_through(stopper, found, order, telling), found.session
     finally:
         close_journal(journal)
 
@@ -175,14 +146,20 @@ async def _seen_through(
     stopper: Stopper, found: StoppableDrive, order: OrderId, telling: StopTelling
 ) -> int:
     """Stop a drive, tell what became of it; returns the exit status."""
+    from tui.drive.orders import INSTEAD
     from tui.session.command.stop_report import Phase
 
     session = found.session
-    stopper.stop([session], order, by="drivepanel stop")
+    # a drive without the wished way is stopped all the same; it is told by which
+    way: OrderId = order if order in INSTEAD or has_order(session, order) else "stop"
+    stopper.stop([session], way, by="drivepanel stop")
     report = await ended(stopper, session.device)
+    if telling.as_json:
+        await LeftAlone(session, "", goes_on=True).learn()
     who = f"Device {session.device}, {found.name}"
     if report.phase is Phase.STOPPED:
-        telling.stopped(session.device, session.profile.id, f"{who}: {report.text}.")
+        lacks = "" if way == order else f" (it has no {order}: ramp stop)"
+        telling.stopped(session, f"{who}: {report.text}{lacks}.")
         return 0
     status = await _why(session)
     telling.failed(session.device, session.profile.id, f"{who}: {report.text}", status)
@@ -206,19 +183,16 @@ async def _why(session: DriveSession) -> int:
 
 async def _stop_all(
     opened: OpenLine,
-    devices: Iterable[int],
+    named: Sequence[int],
     order: OrderId,
     profile_id: str | None,
     telling: StopTelling,
-    *,
-    named: bool,
 ) -> int:
     """Stop each drive as soon as it is found; what one does holds up no other.
 
-    Of `named` addresses every one has to answer.
-
     Every address is first asked once, shortly, before any is asked with patience: a silent one
-    takes seconds to rule out, and meanwhile motors turn.
+    takes seconds to rule out, and meanwhile motors turn. A silent address is a failure where a
+    drive is known to be there: named, simulated, or started from here.
     """
     from tui.session.command.stop import Stopper
     from tui.session.journal import Journal
@@ -226,14 +200,18 @@ async def _stop_all(
     journal = Journal()
     stopper = Stopper(opened.line, journal)
     stops: list[asyncio.Task[int]] = []
-    left = list(devices)
+    started = await remembered(opened)
+    devices = named or sorted({*(opened.devices or _devices(USUAL_ADDRESSES)), *started})
+    expected = set(named) or {*opened.devices, *started}
+    # motors that were started from here turn most likely
+    left = sorted(devices, key=lambda device: device not in started)
     worst = 0
     try:
         for patient in (False, True):
             asked, left = left, []
             for device in asked:
                 try:
-                    found = await _found(opened, device, profile_id, patient=patient)
+                    found = await found_at(opened, device, profile_id, patient=patient)
                 except Failure as failure:
                     telling.failed(device, None, failure.message, failure.status)
                     worst = max(worst, failure.status)
@@ -241,65 +219,15 @@ async def _stop_all(
                 if found is None:
                     left.append(device)
                     continue
-                # a drive without the wished way is stopped all the same
-                way: OrderId = order if has_order(found.session, order) else "stop"
-                stops.append(asyncio.create_task(_seen_through(stopper, found, way, telling)))
+                look_after(opened, found.session, opened.text)
+                stops.append(asyncio.create_task(_seen_through(stopper, found, order, telling)))
     finally:
         # whatever went wrong with the search: stops that were begun are seen through
         worst = max([worst, *await asyncio.gather(*stops)])
         close_journal(journal)
-    if left:
-        status = LINE_TROUBLE if named else 0
-        telling.silent(left, status)
-        worst = max(worst, status)
+    if missing := sorted(expected.intersection(left)):
+        telling.silent(missing, LINE_TROUBLE)
+        worst = max(worst, LINE_TROUBLE)
+    if empty := sorted(set(left) - expected):
+        telling.silent(empty, 0)
     return worst or (0 if stops else LINE_TROUBLE)
-
-
-async def _found(
-    opened: OpenLine, device: int, profile_id: str | None, *, patient: bool
-) -> StoppableDrive | None:
-    """The drive at an address; None where nobody answers yet.
-
-    Raises Failure where it cannot be stopped, and why.
-    """
-    from tui.bus.api import Priority
-    from tui.bus.errors import LineError, NoAnswer
-    from tui.session.connect.identify import identify_drive
-
-    priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
-    try:
-        identity = await identify_drive(opened.line, device, priority=priority)
-    except NoAnswer:
-        return None
-    except LineError as error:
-        if not patient:
-            return None  # asked again, with patience
-        raise Failure(f"Device {device}: NOT STOPPED: {error}", LINE_TROUBLE) from error
-    if (found := await asyncio.to_thread(_session, opened, identity, profile_id)) is not None:
-        return found
-    fits = ", ".join(identity.candidates) or "drivepanel profiles"
-    raise Failure(
-        f"Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
-        f" with -p ({fits}), or stop it at the machine.",
-        DRIVE_REFUSED,
-    )
-
-
-def _session(
-    opened: OpenLine, identity: DriveIdentity, profile_id: str | None
-) -> StoppableDrive | None:
-    """A session with the drive; None where it is not known what stops it.
-
-    A drive that does not say who it is may belong to several families: where the same words stop
-    them all, which one it is does not matter.
-    """
-    from tui.drive.orders import stop_alike
-    from tui.drive.profile import library
-    from tui.session.drive import DriveSession
-
-    named = identity.profile or profile_id
-    profiles = [library.load(one) for one in ([named] if named else identity.candidates)]
-    if not stop_alike(profiles):
-        return None
-    session = DriveSession(opened.line, identity.device, profiles[0], identity)
-    return StoppableDrive(session, " or ".join(profile.name for profile in profiles))

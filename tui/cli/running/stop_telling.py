@@ -2,12 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
-from typing import Any
+from typing import TYPE_CHECKING, Any
+
+from tui.session.connect.addresses import addresses_text
 
 from ..commands.orders import complain
 from ..shared.errors import DONE
+from ..shared.left_alone import timeout_json
 from ..shared.say import say
+
+if TYPE_CHECKING:
+    from tui.session.command.first_stop import SentFirst
+    from tui.session.drive import DriveSession
 
 
 class StopTelling:
@@ -17,13 +25,33 @@ class StopTelling:
         self.as_json = as_json
         self._line_text = line_text
         self.documents: list[dict[str, Any]] = []
+        self._first: dict[int, list[dict[str, Any]]] = {}
 
-    def stopped(self, device: int, profile: str | None, text: str) -> None:
+    def sent_first(self, device: int, sent: Sequence[SentFirst], says: str) -> None:
+        """What went out before a drive had said what it is, and what it says."""
+        for one in sent:
+            if not self.as_json:
+                with suppress(OSError):
+                    say(f"Device {device}: sent first {one.text}; {says}.")
+        self._first[device] = [
+            {
+                "address": one.what.address,
+                "word": one.what.word,
+                "families": [family.id for family in one.what.families],
+                "answer": one.answer,
+            }
+            for one in sent
+        ]
+
+    def stopped(self, session: DriveSession, text: str) -> None:
         """A motor stands."""
+        from tui.session.monitor.timeout import timeout_now
+
         if not self.as_json:
             with suppress(OSError):  # a reader that went away must not end the other stops
                 say(text)
-        self._keep(device, profile, text, DONE)
+        self._keep(session.device, session.profile.id, text, DONE)
+        self.documents[-1]["timeout"] = timeout_json(timeout_now(session))
 
     def failed(self, device: int, profile: str | None, text: str, status: int) -> None:
         """A motor is not known to stand."""
@@ -32,7 +60,10 @@ class StopTelling:
 
     def silent(self, devices: list[int], status: int) -> None:
         """Nobody answered at these addresses; a status other than 0 where somebody was to."""
-        complain(f"No answer at {', '.join(map(str, devices))}.")
+        if status:
+            complain(f"NOT STOPPED: no answer at {', '.join(map(str, devices))}.")
+        else:
+            complain(f"Nobody answers at {addresses_text(devices)}.")
         for device in devices if status else ():
             self._keep(device, None, "No answer.", status)
 
@@ -43,5 +74,7 @@ class StopTelling:
         self.documents[-1]["given_back"] = text
 
     def _keep(self, device: int, profile: str | None, text: str, status: int) -> None:
-        told = {"line": self._line_text, "device": device, "profile": profile}
+        told: dict[str, Any] = {"line": self._line_text, "device": device, "profile": profile}
+        if (sent := self._first.get(device)) is not None:
+            told["first"] = sent
         self.documents.append({**told, "stopped": not status, "text": text, "status": status})

@@ -67,7 +67,7 @@ def quick_head(path: Path) -> ProfileFileHead:
             text = file.read(HEAD_BYTES)
     except (OSError, UnicodeDecodeError):
         return ProfileFileHead()
-    return ProfileFileHead(_section(text, "profile") or {})
+    return ProfileFileHead(section(text, "profile") or {})
 
 
 def asked_of(path: Path, own: bool, packaged: Path) -> AskedOf:
@@ -92,7 +92,7 @@ def _head(path: Path, own: bool, packaged: Path, _stamp: tuple[int, int]) -> Pro
         return ProfileFileHead(fault=f"cannot be read: {error.strerror}")
     except UnicodeDecodeError as error:
         return ProfileFileHead(fault=f"byte {error.start} is not UTF-8 text")
-    head = _section(text, "profile") or {}
+    head = section(text, "profile") or {}
     if not own and head and (count := _counted(text, head, packaged)) is not None:
         return ProfileFileHead(head, count)
     try:
@@ -109,7 +109,7 @@ def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
     """How many parameters a packaged file has with those that it shares; None if not plain."""
     if "rows_from" not in head:
         return len(_PARAMETER.findall(text))
-    if "without" in head or (shared := _shared_texts(head, packaged)) is None:
+    if "without" in head or (shared := shared_texts(head, packaged)) is None:
         return None
     texts = (text, *shared)
     codes = [row[1] for one in texts for row in _CODE.findall(one)]
@@ -117,7 +117,7 @@ def _counted(text: str, head: Mapping[str, Any], packaged: Path) -> int | None:
     return len(set(codes)) if plain else None
 
 
-def _shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
+def shared_texts(head: Mapping[str, Any], packaged: Path) -> list[str] | None:
     """The texts of a packaged file's shared rows; None where they are not there."""
     names = head.get("rows_from")
     try:
@@ -148,14 +148,14 @@ def _told(path: Path, own: bool, packaged: Path) -> Mapping[str, Any]:
     if own:
         return _whole(path, packaged)
     text = path.read_text(encoding="utf-8")
-    head = _section(text, "profile")
-    shared = _shared_texts(head, packaged) if head is not None else None
+    head = section(text, "profile")
+    shared = shared_texts(head, packaged) if head is not None else None
     if shared is None or any(
         header[1] != "parameters" for one in shared for header in _HEADER.finditer(one)
     ):
         return _whole(path, packaged)
-    found = {"identification": _section(text, "identification") or {}}
-    functions = _section(text, "functions")
+    found = {"identification": section(text, "identification") or {}}
+    functions = section(text, "functions")
     return {**found, "functions": functions} if functions else _whole(path, packaged)
 
 
@@ -165,7 +165,7 @@ def _whole(path: Path, packaged: Path) -> Mapping[str, Any]:
     return read_tables(path, packaged).tables
 
 
-def _section(text: str, name: str) -> Any:
+def section(text: str, name: str) -> Any:
     """A table of the top read by itself; None where that cannot be done."""
     import tomli
 

@@ -214,6 +214,16 @@ class Starts:
         newest = {one.device: one for one in here if one.device not in alive | going}
         return [newest[device] for device in sorted(newest)]
 
+    def profiles(self, line: str) -> dict[int, str]:
+        """By device, the profile of the last start on record, whose program lives or not.
+
+        Reads files.
+        """
+        key = line_key(line)
+        here = [one for one in self._files.records() if line_key(one.line) == key]
+        here.sort(key=lambda one: one.begun.timestamp() if one.begun else 0.0)
+        return {one.device: one.profile for one in here}
+
     def close(self, timeout: float = 1.0) -> bool:
         """Wait for what is still to be written or removed, so many seconds; False if it was not."""
         with self._changed:

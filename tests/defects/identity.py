@@ -1,0 +1,102 @@
+"""Defects of who a drive is taken for, of its stop before that is known, and of its time-out."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+CONTRADICTION = "tests/session/test_contradiction.py"
+FIRST = "tests/drive/test_first_stop.py"
+TIMEOUT = "tests/session/test_timeout.py"
+IDENTITY = "tests/cli/test_identity.py"
+LEFT = "tests/cli/test_left_alone.py"
+
+DEFECTS = (
+    Defect(
+        "contradicted-drive-armed",
+        "tui/session/arming.py",
+        "        if self.barred:\n",
+        "        if False:\n",
+        "A drive is commanded by the words of another family.",
+        (CONTRADICTION,),
+    ),
+    Defect(
+        "cut-short-reference-contradicts",
+        "tui/session/connect/contradiction.py",
+        "return told.startswith(stem) or stem.startswith(told)",
+        "return False",
+        "A drive of a kind that looks like its profile's is refused.",
+        (CONTRADICTION,),
+    ),
+    Defect(
+        "contradicted-drive-stopped-by-the-wrong-family",
+        "tui/session/command/stop.py",
+        "if not session.contradiction or own is None:",
+        "if True or own is None:",
+        "The stop key runs a motor that was taken for another family's.",
+        (f"{CONTRADICTION}::test_a_contradicted_drive_is_stopped_as_what_it_says_it_is",),
+    ),
+    Defect(
+        "profile-believed-by-the-command-line",
+        "tui/cli/shared/options.py",
+        "    if session.contradiction:\n",
+        "    if False:\n",
+        "A setting of one family is written into another.",
+        (f"{IDENTITY}::test_5_a_drive_that_is_another_is_told_and_not_written",),
+    ),
+    Defect(
+        "first-word-of-one-family-only",
+        "tui/drive/first_stop.py",
+        "_stopped_by(other, place.address, word, raws) for other in may_be",
+        "_stopped_by(other, place.address, word, raws) for other in may_be[:1]",
+        "The stop word of one family runs the motor of another.",
+        (FIRST,),
+    ),
+    Defect(
+        "unsaid-drive-followed-by-any-family",
+        "tui/drive/first_stop.py",
+        "if alone is not None and alone.word == what.word:",
+        "if alone is not None:",
+        "A motor that was just stopped is started by the stop of the family named.",
+        (FIRST,),
+    ),
+    Defect(
+        "first-word-not-in-the-journal",
+        "tui/session/command/first_stop.py",
+        "journal.add(_entry(line, device, what, answer))",
+        "pass",
+        "Nobody finds out what stopped, or moved, a motor.",
+        ("tests/session/test_first_stop.py::test_it_is_in_the_journal_with_what_was_said_to_it",),
+    ),
+    Defect(
+        "time-out-of-the-other-port-ignored",
+        "tui/session/monitor/timeout.py",
+        "for code in (rules.timeout, *rules.other_timeouts):",
+        "for code in (rules.timeout,):",
+        "A drive on its other port trips without a word.",
+        (TIMEOUT,),
+    ),
+    Defect(
+        "watch-begun-by-others-not-seen",
+        "tui/session/monitor/timeout.py",
+        "return any(raws.get(chart.command) for chart in session.profile.data.charts)",
+        "return False",
+        "A drive that another program has commanded trips after a read, without a word.",
+        (TIMEOUT,),
+    ),
+    Defect(
+        "farewell-not-said-after-an-error",
+        "tui/cli/shared/options.py",
+        "        finally:\n            await say_farewells(opened)",
+        "        else:\n            await say_farewells(opened)",
+        "A command that fails leaves a time-out running and says nothing of it.",
+        (f"{LEFT}::test_it_is_told_where_the_command_failed",),
+    ),
+    Defect(
+        "silent-address-of-a-stop-counts-as-stopped",
+        "tui/cli/commands/stop.py",
+        "worst = max(worst, LINE_TROUBLE)",
+        "worst = max(worst, 0)",
+        "A script takes a motor that did not answer for stopped.",
+        ("tests/line/test_commands.py::test_stop_all_stops_each",),
+    ),
+)

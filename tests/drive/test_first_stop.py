@@ -1,0 +1,138 @@
+"""The word that is sent before a drive has said what it is stops it, whatever it is."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+
+import pytest
+
+from tui.drive.first_stop import FirstWord, first_word, followers, stop_places
+from tui.drive.orders import GENTLE_FIRST
+from tui.drive.profile import library
+from tui.drive.profile.schema import OrderId
+from tui.drive.profile.stop_facts import StopFacts, stop_facts
+
+FACTS = stop_facts()
+PLACES = {one.address: one for one in stop_places(FACTS)}
+CMD, CHCF, DOTD, ETA, LEROY, LEROY_STATUS = 8501, 8401, 8652, 3201, 641, 1039
+ENABLED, HALF_WAY = 0x0027, 0x0021
+NAMED = [(), ("atv31",), ("atv312",), ("atv71",)]
+WAYS: list[OrderId] = ["stop", "quick-stop", "freewheel"]
+
+
+def word(address: int, raws: dict[int, int], way: OrderId = "stop", *named: str) -> int | None:
+    found = first_word(PLACES[address], raws, way, named)
+    return None if found is None else found.word
+
+
+@pytest.mark.parametrize("one", FACTS, ids=lambda one: one.id)
+def test_what_is_picked_out_of_a_file_is_what_the_profile_says(one: StopFacts) -> None:
+    profile = library.load(one.id)
+    assert one.charts == tuple(profile.data.charts)
+    assert one.names_itself is (profile.function(43) is not None)
+    assert {code: profile[code].address for code in one.places} == dict(one.places)
+    needed = {chart.status for chart in one.charts} | {chart.command for chart in one.charts}
+    needed |= {chart.when.parameter for chart in one.charts if chart.when}
+    assert needed - {""} <= set(one.places)
+
+
+def test_a_profile_of_the_users_own_is_read_too() -> None:
+    folder = library.user_folder()
+    folder.mkdir(parents=True)
+    packaged = library.packaged_folder()
+    for name in ("atv71.toml",):
+        text = (packaged / name).read_text().replace('id = "atv71"', 'id = "pump"', 1)
+        (folder / "pump.toml").write_text(text)
+    found = {one.id: one for one in stop_facts()}
+    assert found["pump"].charts == found["atv71"].charts
+    assert set(found["atv71"].places) <= set(found["pump"].places)
+
+
+def test_families_that_are_silent_at_foreign_words_come_first_and_the_named_before() -> None:
+    assert [one.address for one in stop_places(FACTS)] == [LEROY, CMD, 0xFA00]
+    named = stop_places(FACTS, ["atv312"])
+    assert named[0].families[0].id == "atv312"
+    assert [one.address for one in named] == [CMD, LEROY, 0xFA00]
+
+
+def test_no_family_has_another_word_where_one_is_stopped() -> None:
+    """A word for one kind must not change a setting of another."""
+    for place in PLACES.values():
+        stopped = {one.id for one in place.families}
+        for one in FACTS:
+            taken = {p.address for p in library.load(one.id).parameters if p.function == 3}
+            assert one.id in stopped or place.address not in taken
+
+
+def states() -> Iterator[dict[int, int]]:
+    """What may be read of drives that are stopped by CMD, some of it not."""
+    for chcf, dotd, eta in itertools.product((None, 0, 1, 2, 3), (None, 0, 1), (None, ENABLED, 8)):
+        told = {CHCF: chcf, DOTD: dotd, ETA: eta}
+        yield {address: raw for address, raw in told.items() if raw is not None}
+
+
+@pytest.mark.parametrize("named", NAMED)
+@pytest.mark.parametrize("way", WAYS)
+def test_whatever_is_there_it_stops_and_starts_nothing(
+    way: OrderId, named: tuple[str, ...]
+) -> None:
+    sent = 0
+    for raws in states():
+        found = first_word(PLACES[CMD], raws, way, named)
+        if found is None:
+            continue
+        sent += 1
+        for family in found.families:
+            for chart in family.charts:
+                known = {c: raws[a] for c, a in family.places.items() if a in raws}
+                if not chart.orders or (chart.when and chart.when.holds(known) is False):
+                    continue
+                meant = {o.id for o in chart.orders if o.words == [found.word]}
+                assert meant & set(GENTLE_FIRST), (raws, family.id, chart.id, hex(found.word))
+    assert sent > 20
+
+
+@pytest.mark.parametrize("named", NAMED)
+def test_on_the_ramp_where_that_is_sure_and_never_a_drivecom_word_into_the_io_profile(
+    named: tuple[str, ...],
+) -> None:
+    assert word(CMD, {ETA: ENABLED, CHCF: 1}, "stop", *named) == 0x0007
+    assert word(CMD, {ETA: ENABLED, CHCF: 1}, "quick-stop", *named) == 0x0002
+    # 16#0007 would run the motor there
+    assert word(CMD, {ETA: ENABLED, CHCF: 3}, "stop", *named) == 0x0000
+    assert word(CMD, {ETA: ENABLED}, "stop", *named) == 0x0000
+    assert word(CMD, {}, "quick-stop", *named) == 0x0000
+
+
+def test_nothing_is_sent_into_a_profile_of_which_no_word_is_known() -> None:
+    assert word(CMD, {CHCF: 0, DOTD: 1}) is None
+
+
+def test_a_drive_that_would_coast_is_halted() -> None:
+    """DOTD = 0: Disable operation lets an Altivar 71 coast; only that has DOTD."""
+    assert word(CMD, {CHCF: 1, DOTD: 0, ETA: ENABLED}) == 0x010F
+    assert word(CMD, {CHCF: 1, DOTD: 0, ETA: HALF_WAY}) == 0x0007
+    assert word(CMD, {CHCF: 1, DOTD: 1, ETA: ENABLED}) == 0x0007
+    # one that was named may be there all the same, and 16#010F is no stop of it
+    assert word(CMD, {CHCF: 1, DOTD: 0, ETA: ENABLED}, "stop", "atv312") == 0x0007
+
+
+def test_a_leroy_somer_is_stopped_by_its_state() -> None:
+    assert word(LEROY, {LEROY_STATUS: 3}) == 0x0001
+    assert word(LEROY, {LEROY_STATUS: 5}) == 0x0000
+    assert word(LEROY, {}) == 0x0000
+
+
+def test_an_unsaid_drive_is_followed_by_a_family_that_sends_the_same_word() -> None:
+    """Altivar 312's own stop, 16#0007, runs an Altivar 71 that 16#0000 has just stopped."""
+
+    def following(raws: dict[int, int], *named: str) -> tuple[str, ...]:
+        found = first_word(PLACES[CMD], raws, "stop", named)
+        assert isinstance(found, FirstWord)
+        return followers(found, raws, "stop")
+
+    assert following({CHCF: 3}) == ("atv71",)
+    assert following({CHCF: 3}, "atv312") == ("atv71",)
+    assert following({}, "atv312") == ("atv71",)
+    assert set(following({CHCF: 1}, "atv312")) == {"atv31", "atv312", "atv71"}

@@ -1,0 +1,117 @@
+"""The first word of a stop, on the wire: before the drive has said what it is."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.bus.line import Line
+from tui.drive.profile import library
+from tui.drive.profile.stop_facts import stop_facts
+from tui.session.command.first_stop import FIRST_WHY, FirstStop, stop_first
+from tui.session.connect.limits import limits_of
+from tui.session.journal import Journal
+from tui.simulator import DriveSpec, Simulation
+from tui.simulator.spec import FaultRates
+
+from .test_stop import FAMILIES, WORDS, Start, journal, start, wait_for, writes
+
+__all__ = ["journal", "start"]
+FACTS = stop_facts()
+PLACES = {0xFA00, 8501, 641}
+
+
+async def first(line: Line, journal: Journal, *named: str) -> FirstStop:
+    return await stop_first(line, 1, journal, FACTS, named, "stop")
+
+
+def running(family: str) -> DriveSpec:
+    sets = {} if family.startswith("atv") else {"6.43": 1, "6.42": 3}
+    return DriveSpec(family, 1, run_hz=20.0, sets=sets)
+
+
+def frames(line: Line) -> list[bytes]:
+    return [frame.data for frame in line.trace if frame.direction == "out"]
+
+
+@pytest.mark.parametrize(
+    ("family", "named"),
+    [*((one, "") for one in FAMILIES), *((one, "atv312") for one in FAMILIES), ("atv21", "atv71")],
+)
+async def test_it_stops_each_family_before_that_was_asked_what_it_is(
+    start: Start, journal: Journal, family: str, named: str
+) -> None:
+    simulation, line = start(running(family))
+    await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
+    sent = await first(line, journal, *([named] if named else []))
+    assert sent.taken is not None
+    assert (sent.taken.address, sent.taken.word) == WORDS[family]
+    assert family in {one.id for one in sent.taken.families}
+    assert 43 not in {frame[1] for frame in frames(line)}
+    await wait_for(lambda: simulation.drive(1).motor.frequency == 0)
+    # whoever was named wrongly was ruled out by its status word, or heard nothing
+    assert writes(line)[-1] == WORDS[family]
+    others = {address for address, _ in writes(line)} - {WORDS[family][0]}
+    assert others <= ({8501} if named == "atv312" else set())
+
+
+async def test_a_ramp_stop_of_the_family_named_does_not_start_another(
+    start: Start, journal: Journal
+) -> None:
+    """In the I/O profile 16#0007, the stop of an Altivar 312, runs an Altivar 71."""
+    simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0}))
+    drive = simulation.drive(1)
+    line.describe(1, limits_of(library.load("atv71")))
+    for address, word in ((8502, 200), (8501, 1)):
+        await line.write(1, address, [word])
+    await wait_for(lambda: drive.motor.frequency > 15)
+    sent = await first(line, journal, "atv312")
+    assert sent.taken is not None
+    assert sent.taken.word == 0
+    assert sent.followers == ("atv71",)
+    assert not sent.may_be("atv312")
+    await wait_for(lambda: drive.motor.frequency == 0)
+
+
+async def test_it_is_in_the_journal_with_what_was_said_to_it(
+    start: Start, journal: Journal
+) -> None:
+    _, line = start(running("atv31"))
+    await first(line, journal)
+    (entry,) = journal.recent
+    assert (entry.code, entry.address, entry.new_raw, entry.answer) == ("CMD", 8501, 7, "ok")
+    assert (entry.why, entry.profile) == (FIRST_WHY, "atv31,atv312,atv71")
+
+
+def silence(simulation: Simulation) -> None:
+    simulation.faults.rates = FaultRates(lost=1.0)
+
+
+async def test_nothing_is_sent_blind_to_who_was_not_named(start: Start, journal: Journal) -> None:
+    simulation, line = start(running("atv71"))
+    silence(simulation)
+    sent = await first(line, journal)
+    assert (sent.sent, sent.answered) == ((), False)
+    assert writes(line) == []
+
+
+async def test_who_was_named_is_stopped_blind_by_what_starts_no_other(
+    start: Start, journal: Journal
+) -> None:
+    simulation, line = start(running("atv312"))
+    await wait_for(lambda: simulation.drive(1).motor.frequency > 5)
+    silence(simulation)
+    sent = await first(line, journal, "atv312")
+    assert (sent.taken, sent.answered) == (None, False)
+    assert writes(line) == [(8501, 0x0000)]
+    assert journal.recent[-1].answer != "ok"
+    # the replies were lost, not the word
+    await wait_for(lambda: simulation.drive(1).motor.frequency == 0)
+
+
+async def test_nothing_goes_to_a_place_that_the_drive_does_not_have(
+    start: Start, journal: Journal
+) -> None:
+    _, line = start(running("atv21"))
+    sent = await first(line, journal, "atv71")
+    assert writes(line) == [WORDS["atv21"]]
+    assert {"atv71", "powerdrive"} <= sent.ruled_out

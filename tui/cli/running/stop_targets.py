@@ -1,0 +1,201 @@
+"""Which drive a stop is for: what it may be, what it says it is, and what it is stopped as."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from ..commands.orders import complain
+from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
+from ..shared.options import Target, unidentified
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+    from tui.drive.profile.schema import OrderId
+    from tui.session.command.first_stop import FirstStop
+    from tui.session.connect.identify import DriveIdentity
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
+    from tui.session.journal import Journal
+
+    from .stop_telling import StopTelling
+
+BLIND_TRIES = 3
+"""How often the first word goes to a drive that answers nothing."""
+REMEMBERED_WITHIN = 0.5
+"""Seconds in which the starts on record are read."""
+
+
+@dataclass(frozen=True, slots=True)
+class StoppableDrive:
+    """A drive that can be stopped, and what it is called."""
+
+    session: DriveSession
+    name: str
+
+
+async def first_stopped(
+    opened: OpenLine, target: Target, order: OrderId, journal: Journal, telling: StopTelling
+) -> StoppableDrive:
+    """Send the first word, then find out what the drive is; both are told."""
+    from tui.bus.errors import ExchangeError, NoAnswer
+    from tui.drive.profile import library
+    from tui.drive.profile.stop_facts import stop_facts
+    from tui.session.command.first_stop import stop_first
+    from tui.session.connect.identify import DriveIdentity, identify_drive
+
+    device = target.device
+    typed = library.load(target.profile_id).id if target.profile_id is not None else None
+    families = await asyncio.to_thread(stop_facts)
+    before = (await remembered(opened)).get(device)
+    known = {typed, *(one.id for one in families)}
+    named = [one for one in (typed, before) if one is not None and one in known]
+    for _ in range(BLIND_TRIES if typed else 1):
+        first = await stop_first(opened.line, device, journal, families, named, order)
+        if first.answered:
+            break
+    identity = DriveIdentity(device, "", "", "", "", None, ())
+    silent: ExchangeError | None = None
+    try:
+        identity = await identify_drive(opened.line, device)
+        says = f"it says it is {identity.reference}" if identity.reference else "it names nothing"
+    except ExchangeError as error:
+        silent, says = error, "it does not say what it is"
+    telling.sent_first(device, first.sent, says)
+    if silent is not None and not first.answered:
+        hint = "" if typed else " -p sends a stop word blind."
+        text = f"NOT STOPPED: Device {device} did not answer. Stop it at the machine.{hint}"
+        raise NoAnswer(device, silent.function, silent.address, text)
+    found = await asyncio.to_thread(_by_what_is_known, opened, identity, typed, named, first)
+    if found is None and first.sent:
+        text = f"Device {device}: NOT STOPPED: it took no stop word. Stop it at the machine."
+        raise Failure(text, DRIVE_REFUSED)
+    if found is None:
+        raise unidentified(identity)
+    # what was sent first was a command, too
+    found.session.told_by_line = bool(first.sent)
+    return found
+
+
+def _by_what_is_known(
+    opened: OpenLine,
+    identity: DriveIdentity,
+    typed: str | None,
+    named: Sequence[str],
+    first: FirstStop,
+) -> StoppableDrive | None:
+    """The drive by what it says of itself, else as it was named, else by the word that it took."""
+    from tui.drive.profile import library
+    from tui.session.connect.contradiction import contradiction
+
+    for one in named:
+        profile = library.load(one)
+        wrong = contradiction(identity, profile)
+        if wrong and one == typed:
+            own = identity.profile and f"as {library.load(identity.profile).name}"
+            complain(f"{wrong} It is stopped {own or 'by the word that it took'}.")
+        unsaid = identity.profile is None and first.may_be(one)
+        if not wrong and (one in identity.candidates or unsaid):
+            return _stoppable(opened, identity, [profile])
+    if identity.profile or identity.candidates:
+        return _session(opened, identity, None)
+    if first.taken is None or not first.followers:
+        return None
+    found = _stoppable(opened, identity, [library.load(first.followers[0])])
+    return StoppableDrive(found.session, " or ".join(one.name for one in first.taken.families))
+
+
+async def remembered(opened: OpenLine) -> dict[int, str]:
+    """By device, the profile by which a motor of this line was last started from here.
+
+    A disk that hangs holds up no stop: then it is not known.
+    """
+    from tui.bus.link import label
+    from tui.session.starts.starts import Starts
+
+    found: list[dict[int, str]] = []
+    loop, done = asyncio.get_running_loop(), asyncio.Event()
+
+    def look() -> None:
+        try:
+            with suppress(OSError):
+                found.append(Starts().profiles(label(opened.line.link)))
+        finally:
+            with suppress(RuntimeError):  # the loop has ended: nobody waits for it
+                loop.call_soon_threadsafe(done.set)
+
+    if opened.simulation is not None:
+        return {}
+    threading.Thread(target=look, name="starts on record", daemon=True).start()
+    with suppress(TimeoutError):
+        await asyncio.wait_for(done.wait(), REMEMBERED_WITHIN)
+    return found[0] if found else {}
+
+
+async def found_at(
+    opened: OpenLine, device: int, profile_id: str | None, *, patient: bool
+) -> StoppableDrive | None:
+    """The drive at an address; None where nobody answers yet.
+
+    Raises Failure where it cannot be stopped, and why.
+    """
+    from tui.bus.api import Priority
+    from tui.bus.errors import LineError, NoAnswer
+    from tui.session.connect.identify import identify_drive
+
+    priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
+    try:
+        identity = await identify_drive(opened.line, device, priority=priority)
+    except NoAnswer:
+        return None
+    except LineError as error:
+        if not patient:
+            return None  # asked again, with patience
+        raise Failure(f"Device {device}: NOT STOPPED: {error}", LINE_TROUBLE) from error
+    if (found := await asyncio.to_thread(_session, opened, identity, profile_id)) is not None:
+        if profile_id is not None and (wrong := _wrongly_named(identity, profile_id)):
+            complain(f"{wrong} It is stopped as {found.name}.")
+        return found
+    fits = ", ".join(identity.candidates) or "drivepanel profiles"
+    raise Failure(
+        f"Device {device}: NOT STOPPED: it does not say who it is. Name its profile"
+        f" with -p ({fits}), or stop it at the machine.",
+        DRIVE_REFUSED,
+    )
+
+
+def _session(
+    opened: OpenLine, identity: DriveIdentity, profile_id: str | None
+) -> StoppableDrive | None:
+    """A session with the drive; None where it is not known what stops it.
+
+    A drive that does not say who it is may belong to several families: where the same words stop
+    them all, which one it is does not matter.
+    """
+    from tui.drive.orders import stop_alike
+    from tui.drive.profile import library
+
+    named = identity.profile or profile_id
+    profiles = [library.load(one) for one in ([named] if named else identity.candidates)]
+    return _stoppable(opened, identity, profiles) if stop_alike(profiles) else None
+
+
+def _stoppable(
+    opened: OpenLine, identity: DriveIdentity, profiles: Sequence[Profile]
+) -> StoppableDrive:
+    from tui.session.drive import DriveSession
+
+    session = DriveSession(opened.line, identity.device, profiles[0], identity)
+    return StoppableDrive(session, " or ".join(profile.name for profile in profiles))
+
+
+def _wrongly_named(identity: DriveIdentity, profile_id: str) -> str:
+    """How a drive contradicts the profile of -p; empty if it does not."""
+    from tui.drive.profile import library
+    from tui.session.connect.contradiction import contradiction
+
+    return contradiction(identity, library.load(profile_id))

@@ -1,0 +1,190 @@
+"""Which word stops a drive of which it is not known for sure what it is; pure functions.
+
+A word that stops one family may start another at the same address (what ramps one down in its
+state chart is a run command in the other's): only a word that stops in every chart that the
+drive may have is sent before it has said what it is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from .chart import state_of
+from .orders import GENTLE_FIRST
+from .profile.schema import Chart, Order, OrderId
+from .profile.stop_facts import StopFacts
+
+
+@dataclass(frozen=True, slots=True)
+class FirstWord:
+    """A word that stops every family which the drive may be of."""
+
+    address: int
+    word: int
+    code: str
+    """What the register is called by those families."""
+    order: OrderId
+    families: tuple[StopFacts, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class StopPlace:
+    """One register that families are stopped by, those of them first that were named."""
+
+    address: int
+    families: tuple[StopFacts, ...]
+
+    @property
+    def status(self) -> tuple[int, ...]:
+        """Addresses of the words that tell their states: who has none of them is of another."""
+        return self._addresses(chart.status for one in self.families for chart in one.charts)
+
+    @property
+    def deciding(self) -> tuple[int, ...]:
+        """Addresses of what else decides by which word they stop."""
+        codes = (
+            code
+            for one in self.families
+            for chart in one.charts
+            for code in (
+                *((chart.when.parameter,) if chart.when else ()),
+                *(w.parameter for order in _stops(chart) for w in order.when),
+            )
+        )
+        return tuple(one for one in self._addresses(codes) if one not in self.status)
+
+    def _addresses(self, codes: Iterator[str]) -> tuple[int, ...]:
+        wanted = set(codes)
+        found = {
+            address
+            for one in self.families
+            for code, address in one.places.items()
+            if code in wanted
+        }
+        return tuple(sorted(found))
+
+
+def stop_places(families: Sequence[StopFacts], named: Sequence[str] = ()) -> list[StopPlace]:
+    """Where families are stopped: those named first, then those that a wrong word meets silence in.
+
+    The others refuse at once a word that they do not have.
+    """
+    places: dict[int, list[StopFacts]] = {}
+    for one in families:
+        for address in {
+            _place(one, chart, order) for chart in one.charts for order in _stops(chart)
+        }:
+            if address is not None:
+                places.setdefault(address, []).append(one)
+    rank = {id: number for number, id in enumerate(named)}
+
+    def place_of(one: StopFacts) -> int:
+        return rank.get(one.id, len(rank))
+
+    found = [
+        StopPlace(address, tuple(sorted(group, key=place_of))) for address, group in places.items()
+    ]
+    return sorted(
+        found,
+        key=lambda one: (
+            min(place_of(family) for family in one.families),
+            all(family.names_itself for family in one.families),
+            one.address,
+        ),
+    )
+
+
+def first_word(
+    place: StopPlace, raws: Mapping[int, int], wanted: OrderId, named: Sequence[str] = ()
+) -> FirstWord | None:
+    """The gentlest word that stops whatever is there, given words read by address; None if none.
+
+    A family that lacks a word which the drive has answered is another, unless it was named.
+    """
+    may_be = tuple(one for one in place.families if one.id in named or raws.keys() <= one.addresses)
+    ways = (wanted, *(way for way in GENTLE_FIRST if way != wanted))
+    for way in ways:
+        for family in may_be:
+            known = _known(family, raws)
+            for chart in _charts(family, known):
+                for order in chart.orders:
+                    if order.id != way or len(order.words) != 1:
+                        continue
+                    if _place(family, chart, order) != place.address:
+                        continue
+                    word = order.words[0] & 0xFFFF
+                    if _holds(order, chart, known) and all(
+                        _stopped_by(other, place.address, word, raws) for other in may_be
+                    ):
+                        code = order.parameter or chart.command
+                        return FirstWord(place.address, word, code, way, may_be)
+    return None
+
+
+def followers(what: FirstWord, raws: Mapping[int, int], wanted: OrderId) -> tuple[str, ...]:
+    """Families whose own stop is the very word that was sent, given the same words.
+
+    By these a drive that does not say what it is may be stopped on: another's word may start it.
+    """
+    found = []
+    for family in what.families:
+        alone = first_word(StopPlace(what.address, (family,)), raws, wanted, (family.id,))
+        if alone is not None and alone.word == what.word:
+            found.append(family.id)
+    return tuple(found)
+
+
+def _stopped_by(family: StopFacts, address: int, word: int, raws: Mapping[int, int]) -> bool:
+    """Whether a word stops a family in every chart that may be in force."""
+    known = _known(family, raws)
+    charts = _charts(family, known)
+    return bool(charts) and all(
+        any(
+            [one & 0xFFFF for one in order.words] == [word]
+            and _place(family, chart, order) == address
+            and _holds(order, chart, known)
+            for order in _stops(chart)
+        )
+        for chart in charts
+    )
+
+
+def _charts(family: StopFacts, known: Mapping[str, int]) -> list[Chart]:
+    """The charts that may be in force; one of which no commands are known only where it surely is.
+
+    There no word is known to stop, so none is sent.
+    """
+    sure = [one for one in family.charts if one.when is not None and one.when.holds(known)]
+    if sure:
+        return sure
+    may = [one for one in family.charts if one.when is None or one.when.holds(known) is None]
+    return [one for one in may if one.orders]
+
+
+def _holds(order: Order, chart: Chart, known: Mapping[str, int]) -> bool:
+    """Whether an order surely may be given now."""
+    if any(not when.holds(known) for when in order.when):
+        return False
+    if not order.states:
+        return True
+    word = known.get(chart.status)
+    return word is not None and state_of(chart, word).id in order.states
+
+
+def _stops(chart: Chart) -> list[Order]:
+    return [order for order in chart.orders if order.id in GENTLE_FIRST]
+
+
+def _own_places(family: StopFacts) -> set[int]:
+    found = {_place(family, chart, one) for chart in family.charts for one in _stops(chart)}
+    return {address for address in found if address is not None}
+
+
+def _place(family: StopFacts, chart: Chart, order: Order) -> int | None:
+    return family.places.get(order.parameter or chart.command)
+
+
+def _known(family: StopFacts, raws: Mapping[int, int]) -> dict[str, int]:
+    """Raw values by the family's own codes."""
+    return {code: raws[address] for code, address in family.places.items() if address in raws}

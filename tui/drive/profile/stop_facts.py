@@ -1,0 +1,100 @@
+"""What stops the drives of every family, told without decoding their profiles.
+
+A stop of a drive that nobody has named yet compares the words of all families. To load them all
+takes seconds on a small computer, so of a packaged file only the charts are read as TOML, and
+the addresses of its parameters are picked out of its text.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from ..errors import ProfileError
+from . import library
+from .heads import section, shared_texts
+from .schema import Chart
+
+_ROW = re.compile(r"^\[\[parameters\]\][ \t]*\n", re.MULTILINE)
+_CODE = re.compile(r"""^code = (["'])(.+)\1$""", re.MULTILINE)
+_ADDRESS = re.compile(r"^address = (\d+)$", re.MULTILINE)
+_TABLE = re.compile(r"^\[", re.MULTILINE)
+_ODD = re.compile(r"^(?:function|mask|shift|type) = ", re.MULTILINE)
+
+
+@dataclass(frozen=True, slots=True)
+class StopFacts:
+    """The charts of one family, and where the words lie that they speak of."""
+
+    id: str
+    name: str
+    charts: tuple[Chart, ...]
+    places: Mapping[str, int]
+    """Address by code, of whole words that function 3 reads."""
+    names_itself: bool
+    """Whether its drives know function 43; the others are silent at words that they lack."""
+
+    @property
+    def addresses(self) -> frozenset[int]:
+        """All addresses that its parameters have."""
+        return frozenset(self.places.values())
+
+
+def stop_facts() -> tuple[StopFacts, ...]:
+    """Those of every family whose file can be used, in the order of their ids."""
+    found = (_facts(listing) for listing in library.listings() if not listing.fault)
+    return tuple(one for one in found if one is not None)
+
+
+def _facts(listing: library.Listing) -> StopFacts | None:
+    names_itself = library.mentions_function(listing, 43)
+    if not listing.own and (quick := _quick(listing.path)) is not None:
+        charts, places = quick
+    else:
+        try:
+            profile = library.load_file(listing.path)
+        except ProfileError:
+            return None
+        charts = tuple(profile.data.charts)
+        places = {
+            one.code: one.address
+            for one in profile.parameters
+            if one.function == 3 and one.type.endswith("16") and one.mask == 0xFFFF
+        }
+    return StopFacts(listing.id, listing.name, charts, places, names_itself)
+
+
+def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:
+    """Charts and addresses out of a packaged file's text; None where it has to be loaded."""
+    try:
+        text = path.read_text(encoding="utf-8")
+    except (OSError, UnicodeDecodeError):
+        return None
+    head, rows = section(text, "profile"), section(text, "charts")
+    if not isinstance(head, dict) or not rows or "without" in head:
+        return None
+    shared = shared_texts(head, path.parent) if "rows_from" in head else []
+    if shared is None or any("[[charts]]" in one for one in shared):
+        return None
+    try:
+        charts = msgspec.convert(rows, tuple[Chart, ...])
+    except msgspec.ValidationError:
+        return None
+    places: dict[str, int] = {}
+    for one in (*shared, text):
+        places |= _places(one)
+    return charts, places
+
+
+def _places(text: str) -> dict[str, int]:
+    found = {}
+    for row in _ROW.split(text)[1:]:
+        own = _TABLE.split(row, maxsplit=1)[0]
+        code, address = _CODE.search(own), _ADDRESS.search(own)
+        if code and address and not _ODD.search(own):
+            found[code[2]] = int(address[1])
+    return found

@@ -1,0 +1,189 @@
+"""The first word of a stop: sent before the drive has said what it is.
+
+Who it may be is told by reads, which move nothing: the status word of each kind of family, and
+what decides by which word that is stopped. Then the one word goes out that stops all that is left
+(`tui.drive.first_stop`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from tui.bus.api import ModbusLine, Priority
+from tui.bus.errors import DeviceException, ExchangeError, LineError, NoAnswer
+from tui.bus.limits import Limits
+from tui.drive.first_stop import FirstWord, StopPlace, first_word, followers, stop_places
+from tui.drive.profile.schema import OrderId
+from tui.drive.profile.stop_facts import StopFacts
+
+from ..journal import Entry, Journal, now_text
+
+ONE_WORD = Limits(
+    functions=frozenset({3, 6, 43}), max_read=1, max_write=1, max_read_23=0, max_write_23=0
+)
+"""What a drive may be sent of which it is not known what it is."""
+FIRST_WHY = "stopped, before it said what it is"
+
+
+@dataclass(frozen=True, slots=True)
+class SentFirst:
+    """A word that was sent, and what the drive or the line said to it."""
+
+    what: FirstWord
+    answer: str
+    """`ok`, or what became of it instead, in few words."""
+
+    @property
+    def taken(self) -> bool:
+        """Whether the drive has answered it well."""
+        return self.answer == "ok"
+
+    @property
+    def text(self) -> str:
+        """For a person: which word went where, whom it stops, what was said to it."""
+        names = [family.name for family in self.what.families]
+        whom = " or ".join([", ".join(names[:-1]), names[-1]] if names[1:] else names)
+        said = "" if self.taken else f" ({self.answer})"
+        return f"16#{self.what.word:04X} to {self.what.code}, the stop of {whom}{said}"
+
+
+@dataclass(frozen=True, slots=True)
+class FirstStop:
+    """What was sent first, and what the drive was seen not to be."""
+
+    sent: tuple[SentFirst, ...]
+    ruled_out: frozenset[str]
+    """Families whose status word the drive refused to have."""
+    followers: tuple[str, ...] = ()
+    """Families by which it may be stopped on without having said what it is."""
+    answered: bool = False
+    """Whether the drive has answered anything."""
+
+    def may_be(self, family: str) -> bool:
+        """Whether a drive that does not say what it is may be stopped as one of a family."""
+        if family in self.ruled_out:
+            return False
+        return family in self.followers or not self.sent
+
+    @property
+    def taken(self) -> FirstWord | None:
+        """The word that the drive took; None where it took none."""
+        return next((one.what for one in self.sent if one.taken), None)
+
+
+@dataclass(frozen=True, slots=True)
+class _Look:
+    there: bool | None
+    """Whether the drive has such a status word; None where it did not answer."""
+    raws: dict[int, int]
+
+
+async def stop_first(
+    line: ModbusLine,
+    device: int,
+    journal: Journal,
+    families: Sequence[StopFacts],
+    named: Sequence[str],
+    wanted: OrderId,
+) -> FirstStop:
+    """Send a drive the word that stops whatever it may be, those first that were `named`.
+
+    Nothing goes to a place whose status word the drive refuses. Where it does not answer at all,
+    the word of those named goes out blind, no other. Raises LineClosed, LineLost, RequestRefused.
+    """
+    line.describe(device, ONE_WORD)
+    sent: list[SentFirst] = []
+    ruled_out: set[str] = set()
+    follow: tuple[str, ...] = ()
+    answered = False
+    for place in stop_places(families, named):
+        known = any(one.id in named for one in place.families)
+        look = await _look(line, device, place, again=known)
+        answered = answered or look.there is not None
+        if look.there is False:
+            ruled_out |= {one.id for one in place.families}
+            continue
+        if look.there is None and not known:
+            continue
+        what = first_word(place, look.raws, wanted, named)
+        if what is None:
+            continue
+        sent.append(await _send(line, device, journal, what))
+        follow = followers(what, look.raws, wanted)
+        if sent[-1].taken or look.there:
+            break
+    answered = answered or any(one.taken for one in sent)
+    return FirstStop(tuple(sent), frozenset(ruled_out), follow, answered)
+
+
+async def _look(line: ModbusLine, device: int, place: StopPlace, *, again: bool) -> _Look:
+    """Read what tells whether a drive is of these families, and by which word it is stopped."""
+    raws: dict[int, int] = {}
+    there: bool | None = False
+    for address in place.status:
+        try:
+            raws[address] = await _read(line, device, address, again=again)
+        except DeviceException:
+            continue
+        except ExchangeError:
+            return _Look(None, {})
+        there = True
+    if there:
+        for address in place.deciding:
+            try:
+                raws[address] = await _read(line, device, address, again=True)
+            except ExchangeError:
+                continue  # by the word that stops whatever it holds
+    return _Look(there, raws)
+
+
+async def _read(line: ModbusLine, device: int, address: int, *, again: bool) -> int:
+    """A word, asked for again once where no good answer comes and `again` says so."""
+    try:
+        reply = await line.read(device, address, 1, priority=Priority.STOP)
+    except DeviceException:
+        raise
+    except ExchangeError:
+        if not again:
+            raise
+        reply = await line.read(device, address, 1, priority=Priority.STOP)
+    return reply.words[0]
+
+
+async def _send(line: ModbusLine, device: int, journal: Journal, what: FirstWord) -> SentFirst:
+    """Write the word, once. It goes into the journal whatever becomes of it."""
+    answer = told = "a signal came: not known whether it was taken"
+    try:
+        await line.write(device, what.address, [what.word], priority=Priority.STOP)
+        answer = told = "ok"
+    except DeviceException as error:
+        answer, told = str(error), "refused"
+    except ExchangeError as error:
+        answer, told = str(error), "no answer" if isinstance(error, NoAnswer) else "no good answer"
+    except LineError as error:
+        answer = told = str(error)
+        raise
+    finally:
+        journal.add(_entry(line, device, what, answer))
+    return SentFirst(what, told)
+
+
+def _entry(line: ModbusLine, device: int, what: FirstWord, answer: str) -> Entry:
+    from tui.bus.link import label
+
+    return Entry(
+        time=now_text(),
+        line=label(line.link),
+        device=device,
+        profile=",".join(one.id for one in what.families),
+        code=what.code,
+        address=what.address,
+        old_raw=None,
+        old="",
+        new_raw=what.word,
+        new=f"16#{what.word:04X}",
+        answer=answer,
+        read_back=None,
+        why=FIRST_WHY,
+    )
