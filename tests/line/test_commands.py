@@ -180,7 +180,7 @@ def test_leave_running_leaves_it_running_and_says_what_the_drive_does() -> None:
         run = ("run", line, "--reference", "20Hz", "--arm", "--for", "2", "--leave-running")
         done = drivepanel(*run)
         assert (done.returncode, besides(done.stderr)) == (0, "")
-        assert "left alone it acts 10 s after the last request" in done.stdout
+        assert "on loss of communication it acts 10 s after the last request" in done.stdout
         assert "stopp" not in done.stdout
         assert turns(simulation)
         done = drivepanel("stop", line)
@@ -253,7 +253,7 @@ def test_a_lost_line_is_told_and_the_motor_is_stopped_when_it_is_back(
             lose(simulation)
             assert program.process.stderr is not None
             said = [program.process.stderr.readline() for _ in range(2)]
-            assert "left alone it acts 10 s after the last request" in said[1]
+            assert "on loss of communication it acts 10 s after the last request" in said[1]
             program.process.send_signal(signal.SIGINT)
             assert "NOT STOPPED yet" in program.process.stderr.readline()
             assert program.process.poll() is None
@@ -586,7 +586,7 @@ def test_status_of_every_family(family: str) -> None:
     titles = [line[:17].strip() for line in done.stdout.splitlines()]
     assert titles[:9] == [
         "Device", "State", "Direction", "Fault", "Alarms", "Commanded by", "Reference from",
-        "From here", "Line watch",
+        "From here", "Comm. time-out",
     ]  # fmt: skip
 
 

@@ -112,7 +112,7 @@ def test_the_demo_over_ssh(
     terminal.press("Enter")
     terminal.wait_for("4 MACHINE", "FORWARD", "Hz")
     terminal.press("q")
-    terminal.wait_for("Leave the panel?", "Device 1, Altivar 21: left alone it acts 3 s after")
+    terminal.wait_for("Leave the panel?", "Device 1, Altivar 21: on loss of communication")
     terminal.answer("y")
     pid = int((tmp_path / "pid").read_text())
     wait_until(lambda: not runs(pid), "the panel left on its key")

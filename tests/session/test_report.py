@@ -18,7 +18,7 @@ SECTIONS = [
     "## Settings changed from the factory",
     "## Control source",
     "## Indirect blocks and scanner",
-    "## When the line falls silent",
+    "## Loss of communication",
     "## Faults",
     "## Written from here",
 ]

@@ -171,9 +171,9 @@ class _Report:
         return "nothing" if not raw else f"raw {raw}"
 
     def watch(self) -> list[str]:
-        """What the drive does when the line falls silent."""
+        """What the drive does on loss of communication."""
         watch = self.profile.data.communication_fault
-        lines = ["## When the line falls silent", ""]
+        lines = ["## Loss of communication", ""]
         if watch is None:
             return [*lines, "What this family does then is in no document at hand."]
         raw = self.values.raws.get(watch.timeout)

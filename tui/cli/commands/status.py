@@ -240,7 +240,7 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         *status.channels.items(),
         *(("Besides", text) for text in status.switches),
         ("From here", status.refused or "commands can have an effect"),
-        ("Line watch", _watch_text(status)),
+        ("Comm. time-out", _watch_text(status)),
         *control_row(status.session),
         *shown_values(profile, status.readings).items(),
     ]
@@ -249,7 +249,7 @@ def status_table(status: Status) -> list[tuple[str, str]]:
 def _watch_text(status: Status) -> str:
     watch = status.watch
     if watch is None:
-        return "none: it goes on when the line falls silent"
+        return "none: it goes on without communication"
     reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
     begins = "" if watch.active else " It begins with the first command or reference."
     return f"{watch.timeout:g} s, then: {reaction.rstrip('.')}.{begins}"
@@ -269,7 +269,7 @@ def status(
     read_only: bool,
     as_json: bool,
 ) -> None:
-    """Tell what a drive does, who commands it, and what it does when the line falls silent."""
+    """Tell a drive's state, control source, faults and reaction to a loss of communication."""
 
     from ..running.holding import hold_on
 

@@ -38,10 +38,11 @@ def left_alone_text(*sessions: DriveSession, watch: TimeoutWatch | None) -> str:
     """What drives of one family do when nobody asks them any more, in a sentence."""
     it = "it" if len(sessions) == 1 else "each"
     if watch is None:
-        return f"{names_of(sessions)}: left alone {it} goes on: no communication time-out."
+        return f"{names_of(sessions)}: without communication {it} goes on: it has no time-out."
     does = watch.reaction.does if watch.reaction else "its own reaction follows"
     after = f"acts {watch.timeout:g} s after the last request"
-    return f"{names_of(sessions)}: left alone {it} {after}: {does.rstrip('.')}."
+    lost = f"{names_of(sessions)}: on loss of communication {it} {after}"
+    return f"{lost}: {does.rstrip('.')}."
 
 
 def names_of(sessions: Sequence[DriveSession]) -> str:
