@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -24,6 +25,7 @@ class FirstPicture(DrivePanelApp):
 
     first: list[list[tuple[str, str]]] | None = None
     fields_then = 0
+    on_first: Callable[[], None] | None = None
 
     def _last_strips(self) -> Any:
         return self.screen._compositor.render_strips()
@@ -33,6 +35,8 @@ class FirstPicture(DrivePanelApp):
         if renderable is not None and not self._batch_count and self.first is None:
             self.first = picture(self)
             self.fields_then = len(self.screen.query(Input))
+            if self.on_first is not None:
+                self.on_first()
 
 
 @pytest.mark.parametrize("size", [(80, 24), (120, 40), (60, 20), (200, 60)])
@@ -59,3 +63,10 @@ async def test_what_is_asked_of_the_fields_does_not_wait_for_them() -> None:
         assert form.line_at("/dev/ttyUSB0") == "serial:/dev/ttyUSB0,19200,8E1"
         await until(pilot, lambda: len(form.query(Input)) == 4)
         assert form.query_one("#addresses", Input).value == "3, 5"
+
+
+async def test_a_field_that_is_asked_for_before_it_is_there_has_the_cursor_then() -> None:
+    app = FirstPicture()
+    app.on_first = lambda: app.connection.form.ask_for_addresses()
+    async with app.run_test() as pilot:
+        await until(pilot, lambda: getattr(app.focused, "id", "") == "addresses")

@@ -21,7 +21,7 @@ from .test_flows import until
 async def test_space_stops_where_a_space_is_no_text(field: str) -> None:
     app = app_of()
     async with app.run_test() as pilot:
-        await until(pilot, lambda: bool(app.connection.query("#lines")))
+        await until(pilot, lambda: bool(app.connection.query(f"#{field}")))
         app.connection.query_one(f"#{field}").focus()
         await pilot.pause()
         before = app.stop_stamp()

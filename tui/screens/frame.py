@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from rich.style import Style
 from rich.text import Text
+from textual.events import ScreenResume
 from textual.screen import Screen
 from textual.widget import Widget
 
@@ -88,7 +89,7 @@ class Framed(Screen[Any]):
             "said": said_lines(view.said, width),
         }
 
-    def on_screen_resume(self) -> None:
+    def on_screen_resume(self, event: ScreenResume) -> None:
         """What stood still below another screen is not shown for a moment."""
         self.draw_frame(self.app.frame_now())
 

@@ -31,6 +31,8 @@ class LineForm(Vertical):
 
     typed = False
     """Whether a person has typed addresses since the last line was opened."""
+    _there = False
+    """Whether there are fields to type into."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -41,6 +43,8 @@ class LineForm(Vertical):
             "addresses": NumberInput(ADDRESSES, id="addresses"),
         }
         self._picture: Lines | None = Lines(fit=self._drawn)
+        self._asked: Input | None = None
+        """The field that was asked for before it was there."""
 
     def compose(self) -> ComposeResult:
         """The picture of the fields."""
@@ -75,6 +79,9 @@ class LineForm(Vertical):
         with self.app.batch_update():
             await self.mount(*rows)
             await picture.remove()
+        self._there = True
+        if self._asked is not None:
+            self.screen.set_focus(self._asked)
 
     def line_at(self, path: str) -> str:
         """The LINE of a serial port with these settings."""
@@ -107,7 +114,7 @@ class LineForm(Vertical):
 
     def ask_for_addresses(self) -> None:
         """Into the field of the addresses, at once: what is typed next belongs there."""
-        self.screen.set_focus(self._fields["addresses"])
+        self._enter("addresses")
 
     @property
     def profile(self) -> str:
@@ -116,7 +123,12 @@ class LineForm(Vertical):
 
     def ask_for_profile(self) -> None:
         """Into the field of the profile, at once: what is typed next belongs there."""
-        self.screen.set_focus(self._fields["profile"])
+        self._enter("profile")
+
+    def _enter(self, name: str) -> None:
+        self._asked = self._fields[name]
+        if self._there:
+            self.screen.set_focus(self._asked)
 
     def offer_settings(self, port: bool) -> None:
         """Only a serial port has settings that are chosen here."""

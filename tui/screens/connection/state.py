@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
-from textual.events import Key, Resize
+from textual.events import Key, Resize, ScreenResume
 from textual.timer import Timer
 from textual.worker import Worker, WorkerState
 
@@ -56,6 +56,8 @@ NOBODY: Mapping[int, WallRow] = MappingProxyType({})
 
 class LineView(PanelScreen):
     """Lines on the left, drives on the right, below all that is said of the drive chosen."""
+
+    _was_shown = False
 
     def __init__(self) -> None:
         super().__init__()
@@ -134,8 +136,11 @@ class LineView(PanelScreen):
         for timer in self._looking:
             timer.pause()
 
-    def on_screen_resume(self) -> None:
+    def on_screen_resume(self, event: ScreenResume) -> None:
         """Much may have changed meanwhile."""
+        if not self._was_shown:
+            # each part got its styles when it was put there, and the first picture waits
+            event.refresh_styles, self._was_shown = False, True
         if self._away:
             self._away = False
             self.lines.look_for_lines()

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
+from textual.events import ScreenResume
 from textual.screen import ModalScreen
 from textual.widget import Widget
 
@@ -75,7 +76,7 @@ class Question(Framed, ModalScreen[T]):
         if self._now is not None:
             self.set_interval(NOW_EVERY, self._tell_now)
 
-    def on_screen_resume(self) -> None:
+    def on_screen_resume(self, event: ScreenResume) -> None:
         """A question that was voided below another screen ends now."""
         if self._voided:
             self.call_later(self.answer, self.NO)

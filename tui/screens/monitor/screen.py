@@ -9,7 +9,7 @@ from typing import ClassVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.containers import Horizontal, Vertical
-from textual.events import Resize
+from textual.events import Resize, ScreenResume
 from textual.timer import Timer
 
 from tui.session.console import DriveConsole
@@ -125,7 +125,7 @@ class MonitorScreen(InputKeys):
             lead = [Text("")] * self._room().lead
             self.put("state", [*lead, Text(f"as of {since}", STALE)])
 
-    def on_screen_resume(self) -> None:
+    def on_screen_resume(self, event: ScreenResume) -> None:
         """Look again after another screen was on top."""
         if self._still is not None:
             self._still.stop()
