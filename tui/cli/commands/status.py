@@ -9,11 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from tui.drive.plain import plain
+from tui.drive.values import NOT_AVAILABLE
 
 from ..shared.control import control_json, control_row
 from ..shared.drives import each_drive
 from ..shared.errors import DONE, told
-from ..shared.fault_output import FaultFinding, fault_json, fault_rows, find_out
+from ..shared.every_drive import USUAL_SEARCH, every_drive
+from ..shared.fault_output import FaultFinding, alarm_json, fault_json, fault_rows, find_out
 from ..shared.options import (
     Target,
     connect_drive,
@@ -25,7 +27,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
-from ..shared.say import say_row
+from ..shared.say import say, say_row
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -42,6 +44,8 @@ SHOWN_QUANTITIES: dict[Quantity, str] = {
     "motor_current": "Current",
 }
 """What tells how a motor turns, and how it is called here."""
+LINE_FIGURES = ("Output frequency", "Current")
+"""What of them stands in the one line of a drive."""
 CHANNEL_NAMES: dict[Quantity, str] = {
     "command_channel": "Commanded by",
     "reference_channel": "Reference from",
@@ -184,6 +188,7 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
         "direction": state.direction,
         "fault": fault_json(state, status.finding),
         "alarms": [bit.name for bit in state.alarms],
+        "alarm": alarm_json(status.finding),
         "commanded_by": status.channels["Commanded by"] or None,
         "reference_from": status.channels["Reference from"] or None,
         "switched_by": list(status.switches),
@@ -246,6 +251,18 @@ def status_table(status: Status) -> list[tuple[str, str]]:
     ]
 
 
+def status_line(status: Status) -> str:
+    """A drive in one line: address, model, state, figures, and the fault if it is in one."""
+    session, state = status.session, status.state
+    shown = shown_values(session.profile, status.readings)
+    figures = "  ".join(f"{shown.get(name, NOT_AVAILABLE):>9}" for name in LINE_FIGURES)
+    name = session.known_identity.reference or session.profile.name
+    fault = fault_text(state)
+    return (
+        f"{session.device:>3}  {name:<18.18}  {state.headline:<18.18}  {figures}  {fault}".rstrip()
+    )
+
+
 def _watch_text(status: Status) -> str:
     watch = status.watch
     if watch is None:
@@ -260,16 +277,26 @@ def _watch_text(status: Status) -> str:
 @drives_options
 @force_profile_option
 @hold_option
+@click.option("--all", "every", is_flag=True, help="Every drive that answers, a line each.")
+@click.option(
+    "--addresses",
+    metavar="LIST",
+    help=f"With --all: where to look, like 1-31 or 1,2,31; {USUAL_SEARCH} unless told.",
+)
 @read_only_option
 @json_option
 @told
 def status(
     target: Target,
     hold: float | None,
+    every: bool,
+    addresses: str | None,
     read_only: bool,
     as_json: bool,
 ) -> None:
     """Tell a drive's state, control source, faults and reaction to a loss of communication."""
+    if addresses and not every:
+        raise click.UsageError("--addresses goes with --all.")
 
     from ..running.holding import hold_on
 
@@ -279,13 +306,18 @@ def status(
         session = await connect_drive(opened, drive)
         sessions.append(session)
         found = await status_of_drive(session, opened)
-        if not as_json:
+        if every and not as_json:
+            say(plain(status_line(found)))
+        elif not as_json:
             for title, text in status_table(found):
                 say_row(title, plain(text) or "-----", STATUS_TITLES)
         return status_json(target.line_text, found), DONE
 
     async def work(opened: OpenLine) -> int:
-        status = await each_drive(target, lambda drive: one(opened, drive), as_json=as_json)
+        wanted = await every_drive(opened, target, addresses) if every else target
+        status = await each_drive(
+            wanted, lambda drive: one(opened, drive), as_json=as_json, titled=not every
+        )
         await hold_on(opened, sessions, hold)
         return status
 

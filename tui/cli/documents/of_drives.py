@@ -8,6 +8,7 @@ import msgspec
 from msgspec import UNSET, UnsetType
 
 from .parts import (
+    AlarmTold,
     ControlTold,
     FaultTold,
     FirstWordTold,
@@ -82,6 +83,7 @@ class StatusTold(OfDriveTold, kw_only=True):
     direction: str | None
     fault: FaultTold | None
     alarms: list[str]
+    alarm: AlarmTold | None
     commanded_by: str | None
     reference_from: str | None
     switched_by: list[str]

@@ -137,6 +137,17 @@ class FaultTold(PartTold):
     reset: ResetTold | None
 
 
+class AlarmTold(PartTold):
+    """The first alarm of a drive without a fault, with what it points at."""
+
+    name: str
+    causes: list[str]
+    checks: list[str]
+    look_at: list[LookTold]
+    confidence: str | None
+    source: str | None
+
+
 class LookTold(PartTold):
     """A parameter that a fault points at."""
 

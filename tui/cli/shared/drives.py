@@ -14,17 +14,18 @@ Work = Callable[[Target], Awaitable[tuple[dict[str, Any], int]]]
 """What is done at one drive: it says its lines, and gives its JSON and its exit status."""
 
 
-async def each_drive(target: Target, work: Work, *, as_json: bool) -> int:
+async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool = True) -> int:
     """Do the work at every drive; with `as_json` print one document, or the list of several.
 
-    What is wrong with one of several is told and keeps it from no other. Returns the highest exit
-    status; raises what the work raises where there is one drive only.
+    With `titled` each of several has its address above it. What is wrong with one of several is
+    told and keeps it from no other. Returns the highest exit status; raises what the work raises
+    where there is one drive only.
     """
     targets = target.each()
     documents: list[dict[str, Any]] = []
     worst = DONE
     for one in targets:
-        if len(targets) > 1 and not as_json:
+        if len(targets) > 1 and titled and not as_json:
             say(f"Device {one.device}:")
         try:
             document, status = await work(one)

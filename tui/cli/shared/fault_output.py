@@ -84,6 +84,21 @@ def fault_json(state: DriveState, found: FaultFinding | None) -> dict[str, Any] 
     }
 
 
+def alarm_json(found: FaultFinding | None) -> dict[str, Any] | None:
+    """The first alarm of a drive without a fault, with what it points at; null where none is."""
+    if found is None or not found.alarm:
+        return None
+    hint = found.hint
+    return {
+        "name": found.alarm,
+        "causes": list(hint.probable) if hint else [],
+        "checks": list(hint.check) if hint else [],
+        "look_at": _look_at_json(found) if hint else [],
+        "confidence": hint.confidence if hint else None,
+        "source": hint.source if hint else None,
+    }
+
+
 def _look_at_json(found: FaultFinding) -> list[dict[str, Any]]:
     from .output import reading_json
 
