@@ -246,13 +246,8 @@ def _cheapest(
         choices = [
             (best[start][0] + timing.read(count), start)
             for start in range(end)
-            if _allows(
-                profile,
-                ordered[start],
-                end - start,
-                count := max(ends[start:end]) - ordered[start].address,
-                unreadable,
-            )
+            for count in (max(ends[start:end]) - ordered[start].address,)
+            if _allows(profile, ordered[start:end], count, unreadable)
         ]
         best.append(min(choices))
     return best
@@ -280,29 +275,28 @@ def run_length(
     `longest` is the limit of a function other than 3.
     """
     count = _span(run)
-    return count if _allows(profile, run[0], len(run), count, unreadable, longest) else None
+    return count if _allows(profile, run, count, unreadable, longest) else None
 
 
 def _allows(
     profile: Profile,
-    first: Parameter,
-    many: int,
+    run: Sequence[Parameter],
     count: int,
     unreadable: Collection[str],
     longest: int | None = None,
 ) -> bool:
-    """Whether the drive allows a read of so many words over so many parameters."""
+    """Whether the drive allows a read of so many words over this run."""
     reading = profile.data.reading
     if longest is None:
-        if many == 1 or count == 1:
+        if len(run) == 1 or count == 1:
             return True
         if reading.single_words_only:
             return False
-        function = profile.function(first.function)
+        function = profile.function(run[0].function)
         longest = (function.max_read if function else None) or 1
     if reading.single_words_only or count > longest:
         return False
-    return reading.gaps_readable or _all_known(profile, first, count, unreadable)
+    return reading.gaps_readable or _all_known(profile, run[0], count, unreadable)
 
 
 def _all_known(profile: Profile, first: Parameter, count: int, unreadable: Collection[str]) -> bool:
