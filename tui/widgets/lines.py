@@ -122,7 +122,7 @@ class Lines(Widget):
 
 @lru_cache(maxsize=1)
 def _names_of_styles() -> Console:
-    return Console()
+    return Console(markup=False)
 
 
 @lru_cache(maxsize=1024)
@@ -134,7 +134,7 @@ def strip_of(
     Kept for when it comes again: most of what changes becomes what it was before.
     """
     text = plain(text)
-    segments = in_order(text, spans, style)
+    segments = piece_by_piece(text, spans, style)
     if segments is None:
         styled = Text(text, end="")
         styled.stylize(style)  # rich drops the style of a text that has no spans
@@ -145,7 +145,7 @@ def strip_of(
     return strip.simplify()
 
 
-def in_order(text: str, spans: Sequence[Span], style: Style | str) -> list[Segment] | None:
+def piece_by_piece(text: str, spans: Sequence[Span], style: Style | str) -> list[Segment] | None:
     """The pieces of a text that was put together piece by piece; None for any other."""
     if not isinstance(style, Style):
         if style:
