@@ -6,8 +6,8 @@ import time
 from collections.abc import Iterator
 
 import pytest
-from textual import _wait
 from textual.css.stylesheet import Stylesheet
+from textual.widgets import Input
 
 from tui.screens.dialogs.question import Question
 
@@ -36,9 +36,9 @@ def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.fixture(autouse=True)
-def idle_beside_a_line(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A panel that watches a line is idle, too: the pilot waited up to 1 s behind each key."""
-    monkeypatch.setattr("textual._wait.SLEEP_IDLE", _wait.SLEEP_GRANULARITY / 4)
+def still_cursor(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The cursor of a field does not blink: on a busy machine a picture is taken after it went."""
+    monkeypatch.setattr(Input, "_toggle_cursor", lambda _: None)
 
 
 @pytest.fixture(autouse=True)

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import pytest
+from textual import _wait
 from textual.events import Key
 from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
@@ -168,6 +169,9 @@ async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]
         return opened
 
     app = DrivePanelApp(open_line=opener, start=text, read_only=read_only)
+    really_idle = _wait.SLEEP_IDLE
+    # a panel that watches a line is idle, too: the pilot waited up to 1 s behind each key
+    _wait.SLEEP_IDLE = _wait.SLEEP_GRANULARITY / 4
     try:
         async with app.run_test(size=(80, 24)) as pilot:
             # a drive is listed once it has its profile; Enter before that is for nobody
@@ -182,6 +186,7 @@ async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]
             if isinstance(app.screen, Leave):
                 await pilot.press("escape")
     finally:
+        _wait.SLEEP_IDLE = really_idle
         simulation.stop()
 
 

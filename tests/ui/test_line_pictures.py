@@ -23,6 +23,7 @@ from tui.session.monitor.line_watch import Look
 from tui.session.paths import remember_line
 
 from . import fakes
+from .test_pictures import LARGE, SMALL
 
 Compare = Callable[..., bool]
 PORTS = [("/dev/ttyUSB0", "USB-RS485 adapter"), ("/dev/ttyS0", "")]
@@ -218,7 +219,11 @@ STATES: dict[str, Callable[[Any, Pilot[None]], Awaitable[None]]] = {
     "wrong-addresses": wrong_addresses,
     "dialog": dialog,
 }
-USUAL = [(state, size) for state in STATES for size in ((80, 24), (120, 40))]
+USUAL = [
+    pytest.param(state, *size.values, id=f"{state}-{size.id}", marks=size.marks)
+    for state in STATES
+    for size in (SMALL, LARGE)
+]
 OTHERS = [(state, size) for state in ("no-line", "thirty-one") for size in ((60, 20), (200, 60))]
 
 

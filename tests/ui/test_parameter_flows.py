@@ -88,7 +88,7 @@ async def message(made: Bench, *parts: str) -> None:
 
 
 async def test_find_edit_write_and_read_back() -> None:
-    async with bench("atv71") as made:
+    async with bench("atv312") as made:
         await to_parameters(made)
         await find(made, "ACC")
         await made.pilot.press("enter")
@@ -132,7 +132,7 @@ async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() 
 
 
 async def test_a_parameter_is_found_from_every_screen() -> None:
-    async with bench("atv71") as made:
+    async with bench("atv312") as made:
         for key in "2567":
             await made.pilot.press(key, "slash", *"hsp", "enter")
             await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
@@ -143,7 +143,7 @@ async def test_a_parameter_is_found_from_every_screen() -> None:
 
 
 async def test_the_groups_have_tab_and_the_arrows() -> None:
-    async with bench("atv71") as made:
+    async with bench("atv312") as made:
         screen = await to_parameters(made)
         first = screen.listed.code
         seen = [first]
@@ -211,7 +211,7 @@ async def test_out_of_range_is_refused_while_it_is_typed() -> None:
 
 
 async def test_steps_undo_all_and_selections() -> None:
-    async with bench("atv71") as made:
+    async with bench("atv312") as made:
         await to_parameters(made)
         await find(made, "HSP")
         await made.pilot.press("minus", "minus", "asterisk")
@@ -227,7 +227,7 @@ async def test_steps_undo_all_and_selections() -> None:
 
 
 async def test_stop_works_here_and_in_its_fields() -> None:
-    async with bench("atv71") as made:
+    async with bench("atv312") as made:
         await made.running()
         await to_parameters(made)
         await find(made, "ACC")
@@ -238,7 +238,7 @@ async def test_stop_works_here_and_in_its_fields() -> None:
 
 
 async def test_leaving_with_staged_edits_asks() -> None:
-    async with bench("atv71") as made:
+    async with bench("atv312") as made:
         await to_parameters(made)
         await find(made, "HSP")
         await made.pilot.press("minus", "q")

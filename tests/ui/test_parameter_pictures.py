@@ -220,8 +220,8 @@ STATES: dict[str, tuple[Any, dict[str, int], float | None, list[str]]] = {
 
 
 OTHER_SIZES = [
-    pytest.param(state, size, id=f"{size[0]}x{size[1]}-{state}")
-    for size in ((60, 20), (200, 60))
+    pytest.param(state, size, id=f"{size[0]}x{size[1]}-{state}", marks=marks)
+    for size, marks in (((60, 20), ()), ((200, 60), pytest.mark.sweep))
     for state in ("settings", "start-up", "staged", "number", "write-running")
 ]
 

@@ -18,8 +18,9 @@ from tui.session.timeout_told import TimeoutWatch
 from . import fakes
 
 BOTH_SIZES = pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
+SMALL = pytest.param((80, 24), id="80x24")
 LARGE = pytest.param((120, 40), id="120x40", marks=pytest.mark.sweep)
-SIZES = pytest.mark.parametrize("size", [pytest.param((80, 24), id="80x24"), LARGE])
+SIZES = pytest.mark.parametrize("size", [SMALL, LARGE])
 """Both sizes too; the larger one in the layer of sweeps."""
 Compare = Callable[..., bool]
 
