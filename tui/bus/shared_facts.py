@@ -14,6 +14,8 @@ from typing import Protocol, TypeVar
 
 import msgspec
 
+from .stop_counts import GivenStops, StopCounts
+
 log = logging.getLogger(__name__)
 
 T = TypeVar("T")
@@ -64,6 +66,7 @@ ReplyListener = Callable[[int, bool, str], None]
 GoneListener = Callable[[Program], None]
 TextListener = Callable[[int, str], None]
 ChangeListener = Callable[[], None]
+DEPARTED_KEPT = 16
 
 
 class SharedFacts:
@@ -78,9 +81,12 @@ class SharedFacts:
         """All on the line, the owner first."""
         self.commanders: Mapping[int, str] = MappingProxyType({})
         """Ids of the programs that command, by device."""
-        self.stops: Mapping[int, int] = MappingProxyType({})
+        self.stops = StopCounts()
         """How many stops each device was given, by all programs."""
-        self.stopped_by: Mapping[int, str] = MappingProxyType({})
+        self.untold: tuple[int, ...] = ()
+        """Devices stopped from here while nobody could be told."""
+        self.departed: tuple[Program, ...] = ()
+        """Programs that have left the line, the last ones last."""
         self.voice: Voice | None = None
         """None while nobody else hears of it."""
         self._lock = threading.RLock()
@@ -104,20 +110,28 @@ class SharedFacts:
         return next((one for one in self.programs if one.id == id), None)
 
     def learn(
-        self, programs: tuple[Program, ...], commanders: Mapping[int, str], stops: Mapping[int, int]
-    ) -> None:
-        """Take over what the owner tells; what this program claims is its own until denied."""
+        self, programs: tuple[Program, ...], commanders: Mapping[int, str], given: GivenStops
+    ) -> tuple[int, ...]:
+        """Take over what the owner tells; what this program claims is its own until denied.
+
+        Returns the devices of which stops are told that this program had not heard of.
+        """
         with self._lock:
             others = {d: one for d, one in commanders.items() if one != self.me.id}
             mine = {d: one for d, one in self.commanders.items() if one == self.me.id}
-            self.programs = programs
             self.commanders = MappingProxyType({**others, **mine})
-            self.learn_stops(stops)
-        self._changed()
+            unheard = self.stops.replace(given, self.me.id)
+        self.set_programs(programs)
+        return unheard
 
     def set_programs(self, programs: tuple[Program, ...]) -> None:
         """The programs on the line, as their owner knows them."""
-        self.programs = programs
+        with self._lock:
+            here = {one.id for one in programs}
+            left = [one for one in self.programs if one.id not in here and one.id != self.me.id]
+            stay = [one for one in self.departed if one.id not in here]
+            self.departed = (*stay, *left)[-DEPARTED_KEPT:]
+            self.programs = programs
         self._changed()
 
     def on_change(self, listener: ChangeListener) -> Callable[[], None]:
@@ -150,24 +164,23 @@ class SharedFacts:
     def give_stop(self, devices: Iterable[int], by: str) -> None:
         """Devices are stopped from here: what was meant for them before is void everywhere."""
         stopped = tuple(devices)
-        self.count_stop(stopped, by)
-        if self.voice is not None:
-            self.voice.stop_given(stopped, by)
-
-    def count_stop(self, devices: Iterable[int], by: str) -> None:
-        """Count a stop of devices, whoever gave it."""
         with self._lock:
-            stopped = tuple(devices)
-            counts = {device: self.stops.get(device, 0) + 1 for device in stopped}
-            self.stops = MappingProxyType({**self.stops, **counts})
-            self.stopped_by = MappingProxyType({**self.stopped_by, **dict.fromkeys(stopped, by)})
+            self.stops.give(self.me.id, stopped, by)
+            voice = self.voice
+            if voice is None:
+                self.untold = tuple(dict.fromkeys((*self.untold, *stopped)))
+        if voice is not None:
+            voice.stop_given(stopped, by)
 
-    def learn_stops(self, stops: Mapping[int, int]) -> None:
-        """Take over counts that are higher than the own ones."""
+    def find_voice(self, voice: Voice) -> tuple[int, ...]:
+        """From now on others hear of what is done here.
+
+        Returns the devices that were stopped while nobody could hear of it.
+        """
         with self._lock:
-            higher = {d: n for d, n in stops.items() if n > self.stops.get(d, 0)}
-            if higher:
-                self.stops = MappingProxyType({**self.stops, **higher})
+            self.voice = voice
+            untold, self.untold = self.untold, ()
+            return untold
 
     def on_stop(self, listener: StopListener) -> Callable[[], None]:
         """Call `listener` when another program stops devices; returns how to end that."""
@@ -269,8 +282,8 @@ class SharedFacts:
         with self._lock:
             held = {d: one for d, one in self.commanders.items() if one != program.id}
             self.commanders = MappingProxyType(held)
-            self.programs = tuple(one for one in self.programs if one.id != program.id)
-        self._changed()
+            rest = tuple(one for one in self.programs if one.id != program.id)
+        self.set_programs(rest)
         for listener in tuple(self._on_gone):
             _told(listener, program)
 
@@ -281,14 +294,15 @@ class SharedFacts:
 
         `stamp` is the count of stops that the program knew when it handed the write over.
         """
-        if stamp != self.stops.get(device, 0):
-            by = self.stopped_by.get(device, "")
+        if stamp != self.stops.stamp(device):
+            by = self.stops.by.get(device, "")
             return f"Not sent: a stop came after it{f' ({by})' if by else ''}."
-        holder = self.commanders.get(device)
-        if holder is not None and holder != program:
-            other = self.program(holder)
-            if other is not None:
-                return commanded_by(device, other)
+        for one in (device,) if device else tuple(self.commanders):
+            holder = self.commanders.get(one)
+            if holder is not None and holder != program:
+                other = self.program(holder)
+                if other is not None:
+                    return commanded_by(one, other)
         return ""
 
 

@@ -5,10 +5,11 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from typing import Any
 
-from ..errors import LineError, LineLost, NotShared, RequestRefused
+from ..errors import LineClosed, LineError, LineLost, NotShared, RequestRefused
 from ..link import label
 from ..model import LineState, LineStatus, Priority
 from ..requests import BROADCAST
@@ -16,7 +17,8 @@ from ..schedule.inside import LineInside
 from ..schedule.queue import Job
 from ..shared_facts import Program
 from ..trace import Frame
-from .direct import DirectStops
+from .failures import error_of
+from .lease import SILENT_OWNER
 from .messages import (
     VERSION,
     Answer,
@@ -29,27 +31,29 @@ from .messages import (
     Failed,
     Goodbye,
     Hello,
+    Here,
     News,
     NoMessage,
     Question,
     Reply,
+    RollCall,
     StopGiven,
     Told,
     TurnedAway,
     Welcome,
     Wish,
     Withdraw,
-    error_of,
     next_message,
     packed,
     request_form,
 )
+from .past_owner import PastOwner
 from .place import Owner
+from .stops_past import StopsPast
+from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
 
-SILENT_OWNER = 1.0
-"""Seconds without a sign of life after which an owner counts as frozen."""
 LOOK_INTERVAL = 0.1
 WAITED_ENOUGH = 5.0
 """Seconds that a request waits for a frozen owner before it is told so."""
@@ -66,7 +70,7 @@ class OwnerAway(Exception):
 class ShareClient:
     """Attached to one owner until it ends; lives in the line's loop, and is its facts' voice."""
 
-    def __init__(self, inside: LineInside, owner: Owner, say: Say) -> None:
+    def __init__(self, inside: LineInside, owner: Owner, say: Say, stops_past: StopsPast) -> None:
         self._inside = inside
         self._owner = owner
         self._say = say
@@ -78,13 +82,18 @@ class ShareClient:
         self._state: LineState | None = None
         self._note = ""
         self._wish: tuple[dict[int, float], bool] = ({}, False)
-        self._silent_looks = 0
-        self._direct: DirectStops | None = None
+        self._past = PastOwner(inside, stops_past)
+        self.again = False
+        """Whether this program was attached to the line before."""
         self.heard = inside.clock()
         """When the owner last gave a sign of life."""
         self.quiet = inside.timing.late_reply
         """Seconds from then for which a reply to the owner's last request may still come."""
-        self.frozen = False
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the owner does not answer, so that nothing but stops goes out."""
+        return self._past.at_work
 
     async def serve(self) -> None:
         """Serve this program's requests until the owner ends.
@@ -96,27 +105,39 @@ class ShareClient:
         except (OSError, ValueError) as error:
             raise OwnerAway from error
         self._writer = writer
-        tasks: list[asyncio.Task[None]] = []
+        closing = True
         try:
             self._greet()
-            watch = self._loop.create_task(self._watch())
-            tasks.append(watch)
-            await self._welcomed(reader)
-            tasks.append(self._loop.create_task(self._forward()))
-            await self._listen(reader)
+            await self._until_one_ends(self._watch(), self._attached(reader))
+            closing = False
         finally:
             self._inside.facts.voice = None
-            for task in tasks:
-                task.cancel()
-            if self._direct is not None:
-                await self._direct.close()
+            await self._past.end()
             with suppress(OSError, RuntimeError):
                 writer.close()
-            self._give_up_asked()
+            self._give_up_asked(closing=closing)
+
+    async def _until_one_ends(self, *works: Coroutine[Any, Any, None]) -> None:
+        """Do several things at once until one of them ends; its error is raised."""
+        tasks = [self._loop.create_task(work) for work in works]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+        for task in done:
+            task.result()
 
     def _greet(self) -> None:
         facts = self._inside.facts
-        self._tell(Hello(VERSION, facts.me, label(self._inside.link), dict(facts.stops)))
+        # first: what is given from here on is told by itself, what was before in the greeting
+        facts.voice = ProgramVoice(facts, self._soon)
+        given = {device: dict(counts) for device, counts in facts.stops.given.items()}
+        self._tell(Hello(VERSION, facts.me, label(self._inside.link), given))
+
+    async def _attached(self, reader: asyncio.StreamReader) -> None:
+        await self._welcomed(reader)
+        await self._until_one_ends(self._forward(), self._listen(reader))
 
     async def _welcomed(self, reader: asyncio.StreamReader) -> None:
         try:
@@ -132,7 +153,6 @@ class ShareClient:
         if not message.asked:
             self._note += f" It is open as {message.label}."
         facts = self._inside.facts
-        facts.voice = self
         for device, holder in facts.commanders.items():
             if holder == facts.me.id:
                 self._tell(Claim(device, True))
@@ -165,11 +185,10 @@ class ShareClient:
         if job.answer.cancelled():
             return
         request = job.request
-        why = self._inside.dispatcher.refusal(job) or (job.forbidden() if job.forbidden else "")
-        if why:
+        if why := self._inside.dispatcher.forbidden(job):
             job.fail(RequestRefused(why))
             return
-        if self.frozen and self._directly(job):
+        if self._past.take(job):
             return
         self._describe(request.device, job)
         kind, fields = request_form(request)
@@ -180,7 +199,7 @@ class ShareClient:
         self._tell(
             Ask(
                 number, kind, fields, int(job.priority), job.replaceable, job.max_age,
-                job.stamp, limits,
+                job.stamp, job.asked, limits,
             )
         )  # fmt: skip
 
@@ -201,7 +220,7 @@ class ShareClient:
 
     def _answered(self, message: Answer | Failed) -> None:
         job = self._asked.pop(message.number, None)
-        if job is None or not job.answer.set_running_or_notify_cancel():
+        if job is None or not (job.begun or job.answer.set_running_or_notify_cancel()):
             return
         job.begun = True
         if isinstance(message, Answer):
@@ -215,12 +234,15 @@ class ShareClient:
             # the owner's end is not this program's
             self._give_up(job, sent=FATE in message.form.text)
         else:
-            job.fail(error_of(message))
+            job.fail(error_of(message.error, message.form))
 
-    def _give_up_asked(self) -> None:
+    def _give_up_asked(self, *, closing: bool) -> None:
         asked, self._asked = self._asked, {}
         for job in asked.values():
-            self._give_up(job, sent=True)
+            if closing and job.request.changes:
+                job.fail(LineClosed(f"The line was closed during the request.{FATE}"))
+            else:
+                self._give_up(job, sent=True)
 
     def _give_up(self, job: Job, *, sent: bool) -> None:
         """The owner ended before it answered: a read is asked anew, a write never is.
@@ -228,19 +250,18 @@ class ShareClient:
         A stop is sent again: it may have got lost, and does no harm twice.
         """
         if not job.request.changes or job.priority is Priority.STOP:
-            job.begun = False
             if not job.answer.cancelled():
                 self._inside.dispatcher.put_back(job)
             return
         text = f"{ENDED} during the request.{FATE}" if sent else f"{ENDED}; this was not sent."
-        if job.begun or job.answer.set_running_or_notify_cancel():
-            job.begun = True
-            job.fail(LineLost(text))
+        job.fail(LineLost(text))
 
     # An owner that is frozen
 
     async def _watch(self) -> None:
         """Notice an owner that does not answer any more, and one that does again."""
+        looks = 0
+        heard = self.heard
         while True:
             await asyncio.sleep(LOOK_INTERVAL)
             inside = self._inside
@@ -249,15 +270,16 @@ class ShareClient:
                 self._wish = wish
                 self._tell(Wish(*wish))
             # by looks, too: where this program got no time to look, the owner may be well
-            self._silent_looks += 1
-            silent = inside.clock() - self.heard > SILENT_OWNER
-            if not self.frozen and silent and self._silent_looks > SILENT_OWNER / LOOK_INTERVAL:
+            looks = looks + 1 if heard == self.heard else 0
+            heard = self.heard
+            silent = inside.clock() - heard
+            if not self.frozen and silent > SILENT_OWNER and looks >= SILENT_OWNER / LOOK_INTERVAL:
                 self._freeze()
             if self.frozen:
-                self._help_stops()
+                self._help_stops(silent)
 
     def _freeze(self) -> None:
-        self.frozen = True
+        self._past.begin()
         who = self._owner.program.text
         log.error("%s owns the line and does not answer", who)
         self._say(
@@ -267,36 +289,25 @@ class ShareClient:
 
     def _hear_life(self) -> None:
         self.heard = self._inside.clock()
-        self._silent_looks = 0
         if self.frozen:
-            self.frozen = False
-            if self._direct is not None:
-                self._direct.end()
-                self._direct = None
+            self._past.leave()
             self._tell_state()
 
-    def _help_stops(self) -> None:
+    def _help_stops(self, silent: float) -> None:
         """Send stops past the frozen owner; tell others that they wait in vain."""
         for number, job in list(self._asked.items()):
-            if self._directly(job):
-                self._asked.pop(number, None)
+            if self._past.take(job):
+                self._withdraw(number)
         for job in self._inside.dispatcher.take_all():
             self._send(job)
-        now = self._inside.clock()
+        if silent < SILENT_OWNER + WAITED_ENOUGH:
+            return
         for number, job in list(self._asked.items()):
-            if now - self.heard > SILENT_OWNER + WAITED_ENOUGH and not job.answer.done():
-                self._asked.pop(number, None)
+            if self._inside.clock() - job.asked > WAITED_ENOUGH and not job.answer.done():
+                self._withdraw(number)
                 fate = FATE if job.request.changes else ""
                 text = f"{self._owner.program.text} owns the line and does not answer.{fate}"
                 job.fail(LineLost(text))
-
-    def _directly(self, job: Job) -> bool:
-        """Send what belongs to a stop directly; False where the job does not."""
-        if self._direct is None:
-            if job.priority is not Priority.STOP:
-                return False
-            self._direct = DirectStops(self._inside)
-        return self._direct.take(job)
 
     # What the owner says
 
@@ -307,15 +318,17 @@ class ShareClient:
                 self._answered(message)
             case News():
                 self._hear_news(message)
-            case Facts(programs=programs, commanders=commanders, stops=stops):
-                facts.learn(programs, commanders, stops)
+            case Facts():
+                self._hear_facts(message)
+            case RollCall(number=number):
+                # once nothing of this program goes out past the owner any more
+                self._past.when_ended(lambda: self._tell(Here(number)))
             case Told(device=device, text=text):
                 facts.hear_text(device, text)
             case StopGiven(devices=devices, by=by, program=program):
-                facts.count_stop(devices, f"{by}, {program.text}")
-                for device in devices:
-                    inside.dispatcher.void(device)
+                facts.stops.note(program.id, devices, message.counts, f"{by}, {program.text}")
                 facts.hear_stop(devices, by, program)
+                inside.dispatcher.void()
             case Denied(device=device, holder=holder):
                 facts.note_commander(device, holder.id)
                 facts.hear_denied(device, f"Drive {device} is commanded by {holder.text}.")
@@ -325,6 +338,14 @@ class ShareClient:
                 facts.hear_reply(device, why, yes=yes)
             case _:
                 log.error("the owner says %s", type(message).__name__)
+
+    def _hear_facts(self, told: Facts) -> None:
+        facts = self._inside.facts
+        unheard = facts.learn(told.programs, told.commanders, told.stops)
+        if unheard and self.again:
+            # given while this program was with no owner
+            facts.hear_stop(unheard, "while nobody owned the line", self._owner.program)
+            self._inside.dispatcher.void()
 
     def _hear_news(self, news: News) -> None:
         inside = self._inside
@@ -344,28 +365,6 @@ class ShareClient:
         if self._state is not None:
             connected = self._state.status is LineStatus.CONNECTED
             self._say(self._state.status, self._note if connected else self._state.reason)
-
-    # The voice of the facts, from any thread
-
-    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
-        """Devices are stopped by this program."""
-        self._soon(StopGiven(devices, by, self._inside.facts.me))
-
-    def claim(self, device: int, take: bool) -> None:
-        """This program commands a device now, or no longer."""
-        self._soon(Claim(device, take))
-
-    def ask(self, device: int) -> None:
-        """This program wants a device that another one commands."""
-        self._soon(Question(device, self._inside.facts.me))
-
-    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
-        """This program answers one that asked."""
-        self._soon(Reply(device, program, yes, why))
-
-    def told(self, device: int, text: str) -> None:
-        """This program has something for all to read."""
-        self._soon(Told(device, text))
 
     def _soon(self, message: AnyMessage) -> None:
         with suppress(RuntimeError):

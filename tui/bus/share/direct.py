@@ -25,7 +25,8 @@ class DirectStops:
 
     def __init__(self, inside: LineInside) -> None:
         self._inside = inside
-        self._devices: set[int] = set()
+        self._stops: dict[int, dict[bytes, Job]] = {}
+        """What was sent to stop each device, each frame once."""
         self._dispatcher = Dispatcher(
             inside.devices,
             inside.around.tally,
@@ -40,11 +41,13 @@ class DirectStops:
         """Take a job that belongs to a stop; False for any other."""
         device = job.request.device
         if job.priority is Priority.STOP:
-            self._devices.add(device)
+            sent = self._stops.setdefault(device, {})
+            if job.request.changes:
+                sent[job.pdu] = job
         elif (
             job.request.changes
             or job.priority > Priority.OPERATOR_READ
-            or (device not in self._devices and BROADCAST not in self._devices)
+            or (device not in self._stops and BROADCAST not in self._stops)
         ):
             return False
         self._dispatcher.submit(job)
@@ -53,7 +56,7 @@ class DirectStops:
         return True
 
     async def _serve(self) -> None:
-        """Open the port beside its owner and serve, again and again."""
+        """Open the port beside its owner and serve, again and again, until it is left."""
         inside = self._inside
         while True:
             try:
@@ -66,22 +69,28 @@ class DirectStops:
                 continue
             try:
                 await self._dispatcher.serve(master)
+                return
             except LineError as error:
                 log.error("a stop past the owner: %s", error)
                 await asyncio.sleep(TRY_AGAIN)
             finally:
                 master.close()
 
-    def end(self) -> None:
-        """The owner answers again: what is left goes its usual way."""
-        if self._task is not None:
-            self._task.cancel()
-        for job in self._dispatcher.take_all():
-            self._inside.dispatcher.put_back(job)
+    async def end(self) -> None:
+        """The owner answers again: what is left goes its usual way, each stop once more.
 
-    async def close(self) -> None:
-        """End, and wait for the port to be given back."""
-        self.end()
+        A frame that the owner was just sending as it froze may have gone out behind the stop.
+        """
+        self._dispatcher.leave()
         if self._task is not None:
+            if not self._dispatcher.in_flight:
+                self._task.cancel()
             with suppress(asyncio.CancelledError):
                 await self._task
+        for frames in self._stops.values():
+            for job in frames.values():
+                again = Job(job.request, job.priority, job.limits)
+                again.program, again.asked = job.program, self._inside.clock()
+                self._inside.dispatcher.submit(again)
+        for job in self._dispatcher.take_all():
+            self._inside.dispatcher.put_back(job)

@@ -21,7 +21,7 @@ from ..shared_facts import Program
 
 log = logging.getLogger(__name__)
 
-PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
+PRIVATE_FOLDER, PRIVATE_FILE, SHARED_FILE = 0o700, 0o600, 0o660
 LONGEST_LOCK = 4096
 """Bytes of a lock file that are read; ours hold some hundred."""
 
@@ -56,18 +56,6 @@ class SharePlace:
     def lock_path(self) -> Path:
         """The file whose lock makes an owner."""
         return self.lock_folder / f"{self.name}.lock"
-
-    def socket_path(self) -> Path:
-        """Where to listen, its folder made; what cannot be made is passed over. Raises OSError."""
-        trouble: OSError | None = None
-        for folder in self.socket_folders:
-            try:
-                make_private(folder, shared=self.group is not None)
-            except OSError as error:
-                trouble = error
-            else:
-                return folder / f"{self.name}.sock"
-        raise trouble or FileNotFoundError("no folder for the socket of the line")
 
 
 def make_private(folder: Path, *, shared: bool = False) -> None:
@@ -104,14 +92,14 @@ class OwnerLock:
         shared = self._place.group is not None
         make_private(path.parent, shared=shared)
         descriptor = os.open(
-            path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o660 if shared else 0o600
+            path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, SHARED_FILE if shared else PRIVATE_FILE
         )
         file = os.fdopen(descriptor, "r+b", buffering=0)
         try:
             if shared:
                 with suppress(PermissionError):
                     os.fchown(descriptor, -1, self._place.group or -1)
-                    os.fchmod(descriptor, 0o660)
+                    os.fchmod(descriptor, SHARED_FILE)
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # a file that was taken away meanwhile locks nobody out
             if os.fstat(descriptor).st_ino != path.stat().st_ino:
@@ -142,6 +130,21 @@ class OwnerLock:
         except OSError:
             return False
 
+    def renew(self) -> bool:
+        """Lock the file that is there now, where the one before was taken away.
+
+        Returns False where another program was quicker. Raises OSError.
+        """
+        before, self._file = self._file, None
+        try:
+            taken = self.take()
+        finally:
+            if self._file is None:
+                self._file = before
+            elif before is not None:
+                before.close()
+        return taken
+
     def give_back(self) -> None:
         """Own the line no more."""
         if self._file is not None:
@@ -158,3 +161,14 @@ def owner_of(place: SharePlace) -> Owner | None:
             return msgspec.json.decode(file.read(LONGEST_LOCK), type=Owner)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return None
+
+
+def has_ended(program: Program) -> bool:
+    """Whether a program of this machine surely is no more."""
+    try:
+        os.kill(program.pid, 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False

@@ -11,8 +11,10 @@ from pathlib import Path
 from ..errors import NotShared
 from ..schedule.inside import LineInside
 from .client import OwnerAway, Say, ShareClient, owner_text
+from .messages import VERSION
 from .place import Owner, OwnerLock, SharePlace, owner_of
 from .server import ShareServer
+from .stops_past import StopsPast
 
 log = logging.getLogger(__name__)
 
@@ -29,6 +31,8 @@ class Sharing:
         self._place = place
         self._inside = inside
         self._lock = OwnerLock(place)
+        self._stops_past = StopsPast(place)
+        self._attached = False
         self._server: ShareServer | None = None
         self._client: ShareClient | None = None
         self._off = False
@@ -59,6 +63,7 @@ class Sharing:
                 self._off = True
                 return
             if taken:
+                self._lock.tell(Owner(VERSION, inside.facts.me, ""))
                 break
             owner = owner_of(self._place)
             try:
@@ -79,7 +84,8 @@ class Sharing:
 
     async def _attend(self, owner: Owner, say: Say) -> float:
         """Be a client of an owner until it ends; returns when its last reply cannot come."""
-        self._client = client = ShareClient(self._inside, owner, say)
+        self._client = client = ShareClient(self._inside, owner, say, self._stops_past)
+        client.again, self._attached = self._attached, True
         try:
             await client.serve()
         finally:
@@ -94,12 +100,10 @@ class Sharing:
             quiet_until = inside.clock() + _left_of(inside.timing.late_reply, before)
         server = ShareServer(self._place, self._lock, inside)
         try:
-            await server.start()
+            await server.start(served.program if served is not None else None)
         except OSError as error:
             log.error("the line cannot be shared: %s", error)
         self._server = server
-        if served is not None:
-            inside.facts.hear_gone(served.program)
         await asyncio.sleep(max(0.0, quiet_until - inside.clock()))
 
     def tell_state(self) -> None:
