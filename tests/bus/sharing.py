@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import os
+import subprocess
+import sys
 import threading
+import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
@@ -17,7 +20,8 @@ from tui.bus.shared_facts import Program
 from .conftest import WIDE
 from .peer import eventually
 
-QUICK = Timing(first_timeout=5.0, min_timeout=5.0, late_reply=0.2, reconnect_first=0.05)
+ROOT = Path(__file__).parent.parent.parent
+QUICK = Timing(first_timeout=1.5, min_timeout=1.5, late_reply=0.2, reconnect_first=0.05)
 """Patient with answers, quick to take a line over."""
 
 
@@ -94,3 +98,44 @@ def in_loop(line: Line, call: Callable[[], object]) -> None:
     loop = line._engine._loop
     assert loop is not None
     loop.call_soon_threadsafe(call)
+
+
+@contextmanager
+def other_program(path: str, folder: Path, name: str, late: float = 0.2) -> Iterator[OtherProgram]:
+    """A process of its own on the line; killed at the end at the latest."""
+    command = [sys.executable, "-m", "tests.bus.share_program", path, str(folder), name, str(late)]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    program = OtherProgram(process)
+    try:
+        program.hear("ready")
+        yield program
+    finally:
+        program.kill()
+
+
+@dataclass(slots=True)
+class OtherProgram:
+    """A process on the line, told what to do."""
+
+    process: subprocess.Popen[str]
+
+    def hear(self, wanted: str) -> None:
+        """Wait for a line that it prints."""
+        assert self.process.stdout is not None
+        said = self.process.stdout.readline()
+        assert said.startswith(wanted), said
+
+    def tell(self, text: str) -> None:
+        """Have it do something, and wait until it did, or for a write began to."""
+        assert self.process.stdin is not None
+        print(text, file=self.process.stdin, flush=True)
+        self.hear("did")
+
+    def kill(self) -> float:
+        """End it as nothing can be caught; returns when."""
+        self.process.kill()
+        killed = time.monotonic()
+        self.process.communicate()
+        return killed

@@ -256,9 +256,13 @@ def request_of(message: Ask) -> Request:
     if kind is None:
         raise NoMessage(f"request {message.kind!r}")
     try:
-        return msgspec.convert(message.fields, kind)
-    except msgspec.MsgspecError as error:
+        request = msgspec.convert(message.fields, kind)
+        bytes([request.device])
+        request.pdu()
+    except Exception as error:
+        # a request that cannot be put into bytes, for whichever reason, is none
         raise NoMessage(str(error)) from error
+    return request
 
 
 def priority_of(number: int) -> Priority:

@@ -178,14 +178,7 @@ class ShareServer:
 
     def _may_attach(self, writer: asyncio.StreamWriter) -> bool:
         """Whether the user at the other end may share the line: the socket's mode, twice."""
-        if self._group is not None:
-            return True
-        peer = writer.get_extra_info("socket")
-        try:
-            found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
-        except (AttributeError, OSError):
-            return True
-        return struct.unpack("3i", found)[1] in (os.getuid(), 0)
+        return self._group is not None or user_of(writer) in (os.getuid(), 0, None)
 
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
@@ -352,3 +345,13 @@ class ShareServer:
     def _news_for(self, client: Client) -> News:
         shares = greatest(self._inside.pace.own, self._wishes(but=client))
         return client.news(self._inside, shares)
+
+
+def user_of(writer: asyncio.StreamWriter) -> int | None:
+    """The number of the user at the other end of a local socket; None where it is not told."""
+    peer = writer.get_extra_info("socket")
+    try:
+        found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    except (AttributeError, OSError):
+        return None
+    return int(struct.unpack("3i", found)[1])
