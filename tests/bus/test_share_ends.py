@@ -76,6 +76,7 @@ async def test_a_write_that_the_owner_left_unanswered_is_never_repeated_a_stop_i
         with pytest.raises(LineLost, match="Whether it was taken is not known"):
             await write
         assert times_sent(peer, 6) == 1
+        await come(lambda: other.facts.programs[0] == other.facts.me)
         third = lines.open("stop")
         stop = asyncio.create_task(third.write(1, SLOW_REGISTER, [0], priority=Priority.STOP))
         await come(lambda: times_sent(peer, 6) == 2)
@@ -145,6 +146,27 @@ async def test_one_that_comes_after_a_killed_owner_keeps_the_same_silence(
         line = share(peer.path).open("watch", timing=replace(QUICK, late_reply=1.0))
         await line.read(1, 8)
         assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
+
+
+async def test_one_that_comes_after_an_owner_that_ended_keeps_it_too(share: Share) -> None:
+    """Whoever was not attached was not told."""
+    late = replace(QUICK, late_reply=1.0)
+    with PtyPeer(slow_at_77) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel", timing=late)
+        await owner.read(1, 1)
+        write = asyncio.create_task(owner.write(1, SLOW_REGISTER, [1]))
+        await asyncio.to_thread(peer.await_requests, 2)
+        await asyncio.to_thread(owner.close)
+        # one that ends before it has sent anything hands it on
+        lines.open("hasty", timing=late, wait=None)
+        await asyncio.sleep(0.1)
+        lines.opened[-1].close()
+        line = lines.open("watch", timing=late)
+        assert (await line.read(1, 8)).words == (8,)
+        assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
+        with pytest.raises(LineClosed):
+            await write
 
 
 async def test_programs_that_went_with_the_owner_are_missed_by_the_next(

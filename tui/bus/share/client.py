@@ -87,8 +87,8 @@ class ShareClient:
         """Whether this program was attached to the line before."""
         self.heard = inside.clock()
         """When the owner last gave a sign of life."""
-        self.quiet = inside.timing.late_reply
-        """Seconds from then for which a reply to the owner's last request may still come."""
+        self.quiet_until = 0.0
+        """When no reply to the owner's last request may come any more."""
 
     @property
     def frozen(self) -> bool:
@@ -162,15 +162,22 @@ class ShareClient:
             try:
                 message = await next_message(reader)
             except (EOFError, OSError):
+                self._killed()
                 return
             except NoMessage as error:
                 log.error("%s says nothing sensible: %s", self._owner.program.text, error)
+                self._killed()
                 return
             self._hear_life()
             if isinstance(message, Goodbye):
-                self.quiet = message.quiet
+                self.quiet_until = self.heard + message.quiet
                 return
             self._hear(message)
+
+    def _killed(self) -> None:
+        """The owner is gone without a word: it may have sent until a moment ago."""
+        last = min(self._inside.clock(), self.heard + SILENT_OWNER)
+        self.quiet_until = last + self._inside.timing.late_reply
 
     # Requests
 

@@ -32,6 +32,9 @@ class Owner(msgspec.Struct, frozen=True):
     version: int
     program: Program
     socket: str
+    """Where it listens; empty where it does not yet, or has ended."""
+    quiet_until: float = 0.0
+    """Monotonic time until which a reply to an owner that has ended may come."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,11 +148,13 @@ class OwnerLock:
                 before.close()
         return taken
 
-    def give_back(self) -> None:
-        """Own the line no more."""
+    def give_back(self, last: Owner | None = None) -> None:
+        """Own the line no more; `last` is what the next owner has to know."""
         if self._file is not None:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), 0)
+                if last is not None:
+                    self.tell(last)
             self._file.close()
             self._file = None
 
