@@ -313,11 +313,11 @@ async def test_what_a_lock_file_holds_keeps_nobody_out(
         assert (await lines.open("watch").read(1, 4)).words == (4,)
 
 
-@pytest.mark.parametrize("trouble", ["a file", "not to be written", "too long"])
+@pytest.mark.parametrize("trouble", ["a file", "not to be written"])
 async def test_the_next_folder_is_taken_where_the_first_takes_no_socket(
     share: Share, tmp_path: Path, trouble: str
 ) -> None:
-    first = tmp_path / ("long" * 30 if trouble == "too long" else "first")
+    first = tmp_path / "first"
     if trouble == "a file":
         first.write_text("")
     elif trouble == "not to be written":
@@ -333,10 +333,23 @@ async def test_the_next_folder_is_taken_where_the_first_takes_no_socket(
         assert [one.suffix for one in (tmp_path / "run").iterdir()] == [".sock"]
 
 
+async def test_a_path_that_is_too_long_for_a_socket_is_none_for_us(
+    share: Share, tmp_path: Path
+) -> None:
+    folder = tmp_path / ("long" * 30)
+    place = SharePlace("serial:line", tmp_path / "lines", (folder,))
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        lines.open("panel", place=place)
+        assert (await lines.open("watch", place=place).read(1, 4)).words == (4,)
+        assert [one.suffix for one in folder.iterdir()] == [".sock"]
+
+
 async def test_where_no_folder_takes_a_socket_the_line_works_unshared(
     share: Share, tmp_path: Path
 ) -> None:
-    place = SharePlace("serial:line", tmp_path / "lines", (tmp_path / ("long" * 30),))
+    (tmp_path / "file").write_text("")
+    place = SharePlace("serial:line", tmp_path / "lines", (tmp_path / "file",))
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
         line = lines.open("panel", place=place)

@@ -22,6 +22,8 @@ from .outcomes import Outcomes, with_fate
 from .patience import Devices
 from .queue import Job, JobQueue
 
+STILL = 1.0
+"""Seconds past the time-out after which an answer cannot have come just now."""
 HELD_LOOK = 0.01
 """Seconds between two looks whether requests are held back still."""
 
@@ -52,7 +54,8 @@ class Dispatcher:
         """Whether a request was sent whose end is not known yet."""
         self.held_back: Callable[[], bool] = bool
         """Whether nothing but stops may go out now: others may have sent stops meanwhile."""
-        self._left = False
+        self.left = False
+        """Whether no further request is served past the owner."""
 
     def wake(self) -> None:
         """Something changed: a request came, a late reply came, or the line was lost."""
@@ -75,9 +78,7 @@ class Dispatcher:
 
     async def all_waiting(self) -> list[Job]:
         """Take out all that waits, once something does."""
-        while not len(self._queue):
-            self._wake.clear()
-            await self._wake.wait()
+        await self.some_wait()
         return self.take_all()
 
     def take_all(self) -> list[Job]:
@@ -104,8 +105,8 @@ class Dispatcher:
                 job.fail(RequestRefused(why))
 
     def leave(self) -> None:
-        """Serve no further request; the one in flight comes to its end."""
-        self._left = True
+        """Serve no further request past the owner; the one in flight comes to its end."""
+        self.left = True
         self._wake.set()
 
     def stray(self, piece: Piece, time: float) -> None:
@@ -113,9 +114,26 @@ class Dispatcher:
         self._devices.stray(piece, time)
         self._wake.set()
 
+    async def some_wait(self) -> None:
+        """Return once something waits, or the line is left."""
+        while not len(self._queue) and not self.left:
+            self._wake.clear()
+            await self._wake.wait()
+
+    async def serve_some(self, master: Master) -> float:
+        """Send what may go out now; returns after how many seconds more may. Raises LineLost."""
+        while not self.left and len(self._queue):
+            await master.quiet()
+            now = self._clock()
+            job, ready = self._queue.take(self._not_before, now)
+            if job is None:
+                return 0.0 if ready is None else max(0.0, ready - now)
+            await self._run(master, job)
+        return 0.0
+
     async def serve(self, master: Master) -> None:
-        """Send requests until the line is lost, or left. Raises LineLost."""
-        while not self._left:
+        """Send requests until the line is lost. Raises LineLost."""
+        while True:
             self._wake.clear()
             pause: float | None = None
             if master.failure is not None:
@@ -219,8 +237,19 @@ class Dispatcher:
         self._conclude(job, result)
 
     def _conclude(self, job: Job, result: ExchangeResult) -> None:
-        if self._outcomes.conclude(job, result):
+        if self._stood_still(job, result) or self._outcomes.conclude(job, result):
             self.put_back(job)
+
+    def _stood_still(self, job: Job, result: ExchangeResult) -> bool:
+        """Whether a read is asked anew: when its answer came is not known.
+
+        This program may have been stopped in between, and the answer have waited for it.
+        """
+        if job.request.changes or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
+            return False
+        request = job.request
+        longest = self._devices.time_out(request.device, request.function, job.priority)
+        return self._clock() - result.sent > longest + STILL
 
     def _not_sent(self, job: Job, why: str) -> None:
         self.in_flight = False

@@ -7,6 +7,7 @@ import itertools
 import logging
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from pathlib import Path
 from typing import Any
 
 from ..errors import LineClosed, LineError, LineLost, NotShared, RequestRefused
@@ -48,8 +49,7 @@ from .messages import (
     request_form,
 )
 from .past_owner import PastOwner
-from .place import Owner
-from .stops_past import StopsPast
+from .place import Owner, short_path
 from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
@@ -70,7 +70,7 @@ class OwnerAway(Exception):
 class ShareClient:
     """Attached to one owner until it ends; lives in the line's loop, and is its facts' voice."""
 
-    def __init__(self, inside: LineInside, owner: Owner, say: Say, stops_past: StopsPast) -> None:
+    def __init__(self, inside: LineInside, owner: Owner, say: Say, past: PastOwner) -> None:
         self._inside = inside
         self._owner = owner
         self._say = say
@@ -82,7 +82,7 @@ class ShareClient:
         self._state: LineState | None = None
         self._note = ""
         self._wish: tuple[dict[int, float], bool] = ({}, False)
-        self._past = PastOwner(inside, stops_past)
+        self._past = past
         self.again = False
         """Whether this program was attached to the line before."""
         self.heard = inside.clock()
@@ -101,7 +101,8 @@ class ShareClient:
         Raises OwnerAway where there is none, NotShared where it takes nobody in.
         """
         try:
-            reader, writer = await asyncio.open_unix_connection(self._owner.socket)
+            with short_path(Path(self._owner.socket)) as address:
+                reader, writer = await asyncio.open_unix_connection(address)
         except (OSError, ValueError) as error:
             raise OwnerAway from error
         self._writer = writer

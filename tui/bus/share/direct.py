@@ -14,6 +14,7 @@ from ..schedule.connection import open_master
 from ..schedule.dispatcher import Dispatcher
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
+from .turn import Turn
 
 log = logging.getLogger(__name__)
 
@@ -23,8 +24,11 @@ TRY_AGAIN = 0.5
 class DirectStops:
     """Sends the stops of this program, and the reads that see their motors stop."""
 
-    def __init__(self, inside: LineInside) -> None:
+    def __init__(self, inside: LineInside, turn: Turn) -> None:
         self._inside = inside
+        self._turn = turn
+        self._echo: bool | None = None
+        """What was found out of the adapter."""
         self._stops: dict[int, dict[bytes, Job]] = {}
         """What was sent to stop each device, each frame once."""
         self._dispatcher = Dispatcher(
@@ -56,25 +60,31 @@ class DirectStops:
         return True
 
     async def _serve(self) -> None:
-        """Open the port beside its owner and serve, again and again, until it is left."""
-        inside = self._inside
+        """Serve in turns with other programs that do the same, until it is left.
+
+        The port is open in a turn only: of two that have it open, each hears a part of an answer.
+        """
         while True:
+            await self._dispatcher.some_wait()
             try:
-                master = await open_master(
-                    inside.link, inside.around, self._dispatcher.wake, alone=False
-                )
+                async with self._turn.taken():
+                    pause = await self._serve_some()
             except LineError as error:
                 log.error("a stop past the owner: %s", error)
-                await asyncio.sleep(TRY_AGAIN)
-                continue
-            try:
-                await self._dispatcher.serve(master)
+                pause = TRY_AGAIN
+            if self._dispatcher.left:
                 return
-            except LineError as error:
-                log.error("a stop past the owner: %s", error)
-                await asyncio.sleep(TRY_AGAIN)
-            finally:
-                master.close()
+            await asyncio.sleep(pause)
+
+    async def _serve_some(self) -> float:
+        inside = self._inside
+        master = await open_master(inside.link, inside.around, self._dispatcher.wake, alone=False)
+        master.echo = self._echo
+        try:
+            return await self._dispatcher.serve_some(master)
+        finally:
+            self._echo = master.echo
+            master.close()
 
     async def end(self) -> None:
         """The owner answers again: what is left goes its usual way, each stop once more.

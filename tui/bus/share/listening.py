@@ -12,7 +12,7 @@ from pathlib import Path
 
 from ..shared_facts import Program
 from .messages import VERSION
-from .place import PRIVATE_FILE, SHARED_FILE, Owner, OwnerLock, SharePlace, make_private
+from .place import PRIVATE_FILE, SHARED_FILE, Owner, OwnerLock, SharePlace, make_private, short_path
 
 log = logging.getLogger(__name__)
 
@@ -51,7 +51,8 @@ class Listening:
             path.unlink()
         listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
         try:
-            listening.bind(str(path))
+            with short_path(path) as address:
+                listening.bind(address)
             path.chmod(SHARED_FILE if shared else PRIVATE_FILE)
             if self._place.group is not None:
                 os.chown(path, -1, self._place.group)

@@ -13,16 +13,18 @@ from ..schedule.queue import Job
 from .direct import DirectStops
 from .messages import StopGiven
 from .stops_past import StopsPast
+from .turn import Turn
 
 
 class PastOwner:
     """The stops of one client past one owner; lives in the line's loop."""
 
-    def __init__(self, inside: LineInside, stops_past: StopsPast) -> None:
+    def __init__(self, inside: LineInside, stops_past: StopsPast, turn: Turn) -> None:
         self.at_work = False
         """Whether the owner is frozen."""
         self._inside = inside
         self._stops_past = stops_past
+        self._turn = turn
         self._direct: DirectStops | None = None
         self._ending: asyncio.Task[None] | None = None
         self._noted: dict[int, tuple[int, ...]] = {}
@@ -59,7 +61,7 @@ class PastOwner:
         if self._direct is None:
             if job.priority is not Priority.STOP:
                 return False
-            self._direct = DirectStops(self._inside)
+            self._direct = DirectStops(self._inside, self._turn)
         if job.priority is Priority.STOP and job.request.changes:
             self._note(job.request.device)
         return self._direct.take(job)

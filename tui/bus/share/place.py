@@ -10,7 +10,8 @@ import logging
 import os
 import re
 import stat
-from contextlib import suppress
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
@@ -22,6 +23,8 @@ from ..shared_facts import Program
 log = logging.getLogger(__name__)
 
 PRIVATE_FOLDER, PRIVATE_FILE, SHARED_FILE = 0o700, 0o600, 0o660
+LONGEST_SOCKET_PATH = 100
+OPEN_FOLDERS = Path("/proc/self/fd")
 LONGEST_LOCK = 4096
 """Bytes of a lock file that are read; ours hold some hundred."""
 
@@ -166,6 +169,22 @@ def owner_of(place: SharePlace) -> Owner | None:
             return msgspec.json.decode(file.read(LONGEST_LOCK), type=Owner)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return None
+
+
+@contextmanager
+def short_path(path: Path) -> Iterator[str]:
+    """A path to a socket that the system takes: it keeps little more than a hundred bytes for one.
+
+    A longer one leads through the open folder, where the system shows those. Raises OSError.
+    """
+    if len(os.fsencode(path)) <= LONGEST_SOCKET_PATH or not OPEN_FOLDERS.is_dir():
+        yield str(path)
+        return
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield str(OPEN_FOLDERS / str(folder) / path.name)
+    finally:
+        os.close(folder)
 
 
 def has_ended(program: Program) -> bool:

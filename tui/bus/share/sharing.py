@@ -12,9 +12,11 @@ from ..errors import NotShared
 from ..schedule.inside import LineInside
 from .client import OwnerAway, Say, ShareClient, owner_text
 from .messages import VERSION
+from .past_owner import PastOwner
 from .place import Owner, OwnerLock, SharePlace, owner_of
 from .server import ShareServer
 from .stops_past import StopsPast
+from .turn import Turn
 
 log = logging.getLogger(__name__)
 
@@ -33,7 +35,6 @@ class Sharing:
         self._place = place
         self._inside = inside
         self._lock = OwnerLock(place)
-        self._stops_past = StopsPast(place)
         self._attached = False
         self._server: ShareServer | None = None
         self._client: ShareClient | None = None
@@ -83,7 +84,8 @@ class Sharing:
 
     async def _attend(self, owner: Owner, say: Say) -> None:
         """Be a client of an owner until it ends."""
-        self._client = client = ShareClient(self._inside, owner, say, self._stops_past)
+        past = PastOwner(self._inside, StopsPast(self._place), Turn(self._place))
+        self._client = client = ShareClient(self._inside, owner, say, past)
         client.again, self._attached = self._attached, True
         try:
             await client.serve()

@@ -127,11 +127,13 @@ class StoppableDrive:
 
 async def _wanted(opened: OpenLine, target: Target) -> StoppableDrive:
     """The wanted drive; raises UsageError where it is not known what stops it."""
+    from tui.bus.api import Priority
     from tui.drive.profile import library
     from tui.session.connect.identify import identify_drive
 
     if target.profile_id is None:
-        identity = await identify_drive(opened.line, target.device)
+        # what a stop needs to know comes before all polls, and past a frozen owner of the line
+        identity = await identify_drive(opened.line, target.device, priority=Priority.STOP)
         found = await asyncio.to_thread(_session, opened, identity, None)
         if found is None:
             raise unidentified(identity)
@@ -236,11 +238,14 @@ async def _found(
 
     Raises Failure where it cannot be stopped, and why.
     """
-    from tui.bus.api import Priority
+    from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import LineError, NoAnswer
     from tui.session.connect.identify import identify_drive
 
     priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
+    if opened.line.state.status is LineStatus.LOST:
+        # the program that owns the line is frozen: nothing else goes past it
+        priority = Priority.STOP
     try:
         identity = await identify_drive(opened.line, device, priority=priority)
     except NoAnswer:

@@ -12,6 +12,7 @@ import click
 
 from .looking_after import look_after
 from .say import say
+from .signals import cleaned_up
 
 if TYPE_CHECKING:
     from tui.bus.link import UsualSettings
@@ -125,14 +126,14 @@ def on_line(
     if opened.line.facts.voice is not None and opened.line.facts.others:
         say(f"drivepanel: {opened.line.state.reason}", err=True)
     look_after(opened.line)
-    try:
-        return asyncio.run(work(opened))
-    except NoAnswer as error:
-        if not (hint := _about_silence(opened, text, usual is not None)):
-            raise
-        raise NoAnswer(error.device, error.function, error.address, f"{error} {hint}") from error
-    finally:
-        opened.close()
+    with cleaned_up(opened.close):
+        try:
+            return asyncio.run(work(opened))
+        except NoAnswer as error:
+            if not (hint := _about_silence(opened, text, usual is not None)):
+                raise
+            told = f"{error} {hint}"
+            raise NoAnswer(error.device, error.function, error.address, told) from error
 
 
 def _usual_settings(profile_id: str | None) -> UsualSettings | None:

@@ -6,7 +6,7 @@ import logging
 import os
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 from typing import Protocol
@@ -55,3 +55,37 @@ def ending_by_signal(panel: Stoppable, *, stop: bool) -> Iterator[None]:
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+class _Ended(BaseException):
+    """A signal ends the command."""
+
+
+@contextmanager
+def cleaned_up(clean_up: Callable[[], object]) -> Iterator[None]:
+    """Clean up whatever ends what is inside, SIGHUP and SIGTERM too, which then end the program.
+
+    Others on the line would else take a program that was ended for one that was killed.
+    """
+
+    def end(number: int, _frame: FrameType | None) -> None:
+        raise _Ended(number)
+
+    before = {}
+    if threading.current_thread() is threading.main_thread():
+        numbers = [getattr(signal, name) for name in NAMES if hasattr(signal, name)]
+        # what the program was started to ignore (nohup) stays ignored
+        ours = [one for one in numbers if signal.getsignal(one) == signal.SIG_DFL]
+        before = {number: signal.signal(number, end) for number in ours}
+    ended_by: int | None = None
+    try:
+        yield
+    except _Ended as ended:
+        (ended_by,) = ended.args
+    finally:
+        # a second one ends the program at once
+        for number, handler in before.items():
+            signal.signal(number, handler)
+        clean_up()
+    if ended_by is not None:
+        os.kill(os.getpid(), ended_by)
