@@ -15,7 +15,7 @@ from pathlib import Path
 
 from tui.bus.line import Line
 from tui.bus.link import SerialLink
-from tui.bus.shared_facts import Program
+from tui.bus.program import Program
 
 from .conftest import WIDE
 from .sharing import QUICK, place_in

@@ -14,8 +14,8 @@ from pathlib import Path
 
 from tui.bus.line import Line, Timing
 from tui.bus.link import Link
+from tui.bus.program import Program
 from tui.bus.share.place import SharePlace
-from tui.bus.shared_facts import Program
 
 from .conftest import WIDE
 from .peer import eventually

@@ -6,19 +6,20 @@ import asyncio
 import os
 import stat
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 import pytest
 
 from tui.bus.api import LineStatus, Priority
-from tui.bus.errors import DeviceException, RequestRefused
+from tui.bus.errors import DeviceException, LineBusy, RequestRefused
 from tui.bus.share.place import SharePlace
 from tui.wire.frames import frame
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
-from .sharing import place_in
+from .sharing import QUICK, place_in
 
 
 def slow(request: bytes, _count: int) -> Sequence[Step]:
@@ -81,6 +82,23 @@ async def test_one_exchange_is_in_flight_and_the_priorities_hold_across_programs
         assert order[:3] == [(3, 1), (6, 40), (6, 30)]
         # a next request that runs into the one before would be read at once with it
         assert [len(one) for one in peer.bursts] == [8] * len(order)
+
+
+async def test_a_program_that_asks_for_too_much_takes_no_room_from_the_others(
+    share: Share,
+) -> None:
+    with PtyPeer(slow) as peer:
+        lines = share(peer.path)
+        few = replace(QUICK, queue_length=8)
+        owner, other = lines.open("panel", timing=few), lines.open("scan", timing=few)
+        reading = asyncio.create_task(owner.read(1, 1))
+        await asyncio.to_thread(peer.await_requests, 1)
+        many = [asyncio.create_task(other.read(1, 20 + number)) for number in range(6)]
+        await asyncio.sleep(0.05)
+        assert (await owner.read(1, 2)).words == (2,)
+        await reading
+        results = await asyncio.gather(*many, return_exceptions=True)
+        assert sum(isinstance(one, LineBusy) for one in results) == 2
 
 
 async def test_who_waits_no_more_is_not_asked_for(share: Share) -> None:

@@ -17,9 +17,9 @@ import pytest
 from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineClosed, LineLost, NotShared
 from tui.bus.line import Line
+from tui.bus.program import Program
 from tui.bus.share.messages import VERSION, AnyMessage, Hello, Told, TurnedAway, packed, unpacked
 from tui.bus.share.place import Owner, OwnerLock
-from tui.bus.shared_facts import Program
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
@@ -221,7 +221,7 @@ def ask(**fields: object) -> bytes:
         "number": 1, "kind": "Read", "fields": {"device": 1, "address": 1, "count": 1},
         "priority": 4, "replaceable": False, "max_age": 0.0, "stamp": 0, "asked": 0.0,
     }  # fmt: skip
-    data = msgspec.msgpack.encode({"type": "Ask", **asked, **fields})
+    data = msgspec.msgpack.encode({"type": "Asking", **asked, **fields})
     return len(data).to_bytes(4, "big") + data
 
 

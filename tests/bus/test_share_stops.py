@@ -12,9 +12,9 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.errors import LineError, LineLost, RequestRefused
 from tui.bus.line import Line
+from tui.bus.program import Program
 from tui.bus.share.messages import StopGiven
 from tui.bus.share.stops_past import StopsPast
-from tui.bus.shared_facts import Program
 from tui.bus.stop_counts import StopCounts
 
 from .conftest import Share

@@ -14,7 +14,7 @@ import pytest
 from tests.bus.peer import eventually
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink, label
-from tui.bus.shared_facts import Program
+from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession

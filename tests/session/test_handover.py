@@ -11,7 +11,7 @@ import pytest
 
 from tests.bus.peer import eventually
 from tui.bus.fake import FakeLine
-from tui.bus.shared_facts import Program
+from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR, CommandedElsewhere
 from tui.session.drive import DriveSession

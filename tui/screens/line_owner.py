@@ -15,7 +15,7 @@ from tui.terminal.loop import soon_in_loop
 from .app_port import Panel
 
 if TYPE_CHECKING:
-    from tui.bus.shared_facts import Program
+    from tui.bus.program import Program
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet

@@ -22,8 +22,6 @@ from .outcomes import Outcomes, with_fate
 from .patience import Devices
 from .queue import Job, JobQueue
 
-STILL = 1.0
-"""Seconds past the time-out after which an answer cannot have come just now."""
 HELD_LOOK = 0.01
 """Seconds between two looks whether requests are held back still."""
 
@@ -96,7 +94,7 @@ class Dispatcher:
 
     def void_older(self, than: float, why: str) -> None:
         """Refuse what waits to change anything since before a moment, but for stops."""
-        self._refuse(lambda job: why if is_command(job) and job.asked < than else "")
+        self._refuse(lambda job: why if job.commands and job.asked < than else "")
 
     def _refuse(self, reason: Callable[[Job], str]) -> None:
         for job in self._queue.waiting():
@@ -189,7 +187,7 @@ class Dispatcher:
 
     def refusal(self, job: Job) -> str:
         """Why a write must not go out: a stop came after it, or another program commands."""
-        if not is_command(job) or not job.program:
+        if not job.commands or not job.program:
             return ""
         return self.facts.refusal(job.program, job.request.device, job.stamp)
 
@@ -237,19 +235,8 @@ class Dispatcher:
         self._conclude(job, result)
 
     def _conclude(self, job: Job, result: ExchangeResult) -> None:
-        if self._stood_still(job, result) or self._outcomes.conclude(job, result):
+        if self._outcomes.waited_for_us(job, result) or self._outcomes.conclude(job, result):
             self.put_back(job)
-
-    def _stood_still(self, job: Job, result: ExchangeResult) -> bool:
-        """Whether a read is asked anew: when its answer came is not known.
-
-        This program may have been stopped in between, and the answer have waited for it.
-        """
-        if job.request.changes or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
-            return False
-        request = job.request
-        longest = self._devices.time_out(request.device, request.function, job.priority)
-        return self._clock() - result.sent > longest + STILL
 
     def _not_sent(self, job: Job, why: str) -> None:
         self.in_flight = False
@@ -317,8 +304,3 @@ class Dispatcher:
 
 class _NotSent(Exception):
     """A request was held back at the last moment, for a reason or for a while."""
-
-
-def is_command(job: Job) -> bool:
-    """Whether a request changes anything and is no stop: a stop voids it."""
-    return job.request.changes and job.priority is not Priority.STOP

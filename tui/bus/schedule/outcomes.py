@@ -19,6 +19,8 @@ from .shared_values import SharedValues
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""
 UNKNOWN_FATE = " Whether it was taken is not known; read the register back before trying again."
+STILL = 1.0
+"""Seconds past the time-out after which an answer cannot have come just now."""
 REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL))
 
 
@@ -43,6 +45,17 @@ class Outcomes:
         self._clock = clock
         self._facts = facts
         self._gateway = gateway
+
+    def waited_for_us(self, job: Job, result: ExchangeResult) -> bool:
+        """Whether a read is asked anew: when its answer came is not known.
+
+        This program may have been stopped in between, and the answer have waited for it.
+        """
+        if job.request.changes or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
+            return False
+        request = job.request
+        longest = self._devices.time_out(request.device, request.function, job.priority)
+        return self._clock() - result.sent > longest + STILL
 
     def conclude(self, job: Job, result: ExchangeResult) -> bool:
         """Note what became of a request, and hand it back; True where it is to be sent again."""

@@ -49,6 +49,11 @@ class Job:
         if self.request.device != BROADCAST:
             self.expectation = self.request.expectation()
 
+    @property
+    def commands(self) -> bool:
+        """Whether it changes anything and is no stop: a stop voids it."""
+        return self.request.changes and self.priority is not Priority.STOP
+
     def fail(self, error: LineError) -> None:
         """Hand back an error, unless the one who asked has gone."""
         if self.begun or self.answer.set_running_or_notify_cancel():
@@ -74,7 +79,8 @@ class JobQueue:
     def put(self, job: Job) -> None:
         """Queue a job. Raises LineBusy when the queue is full.
 
-        A stop always finds room; polls and background work leave half of it to the operator.
+        Each program that shares the line has as much room: none takes it from the others. A stop
+        always finds some; polls and background work leave half of it to the operator.
         """
         if job.replaceable and (older := self._replaced_by(job)) is not None:
             self._jobs.remove(older)
@@ -83,8 +89,9 @@ class JobQueue:
             self._jobs.append(job)
             return
         room = self._length if job.priority < Priority.POLL else self._length // 2
-        if job.priority is not Priority.STOP and len(self._jobs) >= room:
-            raise LineBusy(f"{len(self._jobs)} requests wait for the line already; try again.")
+        waiting = sum(one.program == job.program for one in self._jobs)
+        if job.priority is not Priority.STOP and waiting >= room:
+            raise LineBusy(f"{waiting} requests wait for the line already; try again.")
         job.order = next(self._orders)
         self._jobs.append(job)
 

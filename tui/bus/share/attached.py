@@ -4,17 +4,34 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from concurrent.futures import Future
 from dataclasses import dataclass, field
+from functools import partial
 
-from ..limits import Limits
-from ..model import DeviceState
+from ..errors import RequestRefused
+from ..limits import CAUTIOUS, Limits
+from ..model import DeviceState, Reply
+from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from ..shared_facts import Program
-from .messages import AnyMessage, News, packed
+from .failures import failure_of
+from .lease import TOO_LATE, stood_still
+from .messages import (
+    Answer,
+    AnyMessage,
+    Asking,
+    Failed,
+    News,
+    NoMessage,
+    asked_request,
+    packed,
+    priority_of,
+)
 
 log = logging.getLogger(__name__)
 
+MOST_ASKED = 256
+"""Requests of one client that may wait."""
 MOST_UNREAD = 1 << 20
 """Bytes that a client may leave unread; one that stalls is let go, and may come back."""
 FRAMES_TOLD = 200
@@ -46,6 +63,33 @@ class Client:
             transport.abort()
             return
         self.writer.write(packed(message))
+
+    def ask(self, inside: LineInside, message: Asking) -> None:
+        """It asks for something on the line. Raises NoMessage."""
+        if len(self.asked) >= MOST_ASKED:
+            raise NoMessage("too many requests at once")
+        request, priority = asked_request(message), priority_of(message.priority)
+        limits = message.limits or self.limits.get(request.device, CAUTIOUS)
+        job = Job(request, priority, limits, replaceable=message.replaceable)
+        job.program, job.stamp = self.program.id, message.stamp
+        job.max_age, job.asked = message.max_age, message.asked
+        self.asked[message.number] = job
+        job.answer.add_done_callback(partial(self._answered, message.number))
+        late = inside.clock() - message.asked
+        if job.commands and late > TOO_LATE:
+            job.fail(RequestRefused(stood_still(late)))
+        else:
+            inside.submit(job)
+
+    def _answered(self, number: int, answer: Future[Reply]) -> None:
+        if self.asked.pop(number, None) is None or answer.cancelled():
+            return
+        error = answer.exception()
+        if error is not None:
+            self.say(Failed(number, *failure_of(error)))
+        else:
+            reply = answer.result()
+            self.say(Answer(number, reply.pdu, reply.time))
 
     def withdraw(self, number: int) -> None:
         """It does not wait for a request any more."""

@@ -3,50 +3,43 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import LineClosed, LineError, LineLost, NotShared, RequestRefused
+from ..errors import LineError, NotShared
 from ..link import label
-from ..model import LineState, LineStatus, Priority
-from ..requests import BROADCAST
+from ..model import LineState, LineStatus
+from ..program import Program
 from ..schedule.inside import LineInside
-from ..schedule.queue import Job
-from ..shared_facts import Program
 from ..trace import Frame
-from .failures import error_of
+from .asked import RequestsAsked
 from .lease import SILENT_OWNER
 from .messages import (
     VERSION,
     Answer,
     AnyMessage,
-    Ask,
+    AskedFor,
     Claim,
     Denied,
-    Describe,
     Facts,
     Failed,
     Goodbye,
+    Granting,
     Hello,
     Here,
     News,
     NoMessage,
-    Question,
-    Reply,
+    PollWish,
     RollCall,
     StopGiven,
     Told,
     TurnedAway,
     Welcome,
-    Wish,
-    Withdraw,
     next_message,
     packed,
-    request_form,
 )
 from .past_owner import PastOwner
 from .place import Owner, short_path
@@ -54,11 +47,9 @@ from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
 
-LOOK_INTERVAL = 0.1
+WATCH_INTERVAL = 0.1
 WAITED_ENOUGH = 5.0
 """Seconds that a request waits for a frozen owner before it is told so."""
-ENDED = "The program that owned the line ended"
-FATE = " Whether it was taken is not known; read the register back before trying again."
 
 Say = Callable[[LineStatus, str], None]
 
@@ -76,9 +67,7 @@ class ShareClient:
         self._say = say
         self._loop = asyncio.get_running_loop()
         self._writer: asyncio.StreamWriter | None = None
-        self._numbers = itertools.count(1)
-        self._asked: dict[int, Job] = {}
-        self._described: dict[int, object] = {}
+        self._asked = RequestsAsked(inside, past, self._tell)
         self._state: LineState | None = None
         self._note = ""
         self._wish: tuple[dict[int, float], bool] = ({}, False)
@@ -116,7 +105,7 @@ class ShareClient:
             await self._past.end()
             with suppress(OSError, RuntimeError):
                 writer.close()
-            self._give_up_asked(closing=closing)
+            self._asked.give_up_all(closing=closing)
 
     async def _until_one_ends(self, *works: Coroutine[Any, Any, None]) -> None:
         """Do several things at once until one of them ends; its error is raised."""
@@ -187,82 +176,7 @@ class ShareClient:
         dispatcher = self._inside.dispatcher
         while True:
             for job in await dispatcher.all_waiting():
-                self._send(job)
-
-    def _send(self, job: Job) -> None:
-        if job.answer.cancelled():
-            return
-        request = job.request
-        if why := self._inside.dispatcher.forbidden(job):
-            job.fail(RequestRefused(why))
-            return
-        if self._past.take(job):
-            return
-        self._describe(request.device, job)
-        kind, fields = request_form(request)
-        number = next(self._numbers)
-        self._asked[number] = job
-        job.answer.add_done_callback(lambda answer: self._withdrawn(number, answer.cancelled()))
-        limits = job.limits if request.device == BROADCAST else None
-        self._tell(
-            Ask(
-                number, kind, fields, int(job.priority), job.replaceable, job.max_age,
-                job.stamp, job.asked, limits,
-            )
-        )  # fmt: skip
-
-    def _describe(self, device: int, job: Job) -> None:
-        if device != BROADCAST and self._described.get(device) is not job.limits:
-            self._described[device] = job.limits
-            self._tell(Describe(device, job.limits))
-
-    def _withdrawn(self, number: int, cancelled: bool) -> None:
-        """Called in any thread: nobody waits for the answer any more."""
-        if cancelled:
-            with suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._withdraw, number)
-
-    def _withdraw(self, number: int) -> None:
-        if self._asked.pop(number, None) is not None:
-            self._tell(Withdraw(number))
-
-    def _answered(self, message: Answer | Failed) -> None:
-        job = self._asked.pop(message.number, None)
-        if job is None or not (job.begun or job.answer.set_running_or_notify_cancel()):
-            return
-        job.begun = True
-        if isinstance(message, Answer):
-            self._inside.devices[job.request.device].heard = message.time
-            job.finish(message.pdu, message.time)
-        else:
-            self._failed(job, message)
-
-    def _failed(self, job: Job, message: Failed) -> None:
-        if message.error == "LineClosed":
-            # the owner's end is not this program's
-            self._give_up(job, sent=FATE in message.form.text)
-        else:
-            job.fail(error_of(message.error, message.form))
-
-    def _give_up_asked(self, *, closing: bool) -> None:
-        asked, self._asked = self._asked, {}
-        for job in asked.values():
-            if closing and job.request.changes:
-                job.fail(LineClosed(f"The line was closed during the request.{FATE}"))
-            else:
-                self._give_up(job, sent=True)
-
-    def _give_up(self, job: Job, *, sent: bool) -> None:
-        """The owner ended before it answered: a read is asked anew, a write never is.
-
-        A stop is sent again: it may have got lost, and does no harm twice.
-        """
-        if not job.request.changes or job.priority is Priority.STOP:
-            if not job.answer.cancelled():
-                self._inside.dispatcher.put_back(job)
-            return
-        text = f"{ENDED} during the request.{FATE}" if sent else f"{ENDED}; this was not sent."
-        job.fail(LineLost(text))
+                self._asked.send(job)
 
     # An owner that is frozen
 
@@ -271,17 +185,17 @@ class ShareClient:
         looks = 0
         heard = self.heard
         while True:
-            await asyncio.sleep(LOOK_INTERVAL)
+            await asyncio.sleep(WATCH_INTERVAL)
             inside = self._inside
             wish = inside.pace.own, inside.around.trace.looked_at
             if wish != self._wish:
                 self._wish = wish
-                self._tell(Wish(*wish))
+                self._tell(PollWish(*wish))
             # by looks, too: where this program got no time to look, the owner may be well
             looks = looks + 1 if heard == self.heard else 0
             heard = self.heard
             silent = inside.clock() - heard
-            if not self.frozen and silent > SILENT_OWNER and looks >= SILENT_OWNER / LOOK_INTERVAL:
+            if not self.frozen and silent > SILENT_OWNER and looks >= SILENT_OWNER / WATCH_INTERVAL:
                 self._freeze()
             if self.frozen:
                 self._help_stops(silent)
@@ -303,19 +217,12 @@ class ShareClient:
 
     def _help_stops(self, silent: float) -> None:
         """Send stops past the frozen owner; tell others that they wait in vain."""
-        for number, job in list(self._asked.items()):
-            if self._past.take(job):
-                self._withdraw(number)
+        self._asked.send_past()
         for job in self._inside.dispatcher.take_all():
-            self._send(job)
-        if silent < SILENT_OWNER + WAITED_ENOUGH:
-            return
-        for number, job in list(self._asked.items()):
-            if self._inside.clock() - job.asked > WAITED_ENOUGH and not job.answer.done():
-                self._withdraw(number)
-                fate = FATE if job.request.changes else ""
-                text = f"{self._owner.program.text} owns the line and does not answer.{fate}"
-                job.fail(LineLost(text))
+            self._asked.send(job)
+        if silent > SILENT_OWNER + WAITED_ENOUGH:
+            text = f"{self._owner.program.text} owns the line and does not answer."
+            self._asked.give_up_older(self._inside.clock() - WAITED_ENOUGH, text)
 
     # What the owner says
 
@@ -323,7 +230,7 @@ class ShareClient:
         facts, inside = self._inside.facts, self._inside
         match message:
             case Answer() | Failed():
-                self._answered(message)
+                self._asked.answered(message)
             case News():
                 self._hear_news(message)
             case Facts():
@@ -340,9 +247,9 @@ class ShareClient:
             case Denied(device=device, holder=holder):
                 facts.note_commander(device, holder.id)
                 facts.hear_denied(device, f"Drive {device} is commanded by {holder.text}.")
-            case Question(device=device, program=program):
+            case AskedFor(device=device, program=program):
                 facts.hear_question(device, program)
-            case Reply(device=device, yes=yes, why=why):
+            case Granting(device=device, yes=yes, why=why):
                 facts.hear_reply(device, why, yes=yes)
             case _:
                 log.error("the owner says %s", type(message).__name__)

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 
-from ..shared_facts import Program, SharedFacts, commanded_by
+from ..program import Program
+from ..shared_facts import SharedFacts, commanded_by
 from .attached import Client
-from .messages import Claim, Denied, Question, Reply
+from .messages import AskedFor, Claim, Denied, Granting
 
 
 class Commanding:
@@ -43,9 +44,9 @@ class Commanding:
         if holder == facts.me.id:
             facts.hear_question(device, program)
         elif holder is not None and (client := self._clients.get(holder)) is not None:
-            client.say(Question(device, program))
+            client.say(AskedFor(device, program))
 
-    def replied(self, program: Program, reply: Reply) -> None:
+    def replied(self, program: Program, reply: Granting) -> None:
         """Hand an answer on to the program that asked; a yes frees the device."""
         facts = self._facts
         if reply.yes and facts.commanders.get(reply.device) == program.id:
@@ -55,4 +56,4 @@ class Commanding:
         if reply.program == facts.me.id:
             facts.hear_reply(reply.device, why, yes=reply.yes)
         elif (client := self._clients.get(reply.program)) is not None:
-            client.say(Reply(reply.device, reply.program, reply.yes, why))
+            client.say(Granting(reply.device, reply.program, reply.yes, why))

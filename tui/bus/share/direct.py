@@ -18,7 +18,7 @@ from .turn import Turn
 
 log = logging.getLogger(__name__)
 
-TRY_AGAIN = 0.5
+PORT_AGAIN = 0.5
 
 
 class DirectStops:
@@ -71,7 +71,7 @@ class DirectStops:
                     pause = await self._serve_some()
             except LineError as error:
                 log.error("a stop past the owner: %s", error)
-                pause = TRY_AGAIN
+                pause = PORT_AGAIN
             if self._dispatcher.left:
                 return
             await asyncio.sleep(pause)

@@ -14,6 +14,9 @@ SILENT_OWNER = 1.0
 LEASE = 0.7
 """Seconds from its last sign of life in which an owner may send; the rest is for one exchange."""
 
+TOO_LATE = 2.0
+"""Seconds after which a command is not sent any more: nobody expects it now."""
+
 
 class Lease:
     """When the owner last gave a sign of life to all; for any thread."""
@@ -35,3 +38,8 @@ class Lease:
     def renew(self, said: float) -> None:
         """All were told at a moment that this program is well, and it knows what they did."""
         self._said = said
+
+
+def stood_still(seconds: float) -> str:
+    """Why a command is not sent, for a person."""
+    return f"Not sent: the program that owns the line stood still for {seconds:.0f} s."

@@ -10,19 +10,19 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ..shared_facts import Program
+from ..program import Program
 from .messages import VERSION
 from .place import PRIVATE_FILE, SHARED_FILE, Owner, OwnerLock, SharePlace, make_private, short_path
 
 log = logging.getLogger(__name__)
 
-Welcome = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+TakeIn = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 
 
 class Listening:
     """Listens for programs of one line; lives in the line's loop."""
 
-    def __init__(self, place: SharePlace, lock: OwnerLock, me: Program, welcome: Welcome) -> None:
+    def __init__(self, place: SharePlace, lock: OwnerLock, me: Program, welcome: TakeIn) -> None:
         self._place = place
         self._lock = lock
         self._me = me

@@ -13,13 +13,13 @@ import msgspec
 
 from ..limits import Limits
 from ..model import DeviceState, LineCounters, LineState, Priority
+from ..program import Program
 from ..requests import Diagnose, Identify, Read, ReadInput, ReadWrite, Request, WriteMany, WriteOne
-from ..shared_facts import Program
 from .failures import ErrorForm
 
 VERSION = 1
 """Of the messages; programs of different versions do not share a line."""
-LONGEST = 1 << 18
+LONGEST_MESSAGE = 1 << 18
 """Bytes of one message; more is no message of ours."""
 LENGTH = 4
 
@@ -62,7 +62,7 @@ class Describe(Message, frozen=True):
     limits: Limits
 
 
-class Ask(Message, frozen=True):
+class Asking(Message, frozen=True):
     """A request for the line."""
 
     number: int
@@ -137,15 +137,15 @@ class Denied(Message, frozen=True):
     holder: Program
 
 
-class Question(Message, frozen=True):
+class AskedFor(Message, frozen=True):
     """A program asks the one that commands a device to leave it."""
 
     device: int
     program: Program
 
 
-class Reply(Message, frozen=True):
-    """The answer to a Question, to `program`."""
+class Granting(Message, frozen=True):
+    """The answer to a AskedFor, to `program`."""
 
     device: int
     program: str
@@ -160,7 +160,7 @@ class Told(Message, frozen=True):
     text: str
 
 
-class Wish(Message, frozen=True):
+class PollWish(Message, frozen=True):
     """The share of the line's time that a program's polls take, by device.
 
     `trace` where it shows frames.
@@ -199,8 +199,9 @@ class Goodbye(Message, frozen=True):
 
 
 AnyMessage = (
-    Hello | Welcome | TurnedAway | Describe | Ask | Withdraw | Answer | Failed | StopGiven | Claim
-    | RollCall | Here | Denied | Question | Reply | Told | Wish | Facts | News | Goodbye
+    Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
+    | Claim | RollCall | Here | Denied | AskedFor | Granting | Told | PollWish | Facts | News
+    | Goodbye
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()
@@ -225,7 +226,7 @@ def packed(message: AnyMessage) -> bytes:
 async def next_message(reader: asyncio.StreamReader) -> AnyMessage:
     """The next message. Raises NoMessage, EOFError where the other end is gone, OSError."""
     length = int.from_bytes(await reader.readexactly(LENGTH), "big")
-    if length > LONGEST:
+    if length > LONGEST_MESSAGE:
         raise NoMessage(f"{length} bytes")
     return unpacked(await reader.readexactly(length))
 
@@ -250,7 +251,7 @@ def request_form(request: Request) -> tuple[str, dict[str, Any]]:
     return type(request).__name__, msgspec.to_builtins(request, builtin_types=(bytes,))
 
 
-def request_of(message: Ask) -> Request:
+def asked_request(message: Asking) -> Request:
     """The request that a message carries. Raises NoMessage."""
     kind = KINDS.get(message.kind)
     if kind is None:

@@ -9,7 +9,9 @@ import hashlib
 import logging
 import os
 import re
+import socket
 import stat
+import struct
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
@@ -18,7 +20,7 @@ from typing import IO
 
 import msgspec
 
-from ..shared_facts import Program
+from ..program import Program
 
 log = logging.getLogger(__name__)
 
@@ -196,3 +198,12 @@ def has_ended(program: Program) -> bool:
     except (OSError, OverflowError):
         return False
     return False
+
+
+def user_of(peer: socket.socket) -> int | None:
+    """The number of the user at the other end of a local socket; None where it is not told."""
+    try:
+        found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    except (AttributeError, OSError):
+        return None
+    return int(struct.unpack("3i", found)[1])

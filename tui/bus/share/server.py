@@ -5,61 +5,46 @@ from __future__ import annotations
 import asyncio
 import logging
 import os
-import socket
-import struct
-from concurrent.futures import Future
 from contextlib import suppress
-from functools import partial
 
-from ..errors import RequestRefused
 from ..limits import CAUTIOUS
 from ..link import label
-from ..model import Reply as LineReply
-from ..schedule.dispatcher import is_command
+from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.pace import greatest
-from ..schedule.queue import Job
-from ..shared_facts import Program
 from .attached import Client
 from .commanding import Commanding
-from .failures import failure_of
 from .listening import Listening
 from .messages import (
     VERSION,
-    Answer,
     AnyMessage,
-    Ask,
+    AskedFor,
+    Asking,
     Claim,
     Describe,
     Facts,
-    Failed,
     Goodbye,
+    Granting,
     Hello,
     Here,
     News,
     NoMessage,
-    Question,
-    Reply,
+    PollWish,
     StopGiven,
     Told,
     TurnedAway,
     Welcome,
-    Wish,
     Withdraw,
     next_message,
     packed,
-    priority_of,
-    request_of,
 )
-from .place import OwnerLock, SharePlace, has_ended
-from .signs import STALE, SignsOfLife, stood_still
+from .place import OwnerLock, SharePlace, has_ended, user_of
+from .signs import SignsOfLife
 from .stops_past import StopsPast
 from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
 
-MOST_ASKED = 256
-"""Requests of one client that may wait."""
 HELLO_WITHIN = 2.0
 BACK_WITHIN = 2.0
 """Seconds in which the programs of an owner before come back, unless they are gone, too."""
@@ -178,7 +163,11 @@ class ShareServer:
 
     def _may_attach(self, writer: asyncio.StreamWriter) -> bool:
         """Whether the user at the other end may share the line: the socket's mode, twice."""
-        return self._group is not None or user_of(writer) in (os.getuid(), 0, None)
+        return self._group is not None or user_of(writer.get_extra_info("socket")) in (
+            os.getuid(),
+            0,
+            None,
+        )
 
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
@@ -228,15 +217,15 @@ class ShareServer:
 
     def _hear(self, client: Client, message: AnyMessage) -> None:
         match message:
-            case Ask():
-                self._ask(client, message)
+            case Asking():
+                client.ask(self._inside, message)
             case Withdraw(number=number):
                 client.withdraw(number)
             case Describe(device=device, limits=limits):
                 client.limits[device] = limits
                 if self._inside.devices[device].limits is CAUTIOUS:
                     self._inside.devices.describe(device, limits)
-            case Wish(shares=shares, trace=trace):
+            case PollWish(shares=shares, trace=trace):
                 client.shares, client.trace = shares, trace
                 self._inside.pace.others = self._wishes()
             case Here(number=number):
@@ -250,41 +239,15 @@ class ShareServer:
                 self._stopped(message)
             case Claim():
                 self._commanding.claimed(client.program, message)
-            case Question(device=device):
+            case AskedFor(device=device):
                 self._commanding.asked_for(client.program, device)
-            case Reply():
+            case Granting():
                 self._commanding.replied(client.program, message)
             case Told(device=device, text=text):
                 self._inside.facts.hear_text(device, text)
                 self._tell_all(message, but=client.program.id)
             case _:
                 raise NoMessage(type(message).__name__)
-
-    def _ask(self, client: Client, message: Ask) -> None:
-        if len(client.asked) >= MOST_ASKED:
-            raise NoMessage("too many requests at once")
-        request, priority = request_of(message), priority_of(message.priority)
-        limits = message.limits or client.limits.get(request.device, CAUTIOUS)
-        job = Job(request, priority, limits, replaceable=message.replaceable)
-        job.program, job.stamp = client.program.id, message.stamp
-        job.max_age, job.asked = message.max_age, message.asked
-        client.asked[message.number] = job
-        job.answer.add_done_callback(partial(self._answered, client, message.number))
-        late = self._inside.clock() - message.asked
-        if is_command(job) and late > STALE:
-            job.fail(RequestRefused(stood_still(late)))
-        else:
-            self._inside.submit(job)
-
-    def _answered(self, client: Client, number: int, answer: Future[LineReply]) -> None:
-        if client.asked.pop(number, None) is None or answer.cancelled():
-            return
-        error = answer.exception()
-        if error is not None:
-            client.say(Failed(number, *failure_of(error)))
-        else:
-            reply = answer.result()
-            client.say(Answer(number, reply.pdu, reply.time))
 
     # What this program says
 
@@ -300,9 +263,9 @@ class ShareServer:
                 self._tell_stop(message)
             case Claim():
                 self._tell_facts()
-            case Question(device=device):
+            case AskedFor(device=device):
                 self._commanding.asked_for(me, device)
-            case Reply():
+            case Granting():
                 self._commanding.replied(me, message)
             case _:
                 self._tell_all(message)
@@ -345,13 +308,3 @@ class ShareServer:
     def _news_for(self, client: Client) -> News:
         shares = greatest(self._inside.pace.own, self._wishes(but=client))
         return client.news(self._inside, shares)
-
-
-def user_of(writer: asyncio.StreamWriter) -> int | None:
-    """The number of the user at the other end of a local socket; None where it is not told."""
-    peer = writer.get_extra_info("socket")
-    try:
-        found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
-    except (AttributeError, OSError):
-        return None
-    return int(struct.unpack("3i", found)[1])

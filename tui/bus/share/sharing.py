@@ -20,7 +20,7 @@ from .turn import Turn
 
 log = logging.getLogger(__name__)
 
-LOOK_INTERVAL = 0.02
+OWNER_INTERVAL = 0.02
 """Seconds between two looks for an owner that is just beginning, or has just ended."""
 LONGEST_QUIET = 30.0
 """Seconds that a line is left quiet at most, should a lock file tell of a later time."""
@@ -79,7 +79,7 @@ class Sharing:
                     raise NotShared(
                         f"{owner_text(owner)} holds the line and cannot be reached. Close it."
                     ) from None
-                await asyncio.sleep(LOOK_INTERVAL)
+                await asyncio.sleep(OWNER_INTERVAL)
         await self._begin(served)
 
     async def _attend(self, owner: Owner, say: Say) -> None:

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Collection
 
 from ..schedule.inside import LineInside
 from .attached import Client
-from .lease import Lease
+from .lease import TOO_LATE, Lease, stood_still
 from .messages import RollCall, StopGiven
 from .stops_past import StopsPast
 
@@ -16,8 +16,6 @@ log = logging.getLogger(__name__)
 
 NEWS_INTERVAL = 0.2
 """Seconds between the owner's signs of life."""
-STALE = 2.0
-"""Seconds after which a command is not sent any more: nobody expects it now."""
 ROLL_TAKES_IN, ROLL_TURNS = 0.05, 20
 """Seconds, and turns of the loop, for programs that wait to be taken in."""
 ROLL_WITHIN, ROLL_LOOK = 0.5, 0.005
@@ -83,8 +81,8 @@ class SignsOfLife:
         """
         stood = self._lease.stood
         log.warning("%s", stood_still(stood))
-        if stood > STALE:
-            self._inside.dispatcher.void_older(self._inside.clock() - STALE, stood_still(stood))
+        if stood > TOO_LATE:
+            self._inside.dispatcher.void_older(self._inside.clock() - TOO_LATE, stood_still(stood))
         for _ in range(ROLL_TURNS):
             await asyncio.sleep(ROLL_TAKES_IN / ROLL_TURNS)
         self._rolls += 1
@@ -101,8 +99,3 @@ class SignsOfLife:
 
     def _all_present(self) -> bool:
         return all(one.present >= self._rolls for one in self._clients())
-
-
-def stood_still(seconds: float) -> str:
-    """Why a command is not sent, for a person."""
-    return f"Not sent: the program that owns the line stood still for {seconds:.0f} s."

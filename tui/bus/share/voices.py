@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from ..shared_facts import SharedFacts
-from .messages import AnyMessage, Claim, Question, Reply, StopGiven, Told
+from .messages import AnyMessage, AskedFor, Claim, Granting, StopGiven, Told
 
 
 class ProgramVoice:
@@ -26,11 +26,11 @@ class ProgramVoice:
 
     def ask(self, device: int) -> None:
         """This program wants a device that another one commands."""
-        self._send(Question(device, self._facts.me))
+        self._send(AskedFor(device, self._facts.me))
 
     def reply(self, device: int, program: str, yes: bool, why: str) -> None:
         """This program answers one that asked."""
-        self._send(Reply(device, program, yes, why))
+        self._send(Granting(device, program, yes, why))
 
     def told(self, device: int, text: str) -> None:
         """This program has something for all to read."""
