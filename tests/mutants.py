@@ -25,7 +25,7 @@ from pathlib import Path
 from queue import SimpleQueue
 from threading import Lock
 
-from tests.defects import bus, commanding, drive, watching
+from tests.defects import bus, commanding, drive, sharing, watching
 from tests.defects.defect import Defect
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,6 +35,7 @@ DEFECTS: tuple[Defect, ...] = (
     *drive.DEFECTS,
     *commanding.DEFECTS,
     *watching.DEFECTS,
+    *sharing.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
 """What became of each defect when it was planted last; `--table` tells it."""

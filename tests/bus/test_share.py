@@ -13,13 +13,15 @@ from pathlib import Path
 import pytest
 
 from tui.bus.api import LineStatus, Priority
-from tui.bus.errors import DeviceException, LineBusy, RequestRefused
+from tui.bus.errors import DeviceException, LineBusy, NoAnswer, RequestRefused
 from tui.bus.share.place import SharePlace
 from tui.wire.frames import frame
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
 from .sharing import QUICK, place_in
+
+UNANSWERED = 98
 
 
 def slow(request: bytes, _count: int) -> Sequence[Step]:
@@ -151,6 +153,8 @@ async def test_what_was_read_for_one_is_taken_by_another_that_accepts_its_age(
     values = iter(range(100, 200))
 
     def counting(request: bytes, _count: int) -> Sequence[Step]:
+        if request[3] == UNANSWERED:
+            return []
         words = b"".join(next(values).to_bytes(2, "big") for _ in range(request[5]))
         return [
             frame(request[0], bytes([3, len(words)]) + words) if request[1] == 3 else reply(request)
@@ -179,6 +183,11 @@ async def test_what_was_read_for_one_is_taken_by_another_that_accepts_its_age(
         await owner.write(1, 99, [1])
         await other.read(1, 11, 2, max_age=60)
         assert len(peer.requests) == 8
+        # also one that is not answered
+        with pytest.raises(NoAnswer):
+            await other.write(1, UNANSWERED, [1])
+        await owner.read(1, 11, 2, max_age=60, priority=Priority.OPERATOR_READ)
+        assert len(peer.requests) == 10
 
 
 async def test_alone_on_the_line_nothing_is_shared(share: Share) -> None:

@@ -6,10 +6,12 @@ import asyncio
 import os
 import socket
 import threading
+import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 import msgspec
 import pytest
@@ -18,13 +20,25 @@ from tui.bus.api import LineStatus, Priority
 from tui.bus.errors import LineClosed, LineLost, NotShared
 from tui.bus.line import Line
 from tui.bus.program import Program
-from tui.bus.share.messages import VERSION, AnyMessage, Hello, Told, TurnedAway, packed, unpacked
-from tui.bus.share.place import Owner, OwnerLock
+from tui.bus.share.messages import (
+    VERSION,
+    Answer,
+    AnyMessage,
+    Failed,
+    Hello,
+    Message,
+    Told,
+    TurnedAway,
+    packed,
+    unpacked,
+)
+from tui.bus.share.place import Owner, OwnerLock, short_path
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
 from .sharing import QUICK, SharedLines, frozen, in_loop, other_program, place_in
 
+M = TypeVar("M", bound=Message)
 STRANGER = Program("stranger", "stranger", 1)
 SLOW_REGISTER = 77
 
@@ -203,7 +217,8 @@ def raw(lines: SharedLines) -> socket.socket:
     (path,) = (lines.folder / "run").glob("*.sock")
     connection = socket.socket(socket.AF_UNIX)
     connection.settimeout(10)
-    connection.connect(str(path))
+    with short_path(path) as address:
+        connection.connect(address)
     return connection
 
 
@@ -216,10 +231,17 @@ def answer(connection: socket.socket) -> AnyMessage:
     return unpacked(connection.recv(length, socket.MSG_WAITALL))
 
 
+def answer_of_kind(connection: socket.socket, kind: type[M]) -> M:
+    """The next message of a kind, whatever is told besides."""
+    while not isinstance(told := answer(connection), kind):
+        pass
+    return told
+
+
 def ask(**fields: object) -> bytes:
     asked: dict[str, object] = {
         "number": 1, "kind": "Read", "fields": {"device": 1, "address": 1, "count": 1},
-        "priority": 4, "replaceable": False, "max_age": 0.0, "stamp": 0, "asked": 0.0,
+        "priority": 4, "replaceable": False, "max_age": 0.0, "stamp": 0, "asked": 1e9,
     }  # fmt: skip
     data = msgspec.msgpack.encode({"type": "Asking", **asked, **fields})
     return len(data).to_bytes(4, "big") + data
@@ -252,6 +274,25 @@ async def test_what_one_program_says_costs_the_others_nothing(share: Share, said
                 assert (await asyncio.wait_for(line.read(1, 5), 10)).words == (5,)
         eventually(lambda: [one.name for one in owner.facts.others] == ["watch"])
         assert (await other.read(1, 6)).words == (6,)
+
+
+async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        await owner.read(1, 1)
+        write = {"device": 1, "address": 9, "value": 1}
+        with raw(lines) as connection:
+            old = time.monotonic() - 5
+            connection.sendall(hello() + ask(kind="WriteOne", fields=write, asked=old))
+            told = await asyncio.to_thread(answer_of_kind, connection, Failed)
+            assert told.error == "RequestRefused"
+            assert "stood still for 5 s" in told.form.text
+            # a stop is never too late
+            stop = ask(number=2, kind="WriteOne", fields=write, asked=old, priority=0)
+            connection.sendall(stop)
+            assert (await asyncio.to_thread(answer_of_kind, connection, Answer)).number == 2
+        assert [one[1] for one in peer.requests] == [3, 6]
 
 
 async def test_a_client_that_reads_nothing_is_let_go(
@@ -326,7 +367,8 @@ async def test_an_owner_that_talks_nonsense_is_left_again(share: Share, tmp_path
     assert lock.take()
     path = tmp_path / "odd.sock"
     with socket.socket(socket.AF_UNIX) as listening:
-        listening.bind(str(path))
+        with short_path(path) as address:
+            listening.bind(address)
         listening.listen()
         lock.tell(Owner(VERSION, STRANGER, str(path)))
         with PtyPeer(honest) as peer:
