@@ -36,8 +36,8 @@ from tui.bus.api import Priority
 from tui.bus.errors import LineError
 from tui.bus.line import Line
 from tui.bus.link import parse_link
+from tui.bus.program import Program
 from tui.bus.share.place import SharePlace
-from tui.bus.shared_facts import Program
 from tui.drive.profile.library import load
 from tui.session.connect.limits import limits_of
 from tui.session.drive import DriveSession

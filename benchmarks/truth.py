@@ -38,8 +38,8 @@ from tui.bus.errors import LineError, NoAnswer
 from tui.bus.limits import Limits
 from tui.bus.line import Line, Reply, Timing
 from tui.bus.link import SerialLink
+from tui.bus.program import Program
 from tui.bus.share.place import SharePlace
-from tui.bus.shared_facts import Program
 
 TIME_OUT = 0.05
 FAST = Timing(

@@ -33,6 +33,7 @@ from tests.defects import (
     lines,
     records,
     scripts,
+    sharing,
     teaching,
     terminal,
     watching,
@@ -52,6 +53,7 @@ DEFECTS: tuple[Defect, ...] = (
     *lines.DEFECTS,
     *teaching.DEFECTS,
     *terminal.DEFECTS,
+    *sharing.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
 """What became of each defect when it was planted last; `--table` tells it."""

@@ -15,7 +15,7 @@ MOST_METHODS = 15
 """Public methods and properties of one class; those of its bases count there."""
 
 EXCEPTIONS: dict[str, tuple[int, str]] = {
-    "bus/api.py:ModbusLine": (19, "what all of a line is asked for; the fake has the same"),
+    "bus/api.py:ModbusLine": (20, "what all of a line is asked for; the fake has the same"),
     "bus/fake.py:FakeLine": (18, "the same as the line that it stands for"),
     "screens/app_port.py:Panel": (20, "all that screens ask of the app, most of it abstract"),
     "screens/connection/state.py:LineView": (

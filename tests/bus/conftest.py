@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from tui.bus.limits import Limits
 from tui.bus.line import Line, Timing
 from tui.bus.link import Link, SerialLink
+
+if TYPE_CHECKING:
+    from .sharing import SharedLines
 
 WIDE = Limits(
     functions=frozenset({3, 6, 8, 16, 23, 43}),
@@ -55,3 +60,22 @@ def open_line() -> Iterator[OpenLine]:
 def sent(line: Line) -> list[float]:
     """When each request went out, by the line itself: a busy machine lets a peer see them late."""
     return [frame.time for frame in line.trace if frame.direction == "out"]
+
+
+Share = Callable[[str], "SharedLines"]
+
+
+@pytest.fixture
+def share(tmp_path: Path) -> Iterator[Share]:
+    """Programs that share the line to a peer, closed after the test."""
+    from .sharing import SharedLines
+
+    made: list[SharedLines] = []
+
+    def shared(path: str) -> SharedLines:
+        made.append(SharedLines(tmp_path, SerialLink(path)))
+        return made[-1]
+
+    yield shared
+    for lines in made:
+        lines.close()

@@ -15,13 +15,14 @@ import tui.session
 from tui.bus.api import LineState, LineStatus
 from tui.bus.limits import Limits
 from tui.bus.line import Line
+from tui.bus.shared_facts import SharedFacts
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR
 from tui.session.drive import DriveSession
 
 from .fake_clock import FakeClock
 
-OWN_TIME = {"clock.py", "journal.py", "events.py", "command/stop.py"}
+OWN_TIME = {"clock.py", "journal.py", "journal_file.py", "events.py", "command/stop.py"}
 """Modules that look at the real clock: the journal's own thread, a thread that waits for a stop."""
 SESSION = Path(tui.session.__file__).parent
 
@@ -52,6 +53,8 @@ class ConnectedLine:
 
     read_only = False
     state = LineState(LineStatus.CONNECTED, "", 0.0)
+    held = ""
+    facts = SharedFacts()
 
     def describe(self, _device: int, _limits: Limits) -> None:
         """What a device may be sent does not matter here."""

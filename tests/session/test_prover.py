@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import Any
 
@@ -23,7 +23,6 @@ from tui.session.proof.silences import Bracket, silences
 from tui.session.work import Stopped
 
 from .fakes import OneDrive
-from .slow_drive import until
 
 PROFILE = library.load("atv312")
 STATUS, LAST_FAULT, TIMEOUT, REACTION, HERTZ, COMMAND = (
@@ -63,6 +62,8 @@ class WatchingDrive(OneDrive):
         self.registers[REACTION] = 1
         self.registers[STATUS] = AT_REST
         self.fault = SLF
+        self.at_twelfth: Callable[[], None] = lambda: None
+        """Called with the twelfth read."""
         self.asked_by: list[Priority] = []
         self._heard = math.inf
 
@@ -86,6 +87,8 @@ class WatchingDrive(OneDrive):
             self.registers[HERTZ] = 0
         self._heard = now
         self.asked_by.append(priority)
+        if len(self.asked_by) == 12:
+            self.at_twelfth()
         self.clock.now += EXCHANGE
         return await super().read(device, address, count, priority=priority, function=function)
 
@@ -170,11 +173,10 @@ async def test_a_stop_ends_the_proof_and_lets_the_drive_be_asked() -> None:
     clock = OwnTime()
     drive = WatchingDrive(clock, 5.0)
     prover = bench(clock, drive)
-    task = asyncio.ensure_future(prover.prove())
-    await until(lambda: len(drive.asked_by) >= 12)
-    prover.session.work.stop("the stop key")
-    await asyncio.wait([task])
-    assert isinstance(task.exception(), Stopped)
+    drive.at_twelfth = lambda: prover.session.work.stop("the stop key")
+    with pytest.raises(Stopped):
+        await prover.prove()
+    assert len(drive.asked_by) >= 12
     assert not drive.facts.hushed
 
 

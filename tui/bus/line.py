@@ -22,6 +22,7 @@ from .model import (
     Reply,
     Timing,
 )
+from .program import Program
 from .requests import (
     BROADCAST,
     Diagnose,
@@ -39,7 +40,7 @@ from .schedule.queue import Job
 from .schedule.worker import ThreadWork, Worker
 from .share.place import SharePlace
 from .share.sharing import Sharing
-from .shared_facts import Program, SharedFacts
+from .shared_facts import SharedFacts
 from .trace import Frame
 
 __all__ = [

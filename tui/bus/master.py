@@ -30,6 +30,8 @@ class Sending:
     time_out: float
     sure: bool = True
     skip: int = 0
+    look: Callable[[], None] = lambda: None
+    """Called last before the first byte; raises where it must not go out any more."""
 
 
 @dataclass(slots=True)

@@ -5,77 +5,27 @@ A line that nobody shares has such facts too: then this program is the only one.
 
 from __future__ import annotations
 
-import logging
 import os
 import threading
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from types import MappingProxyType
-from typing import Protocol, TypeVar
 
-import msgspec
+from .facts_heard import FactsHeard, LineVoice, heard
+from .program import Program
+from .stop_counts import GivenStops, StopCounts
 
-log = logging.getLogger(__name__)
-
-T = TypeVar("T")
-
-
-class Program(msgspec.Struct, frozen=True):
-    """A program on the line, as others name it."""
-
-    id: str
-    """Its own among all programs."""
-    name: str
-    """`panel`, `run` and the like."""
-    pid: int = 0
-    user: str = ""
-    where: str = ""
-    """Its terminal; empty where that is unknown."""
-
-    @property
-    def text(self) -> str:
-        """How people are told of it: `panel on pts/3 (pid 812)`."""
-        where = f" on {self.where}" if self.where else ""
-        return f"{self.name}{where} (pid {self.pid})"
+DEPARTED_KEPT = 16
+"""How many programs that left are remembered."""
 
 
-class Voice(Protocol):
-    """Carries what is done here to the other programs; called in any thread."""
-
-    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
-        """Devices are stopped from here."""
-
-    def claim(self, device: int, take: bool) -> None:
-        """This program commands a device now, or no longer."""
-
-    def ask(self, device: int) -> None:
-        """This program wants a device that another one commands."""
-
-    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
-        """The answer to a program that asked."""
-
-    def hushed(self, device: int, why: str) -> None:
-        """A device is left alone by this program, or with no reason no longer."""
-
-    def told(self, device: int, text: str) -> None:
-        """Something that everybody on the line is to read."""
-
-
-StopListener = Callable[[tuple[int, ...], str, Program], None]
-DeniedListener = Callable[[int, str], None]
-QuestionListener = Callable[[int, Program], None]
-ReplyListener = Callable[[int, bool, str], None]
-GoneListener = Callable[[Program], None]
-TextListener = Callable[[int, str], None]
-ChangeListener = Callable[[], None]
-
-
-class SharedFacts:
+class SharedFacts(FactsHeard):
     """The facts of one line. May be used from any thread; mappings are replaced, never changed.
 
     Listeners are called in the line's thread.
     """
 
     def __init__(self, me: Program | None = None) -> None:
+        super().__init__()
         self.me = me or Program("here", "drivepanel", os.getpid())
         self.programs: tuple[Program, ...] = (self.me,)
         """All on the line, the owner first."""
@@ -83,19 +33,13 @@ class SharedFacts:
         """Ids of the programs that command, by device."""
         self.hushed: Mapping[int, tuple[str, str]] = MappingProxyType({})
         """Devices that nobody asks now: by whose id, and why."""
-        self.stops: Mapping[int, int] = MappingProxyType({})
+        self.stops = StopCounts()
         """How many stops each device was given, by all programs."""
-        self.stopped_by: Mapping[int, str] = MappingProxyType({})
-        self.voice: Voice | None = None
+        self.departed: tuple[Program, ...] = ()
+        """Programs that have left the line, the last ones last."""
+        self.voice: LineVoice | None = None
         """None while nobody else hears of it."""
         self._lock = threading.RLock()
-        self._on_stop: list[StopListener] = []
-        self._on_denied: list[DeniedListener] = []
-        self._on_question: list[QuestionListener] = []
-        self._on_reply: list[ReplyListener] = []
-        self._on_gone: list[GoneListener] = []
-        self._on_text: list[TextListener] = []
-        self._on_change: list[ChangeListener] = []
 
     # Who is there
 
@@ -112,33 +56,33 @@ class SharedFacts:
         self,
         programs: tuple[Program, ...],
         commanders: Mapping[int, str],
-        stops: Mapping[int, int],
+        given: GivenStops,
         hushed: Mapping[int, tuple[str, str]],
-    ) -> None:
-        """Take over what the owner tells; what this program claims is its own until denied."""
+    ) -> tuple[int, ...]:
+        """Take over what the owner tells; what this program claims is its own until denied.
+
+        Returns the devices of which stops are told that this program had not heard of.
+        """
         with self._lock:
             others = {d: one for d, one in commanders.items() if one != self.me.id}
             mine = {d: one for d, one in self.commanders.items() if one == self.me.id}
-            self.programs = programs
             told = {d: one for d, one in hushed.items() if one[0] != self.me.id}
             own = {d: one for d, one in self.hushed.items() if one[0] == self.me.id}
             self.hushed = MappingProxyType({**told, **own})
             self.commanders = MappingProxyType({**others, **mine})
-            self.learn_stops(stops)
-        self._changed()
+            unheard = self.stops.replace(given, self.me.id)
+        self.set_programs(programs)
+        return unheard
 
     def set_programs(self, programs: tuple[Program, ...]) -> None:
         """The programs on the line, as their owner knows them."""
-        self.programs = programs
+        with self._lock:
+            here = {one.id for one in programs}
+            left = [one for one in self.programs if one.id not in here and one.id != self.me.id]
+            stay = [one for one in self.departed if one.id not in here]
+            self.departed = (*stay, *left)[-DEPARTED_KEPT:]
+            self.programs = programs
         self._changed()
-
-    def on_change(self, listener: ChangeListener) -> Callable[[], None]:
-        """Call `listener` when programs or commanders are others than before."""
-        return _subscribed(self._on_change, listener)
-
-    def _changed(self) -> None:
-        for listener in tuple(self._on_change):
-            _told(listener)
 
     # What all are to read
 
@@ -147,15 +91,6 @@ class SharedFacts:
         self.hear_text(device, text)
         if self.voice is not None:
             self.voice.told(device, text)
-
-    def on_text(self, listener: TextListener) -> Callable[[], None]:
-        """Call `listener` with what is to be read about a device."""
-        return _subscribed(self._on_text, listener)
-
-    def hear_text(self, device: int, text: str) -> None:
-        """Something is to be read."""
-        for listener in tuple(self._on_text):
-            _told(listener, device, text)
 
     # Left alone
 
@@ -182,33 +117,10 @@ class SharedFacts:
     def give_stop(self, devices: Iterable[int], by: str) -> None:
         """Devices are stopped from here: what was meant for them before is void everywhere."""
         stopped = tuple(devices)
-        self.count_stop(stopped, by)
+        # counted before the voice is looked for: who finds one later tells the counts
+        self.stops.give(self.me.id, stopped, by)
         if self.voice is not None:
             self.voice.stop_given(stopped, by)
-
-    def count_stop(self, devices: Iterable[int], by: str) -> None:
-        """Count a stop of devices, whoever gave it."""
-        with self._lock:
-            stopped = tuple(devices)
-            counts = {device: self.stops.get(device, 0) + 1 for device in stopped}
-            self.stops = MappingProxyType({**self.stops, **counts})
-            self.stopped_by = MappingProxyType({**self.stopped_by, **dict.fromkeys(stopped, by)})
-
-    def learn_stops(self, stops: Mapping[int, int]) -> None:
-        """Take over counts that are higher than the own ones."""
-        with self._lock:
-            higher = {d: n for d, n in stops.items() if n > self.stops.get(d, 0)}
-            if higher:
-                self.stops = MappingProxyType({**self.stops, **higher})
-
-    def on_stop(self, listener: StopListener) -> Callable[[], None]:
-        """Call `listener` when another program stops devices; returns how to end that."""
-        return _subscribed(self._on_stop, listener)
-
-    def hear_stop(self, devices: tuple[int, ...], by: str, program: Program) -> None:
-        """Another program has stopped devices."""
-        for listener in tuple(self._on_stop):
-            _told(listener, devices, by, program)
 
     # Who commands
 
@@ -247,15 +159,6 @@ class SharedFacts:
             self.commanders = MappingProxyType(held)
         self._changed()
 
-    def on_denied(self, listener: DeniedListener) -> Callable[[], None]:
-        """Call `listener` with device and reason when a claim was refused or ended."""
-        return _subscribed(self._on_denied, listener)
-
-    def hear_denied(self, device: int, why: str) -> None:
-        """What this program claimed is not, or no longer, its own."""
-        for listener in tuple(self._on_denied):
-            _told(listener, device, why)
-
     # Taking over
 
     def ask_for(self, device: int) -> None:
@@ -270,31 +173,14 @@ class SharedFacts:
         if self.voice is not None:
             self.voice.reply(device, program, yes, why)
 
-    def on_question(self, listener: QuestionListener) -> Callable[[], None]:
-        """Call `listener` when a program asks for a device that is commanded from here."""
-        return _subscribed(self._on_question, listener)
-
-    def hear_question(self, device: int, program: Program) -> None:
-        """A program asks for a device that is commanded from here."""
-        for listener in tuple(self._on_question):
-            _told(listener, device, program)
-
-    def on_reply(self, listener: ReplyListener) -> Callable[[], None]:
-        """Call `listener` with device, yes or no, and why, when a question was answered."""
-        return _subscribed(self._on_reply, listener)
-
     def hear_reply(self, device: int, why: str, *, yes: bool) -> None:
         """The program that commands a device has answered."""
         if yes:
             self.note_commander(device, None)
         for listener in tuple(self._on_reply):
-            _told(listener, device, yes, why)
+            heard(listener, device, yes, why)
 
     # Programs that went away
-
-    def on_gone(self, listener: GoneListener) -> Callable[[], None]:
-        """Call `listener`, in the owner only, when a program left without saying so, or ended."""
-        return _subscribed(self._on_gone, listener)
 
     def hear_gone(self, program: Program) -> None:
         """A program is on the line no more; called where this program owns it."""
@@ -303,10 +189,10 @@ class SharedFacts:
             self.commanders = MappingProxyType(held)
             left = {d: one for d, one in self.hushed.items() if one[0] != program.id}
             self.hushed = MappingProxyType(left)
-            self.programs = tuple(one for one in self.programs if one.id != program.id)
-        self._changed()
+            rest = tuple(one for one in self.programs if one.id != program.id)
+        self.set_programs(rest)
         for listener in tuple(self._on_gone):
-            _told(listener, program)
+            heard(listener, program)
 
     # What may go out
 
@@ -315,35 +201,18 @@ class SharedFacts:
 
         `stamp` is the count of stops that the program knew when it handed the write over.
         """
-        if stamp != self.stops.get(device, 0):
-            by = self.stopped_by.get(device, "")
+        if stamp != self.stops.stamp(device):
+            by = self.stops.by.get(device, "")
             return f"Not sent: a stop came after it{f' ({by})' if by else ''}."
-        holder = self.commanders.get(device)
-        if holder is not None and holder != program:
-            other = self.program(holder)
-            if other is not None:
-                return commanded_by(device, other)
+        for one in (device,) if device else tuple(self.commanders):
+            holder = self.commanders.get(one)
+            if holder is not None and holder != program:
+                other = self.program(holder)
+                if other is not None:
+                    return commanded_by(one, other)
         return ""
 
 
 def commanded_by(device: int, other: Program) -> str:
     """That another program commands a device, for a person."""
     return f"Drive {device} is commanded by {other.text}."
-
-
-def _subscribed(listeners: list[T], listener: T) -> Callable[[], None]:
-    listeners.append(listener)
-
-    def leave() -> None:
-        if listener in listeners:
-            listeners.remove(listener)
-
-    return leave
-
-
-def _told(listener: Callable[..., None], *what: object) -> None:
-    try:
-        listener(*what)
-    except Exception:
-        # a listener's fault is not the line's
-        log.exception("a listener of the shared line failed")

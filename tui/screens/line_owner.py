@@ -16,7 +16,7 @@ from .app_port import Panel
 from .open_lines import LineEvents, PanelLine
 
 if TYPE_CHECKING:
-    from tui.bus.shared_facts import Program
+    from tui.bus.program import Program
     from tui.session.connect.open_line import OpenLine
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet

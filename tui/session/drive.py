@@ -7,7 +7,7 @@ import weakref
 
 from tui.bus.api import ModbusLine
 from tui.bus.link import label
-from tui.bus.shared_facts import Program
+from tui.bus.program import Program
 from tui.drive.chart import UNKNOWN, ChartState, fault_code, read_chart
 from tui.drive.profile.profile import Profile
 

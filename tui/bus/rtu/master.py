@@ -148,6 +148,7 @@ class RtuMaster:
         begun = clock()
         self._sent = self._last = begun + len(data) * self._character
         try:
+            sending.look()
             await self._send(data)
             tally.requests += 1
             tally.bytes_out += len(data)

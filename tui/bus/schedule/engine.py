@@ -134,7 +134,8 @@ class Engine:
     def submit(self, job: Job) -> None:
         """Hand a job to the loop. Raises LineClosed."""
         job.program = self.facts.me.id
-        job.stamp = self.facts.stops.get(job.request.device, 0)
+        job.stamp = self.facts.stops.stamp(job.request.device)
+        job.asked = self._clock()
         self._enter(self._take, job)
 
     def _enter(self, action: Callable[[T], None], argument: T) -> None:

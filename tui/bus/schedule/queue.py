@@ -38,6 +38,8 @@ class Job:
     """Id of the program that asks."""
     stamp: int = 0
     """The count of stops of the device that it knew of."""
+    asked: float = 0.0
+    """When it was handed over, by the line's clock."""
     max_age: float = 0.0
     """A reply to the same question is taken, from whoever asked it, up to this age in seconds."""
 
@@ -46,6 +48,11 @@ class Job:
         self.pdu = self.request.pdu()
         if self.request.device != BROADCAST:
             self.expectation = self.request.expectation()
+
+    @property
+    def commands(self) -> bool:
+        """Whether it changes anything and is no stop: a stop voids it."""
+        return self.request.changes and self.priority is not Priority.STOP
 
     def fail(self, error: LineError) -> None:
         """Hand back an error, unless the one who asked has gone."""
@@ -72,7 +79,8 @@ class JobQueue:
     def put(self, job: Job) -> None:
         """Queue a job. Raises LineBusy when the queue is full.
 
-        A stop always finds room; polls and background work leave half of it to the operator.
+        Each program that shares the line has as much room: none takes it from the others. A stop
+        always finds some; polls and background work leave half of it to the operator.
         """
         if job.replaceable and (older := self._replaced_by(job)) is not None:
             self._jobs.remove(older)
@@ -81,8 +89,9 @@ class JobQueue:
             self._jobs.append(job)
             return
         room = self._length if job.priority < Priority.POLL else self._length // 2
-        if job.priority is not Priority.STOP and len(self._jobs) >= room:
-            raise LineBusy(f"{len(self._jobs)} requests wait for the line already; try again.")
+        waiting = sum(one.program == job.program for one in self._jobs)
+        if job.priority is not Priority.STOP and waiting >= room:
+            raise LineBusy(f"{waiting} requests wait for the line already; try again.")
         job.order = next(self._orders)
         self._jobs.append(job)
 

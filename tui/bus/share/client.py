@@ -3,59 +3,53 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Coroutine
 from contextlib import suppress
+from pathlib import Path
+from typing import Any
 
-from ..errors import LineError, LineLost, NotShared, RequestRefused
+from ..errors import LineError, NotShared
 from ..link import label
-from ..model import LineState, LineStatus, Priority
-from ..requests import BROADCAST
+from ..model import LineState, LineStatus
+from ..program import Program
 from ..schedule.inside import LineInside
-from ..schedule.queue import Job
-from ..shared_facts import Program
 from ..trace import Frame
-from .direct import DirectStops
+from .asked import RequestsAsked
+from .lease import SILENT_OWNER
 from .messages import (
     VERSION,
     Answer,
     AnyMessage,
-    Ask,
+    AskedFor,
     Claim,
     Denied,
-    Describe,
     Facts,
     Failed,
     Goodbye,
+    Granting,
     Hello,
-    Hush,
+    Here,
     News,
     NoMessage,
-    Question,
-    Reply,
+    PollWish,
+    RollCall,
     StopGiven,
     Told,
     TurnedAway,
     Welcome,
-    Wish,
-    Withdraw,
-    error_of,
     next_message,
     packed,
-    request_form,
 )
-from .place import Owner
+from .past_owner import PastOwner
+from .place import Owner, short_path
+from .voices import ProgramVoice
 
 log = logging.getLogger(__name__)
 
-SILENT_OWNER = 1.0
-"""Seconds without a sign of life after which an owner counts as frozen."""
-LOOK_INTERVAL = 0.1
+WATCH_INTERVAL = 0.1
 WAITED_ENOUGH = 5.0
 """Seconds that a request waits for a frozen owner before it is told so."""
-ENDED = "The program that owned the line ended"
-FATE = " Whether it was taken is not known; read the register back before trying again."
 
 Say = Callable[[LineStatus, str], None]
 
@@ -67,25 +61,28 @@ class OwnerAway(Exception):
 class ShareClient:
     """Attached to one owner until it ends; lives in the line's loop, and is its facts' voice."""
 
-    def __init__(self, inside: LineInside, owner: Owner, say: Say) -> None:
+    def __init__(self, inside: LineInside, owner: Owner, say: Say, past: PastOwner) -> None:
         self._inside = inside
         self._owner = owner
         self._say = say
         self._loop = asyncio.get_running_loop()
         self._writer: asyncio.StreamWriter | None = None
-        self._numbers = itertools.count(1)
-        self._asked: dict[int, Job] = {}
-        self._described: dict[int, object] = {}
+        self._asked = RequestsAsked(inside, past, self._tell)
         self._state: LineState | None = None
         self._note = ""
         self._wish: tuple[dict[int, float], bool] = ({}, False)
-        self._silent_looks = 0
-        self._direct: DirectStops | None = None
+        self._past = past
+        self.again = False
+        """Whether this program was attached to the line before."""
         self.heard = inside.clock()
         """When the owner last gave a sign of life."""
-        self.quiet = inside.timing.late_reply
-        """Seconds from then for which a reply to the owner's last request may still come."""
-        self.frozen = False
+        self.quiet_until = 0.0
+        """When no reply to the owner's last request may come any more."""
+
+    @property
+    def frozen(self) -> bool:
+        """Whether the owner does not answer, so that nothing but stops goes out."""
+        return self._past.at_work
 
     async def serve(self) -> None:
         """Serve this program's requests until the owner ends.
@@ -93,31 +90,44 @@ class ShareClient:
         Raises OwnerAway where there is none, NotShared where it takes nobody in.
         """
         try:
-            reader, writer = await asyncio.open_unix_connection(self._owner.socket)
+            with short_path(Path(self._owner.socket)) as address:
+                reader, writer = await asyncio.open_unix_connection(address)
         except (OSError, ValueError) as error:
             raise OwnerAway from error
         self._writer = writer
-        tasks: list[asyncio.Task[None]] = []
+        closing = True
         try:
             self._greet()
-            watch = self._loop.create_task(self._watch())
-            tasks.append(watch)
-            await self._welcomed(reader)
-            tasks.append(self._loop.create_task(self._forward()))
-            await self._listen(reader)
+            await self._until_one_ends(self._watch(), self._attached(reader))
+            closing = False
         finally:
             self._inside.facts.voice = None
-            for task in tasks:
-                task.cancel()
-            if self._direct is not None:
-                await self._direct.close()
+            await self._past.end()
             with suppress(OSError, RuntimeError):
                 writer.close()
-            self._give_up_asked()
+            self._asked.give_up_all(closing=closing)
+
+    async def _until_one_ends(self, *works: Coroutine[Any, Any, None]) -> None:
+        """Do several things at once until one of them ends; its error is raised."""
+        tasks = [self._loop.create_task(work) for work in works]
+        try:
+            done, _ = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+        for task in done:
+            task.result()
 
     def _greet(self) -> None:
         facts = self._inside.facts
-        self._tell(Hello(VERSION, facts.me, label(self._inside.link), dict(facts.stops)))
+        # first: what is given from here on is told by itself, what was before in the greeting
+        facts.voice = ProgramVoice(facts, self._soon)
+        given = {device: dict(counts) for device, counts in facts.stops.given.items()}
+        self._tell(Hello(VERSION, facts.me, label(self._inside.link), given))
+
+    async def _attached(self, reader: asyncio.StreamReader) -> None:
+        await self._welcomed(reader)
+        await self._until_one_ends(self._forward(), self._listen(reader))
 
     async def _welcomed(self, reader: asyncio.StreamReader) -> None:
         try:
@@ -133,7 +143,6 @@ class ShareClient:
         if not message.asked:
             self._note += f" It is open as {message.label}."
         facts = self._inside.facts
-        facts.voice = self
         for device, holder in facts.commanders.items():
             if holder == facts.me.id:
                 self._tell(Claim(device, True))
@@ -143,15 +152,22 @@ class ShareClient:
             try:
                 message = await next_message(reader)
             except (EOFError, OSError):
+                self._killed()
                 return
             except NoMessage as error:
                 log.error("%s says nothing sensible: %s", self._owner.program.text, error)
+                self._killed()
                 return
             self._hear_life()
             if isinstance(message, Goodbye):
-                self.quiet = message.quiet
+                self.quiet_until = self.heard + message.quiet
                 return
             self._hear(message)
+
+    def _killed(self) -> None:
+        """The owner is gone without a word: it may have sent until a moment ago."""
+        last = min(self._inside.clock(), self.heard + SILENT_OWNER)
+        self.quiet_until = last + self._inside.timing.late_reply
 
     # Requests
 
@@ -160,105 +176,32 @@ class ShareClient:
         dispatcher = self._inside.dispatcher
         while True:
             for job in await dispatcher.all_waiting():
-                self._send(job)
-
-    def _send(self, job: Job) -> None:
-        if job.answer.cancelled():
-            return
-        request = job.request
-        why = self._inside.dispatcher.refusal(job) or (job.forbidden() if job.forbidden else "")
-        if why:
-            job.fail(RequestRefused(why))
-            return
-        if self.frozen and self._directly(job):
-            return
-        self._describe(request.device, job)
-        kind, fields = request_form(request)
-        number = next(self._numbers)
-        self._asked[number] = job
-        job.answer.add_done_callback(lambda answer: self._withdrawn(number, answer.cancelled()))
-        limits = job.limits if request.device == BROADCAST else None
-        self._tell(
-            Ask(
-                number, kind, fields, int(job.priority), job.replaceable, job.max_age,
-                job.stamp, limits,
-            )
-        )  # fmt: skip
-
-    def _describe(self, device: int, job: Job) -> None:
-        if device != BROADCAST and self._described.get(device) is not job.limits:
-            self._described[device] = job.limits
-            self._tell(Describe(device, job.limits))
-
-    def _withdrawn(self, number: int, cancelled: bool) -> None:
-        """Called in any thread: nobody waits for the answer any more."""
-        if cancelled:
-            with suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._withdraw, number)
-
-    def _withdraw(self, number: int) -> None:
-        if self._asked.pop(number, None) is not None:
-            self._tell(Withdraw(number))
-
-    def _answered(self, message: Answer | Failed) -> None:
-        job = self._asked.pop(message.number, None)
-        if job is None or not job.answer.set_running_or_notify_cancel():
-            return
-        job.begun = True
-        if isinstance(message, Answer):
-            self._inside.devices[job.request.device].heard = message.time
-            job.finish(message.pdu, message.time)
-        else:
-            self._failed(job, message)
-
-    def _failed(self, job: Job, message: Failed) -> None:
-        if message.error == "LineClosed":
-            # the owner's end is not this program's
-            self._give_up(job, sent=FATE in message.form.text)
-        else:
-            job.fail(error_of(message))
-
-    def _give_up_asked(self) -> None:
-        asked, self._asked = self._asked, {}
-        for job in asked.values():
-            self._give_up(job, sent=True)
-
-    def _give_up(self, job: Job, *, sent: bool) -> None:
-        """The owner ended before it answered: a read is asked anew, a write never is.
-
-        A stop is sent again: it may have got lost, and does no harm twice.
-        """
-        if not job.request.changes or job.priority is Priority.STOP:
-            job.begun = False
-            if not job.answer.cancelled():
-                self._inside.dispatcher.put_back(job)
-            return
-        text = f"{ENDED} during the request.{FATE}" if sent else f"{ENDED}; this was not sent."
-        if job.begun or job.answer.set_running_or_notify_cancel():
-            job.begun = True
-            job.fail(LineLost(text))
+                self._asked.send(job)
 
     # An owner that is frozen
 
     async def _watch(self) -> None:
         """Notice an owner that does not answer any more, and one that does again."""
+        looks = 0
+        heard = self.heard
         while True:
-            await asyncio.sleep(LOOK_INTERVAL)
+            await asyncio.sleep(WATCH_INTERVAL)
             inside = self._inside
             wish = inside.pace.own, inside.around.trace.looked_at
             if wish != self._wish:
                 self._wish = wish
-                self._tell(Wish(*wish))
+                self._tell(PollWish(*wish))
             # by looks, too: where this program got no time to look, the owner may be well
-            self._silent_looks += 1
-            silent = inside.clock() - self.heard > SILENT_OWNER
-            if not self.frozen and silent and self._silent_looks > SILENT_OWNER / LOOK_INTERVAL:
+            looks = looks + 1 if heard == self.heard else 0
+            heard = self.heard
+            silent = inside.clock() - heard
+            if not self.frozen and silent > SILENT_OWNER and looks >= SILENT_OWNER / WATCH_INTERVAL:
                 self._freeze()
             if self.frozen:
-                self._help_stops()
+                self._help_stops(silent)
 
     def _freeze(self) -> None:
-        self.frozen = True
+        self._past.begin()
         who = self._owner.program.text
         log.error("%s owns the line and does not answer", who)
         self._say(
@@ -268,36 +211,18 @@ class ShareClient:
 
     def _hear_life(self) -> None:
         self.heard = self._inside.clock()
-        self._silent_looks = 0
         if self.frozen:
-            self.frozen = False
-            if self._direct is not None:
-                self._direct.end()
-                self._direct = None
+            self._past.leave()
             self._tell_state()
 
-    def _help_stops(self) -> None:
+    def _help_stops(self, silent: float) -> None:
         """Send stops past the frozen owner; tell others that they wait in vain."""
-        for number, job in list(self._asked.items()):
-            if self._directly(job):
-                self._asked.pop(number, None)
+        self._asked.send_past()
         for job in self._inside.dispatcher.take_all():
-            self._send(job)
-        now = self._inside.clock()
-        for number, job in list(self._asked.items()):
-            if now - self.heard > SILENT_OWNER + WAITED_ENOUGH and not job.answer.done():
-                self._asked.pop(number, None)
-                fate = FATE if job.request.changes else ""
-                text = f"{self._owner.program.text} owns the line and does not answer.{fate}"
-                job.fail(LineLost(text))
-
-    def _directly(self, job: Job) -> bool:
-        """Send what belongs to a stop directly; False where the job does not."""
-        if self._direct is None:
-            if job.priority is not Priority.STOP:
-                return False
-            self._direct = DirectStops(self._inside)
-        return self._direct.take(job)
+            self._asked.send(job)
+        if silent > SILENT_OWNER + WAITED_ENOUGH:
+            text = f"{self._owner.program.text} owns the line and does not answer."
+            self._asked.give_up_older(self._inside.clock() - WAITED_ENOUGH, text)
 
     # What the owner says
 
@@ -305,27 +230,37 @@ class ShareClient:
         facts, inside = self._inside.facts, self._inside
         match message:
             case Answer() | Failed():
-                self._answered(message)
+                self._asked.answered(message)
             case News():
                 self._hear_news(message)
             case Facts():
-                facts.learn(message.programs, message.commanders, message.stops, message.hushed)
+                self._hear_facts(message)
+            case RollCall(number=number):
+                # once nothing of this program goes out past the owner any more
+                self._past.when_ended(lambda: self._tell(Here(number)))
             case Told(device=device, text=text):
                 facts.hear_text(device, text)
             case StopGiven(devices=devices, by=by, program=program):
-                facts.count_stop(devices, f"{by}, {program.text}")
-                for device in devices:
-                    inside.dispatcher.void(device)
+                facts.stops.note(program.id, devices, message.counts, f"{by}, {program.text}")
                 facts.hear_stop(devices, by, program)
+                inside.dispatcher.void()
             case Denied(device=device, holder=holder):
                 facts.note_commander(device, holder.id)
                 facts.hear_denied(device, f"Drive {device} is commanded by {holder.text}.")
-            case Question(device=device, program=program):
+            case AskedFor(device=device, program=program):
                 facts.hear_question(device, program)
-            case Reply(device=device, yes=yes, why=why):
+            case Granting(device=device, yes=yes, why=why):
                 facts.hear_reply(device, why, yes=yes)
             case _:
                 log.error("the owner says %s", type(message).__name__)
+
+    def _hear_facts(self, told: Facts) -> None:
+        facts = self._inside.facts
+        unheard = facts.learn(told.programs, told.commanders, told.stops, told.hushed)
+        if unheard and self.again:
+            # given while this program was with no owner
+            facts.hear_stop(unheard, "while nobody owned the line", self._owner.program)
+            self._inside.dispatcher.void()
 
     def _hear_news(self, news: News) -> None:
         inside = self._inside
@@ -345,32 +280,6 @@ class ShareClient:
         if self._state is not None:
             connected = self._state.status is LineStatus.CONNECTED
             self._say(self._state.status, self._note if connected else self._state.reason)
-
-    # The voice of the facts, from any thread
-
-    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
-        """Devices are stopped by this program."""
-        self._soon(StopGiven(devices, by, self._inside.facts.me))
-
-    def claim(self, device: int, take: bool) -> None:
-        """This program commands a device now, or no longer."""
-        self._soon(Claim(device, take))
-
-    def ask(self, device: int) -> None:
-        """This program wants a device that another one commands."""
-        self._soon(Question(device, self._inside.facts.me))
-
-    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
-        """This program answers one that asked."""
-        self._soon(Reply(device, program, yes, why))
-
-    def hushed(self, device: int, why: str) -> None:
-        """This program leaves a device alone, or no longer."""
-        self._soon(Hush(device, why))
-
-    def told(self, device: int, text: str) -> None:
-        """This program has something for all to read."""
-        self._soon(Told(device, text))
 
     def _soon(self, message: AnyMessage) -> None:
         with suppress(RuntimeError):

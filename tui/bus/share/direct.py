@@ -14,18 +14,23 @@ from ..schedule.connection import open_master
 from ..schedule.dispatcher import Dispatcher
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
+from .turn import Turn
 
 log = logging.getLogger(__name__)
 
-TRY_AGAIN = 0.5
+PORT_AGAIN = 0.5
 
 
 class DirectStops:
     """Sends the stops of this program, and the reads that see their motors stop."""
 
-    def __init__(self, inside: LineInside) -> None:
+    def __init__(self, inside: LineInside, turn: Turn) -> None:
         self._inside = inside
-        self._devices: set[int] = set()
+        self._turn = turn
+        self._echo: bool | None = None
+        """What was found out of the adapter."""
+        self._stops: dict[int, dict[bytes, Job]] = {}
+        """What was sent to stop each device, each frame once."""
         self._dispatcher = Dispatcher(
             inside.devices,
             inside.around.tally,
@@ -40,11 +45,13 @@ class DirectStops:
         """Take a job that belongs to a stop; False for any other."""
         device = job.request.device
         if job.priority is Priority.STOP:
-            self._devices.add(device)
+            sent = self._stops.setdefault(device, {})
+            if job.request.changes:
+                sent[job.pdu] = job
         elif (
             job.request.changes
             or job.priority > Priority.OPERATOR_READ
-            or (device not in self._devices and BROADCAST not in self._devices)
+            or (device not in self._stops and BROADCAST not in self._stops)
         ):
             return False
         self._dispatcher.submit(job)
@@ -53,35 +60,47 @@ class DirectStops:
         return True
 
     async def _serve(self) -> None:
-        """Open the port beside its owner and serve, again and again."""
-        inside = self._inside
+        """Serve in turns with other programs that do the same, until it is left.
+
+        The port is open in a turn only: of two that have it open, each hears a part of an answer.
+        """
         while True:
+            await self._dispatcher.some_wait()
             try:
-                master = await open_master(
-                    inside.link, inside.around, self._dispatcher.wake, alone=False
-                )
+                async with self._turn.taken():
+                    pause = await self._serve_some()
             except LineError as error:
                 log.error("a stop past the owner: %s", error)
-                await asyncio.sleep(TRY_AGAIN)
-                continue
-            try:
-                await self._dispatcher.serve(master)
-            except LineError as error:
-                log.error("a stop past the owner: %s", error)
-                await asyncio.sleep(TRY_AGAIN)
-            finally:
-                master.close()
+                pause = PORT_AGAIN
+            if self._dispatcher.left:
+                return
+            await asyncio.sleep(pause)
 
-    def end(self) -> None:
-        """The owner answers again: what is left goes its usual way."""
-        if self._task is not None:
-            self._task.cancel()
-        for job in self._dispatcher.take_all():
-            self._inside.dispatcher.put_back(job)
+    async def _serve_some(self) -> float:
+        inside = self._inside
+        master = await open_master(inside.link, inside.around, self._dispatcher.wake, alone=False)
+        master.echo = self._echo
+        try:
+            return await self._dispatcher.serve_some(master)
+        finally:
+            self._echo = master.echo
+            master.close()
 
-    async def close(self) -> None:
-        """End, and wait for the port to be given back."""
-        self.end()
+    async def end(self) -> None:
+        """The owner answers again: what is left goes its usual way, each stop once more.
+
+        A frame that the owner was just sending as it froze may have gone out behind the stop.
+        """
+        self._dispatcher.leave()
         if self._task is not None:
+            if not self._dispatcher.in_flight:
+                self._task.cancel()
             with suppress(asyncio.CancelledError):
                 await self._task
+        for frames in self._stops.values():
+            for job in frames.values():
+                again = Job(job.request, job.priority, job.limits)
+                again.program, again.asked = job.program, self._inside.clock()
+                self._inside.dispatcher.submit(again)
+        for job in self._dispatcher.take_all():
+            self._inside.dispatcher.put_back(job)

@@ -6,31 +6,20 @@ Times are those of the machine's monotonic clock, which all its programs share.
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from typing import Any
 
 import msgspec
 
-from ..errors import (
-    ChecksumFault,
-    DeviceException,
-    LineBusy,
-    LineClosed,
-    LineError,
-    LineLost,
-    NoAnswer,
-    RequestRefused,
-    Superseded,
-    WrongReply,
-)
 from ..limits import Limits
 from ..model import DeviceState, LineCounters, LineState, Priority
+from ..program import Program
 from ..requests import Diagnose, Identify, Read, ReadInput, ReadWrite, Request, WriteMany, WriteOne
-from ..shared_facts import Program
+from .failures import ErrorForm
 
 VERSION = 1
 """Of the messages; programs of different versions do not share a line."""
-LONGEST = 1 << 18
+LONGEST_MESSAGE = 1 << 18
 """Bytes of one message; more is no message of ours."""
 LENGTH = 4
 
@@ -46,8 +35,8 @@ class Hello(Message, frozen=True):
     program: Program
     label: str
     """The line as it was meant, with its settings."""
-    stops: dict[int, int]
-    """The counts of stops that it knows."""
+    stops: dict[int, dict[str, int]]
+    """The stops that it knows of, by device and program."""
 
 
 class Welcome(Message, frozen=True):
@@ -73,7 +62,7 @@ class Describe(Message, frozen=True):
     limits: Limits
 
 
-class Ask(Message, frozen=True):
+class Asking(Message, frozen=True):
     """A request for the line."""
 
     number: int
@@ -84,6 +73,8 @@ class Ask(Message, frozen=True):
     max_age: float
     stamp: int
     """The count of stops of the device that the asker knew of."""
+    asked: float
+    """When the program asked."""
     limits: Limits | None = None
     """Where they are not those of the device: of a broadcast."""
 
@@ -102,21 +93,6 @@ class Answer(Message, frozen=True):
     time: float
 
 
-class ErrorForm(msgspec.Struct, frozen=True, omit_defaults=True):
-    """An error as a message carries it; which fields count is its kind's own business."""
-
-    text: str = ""
-    device: int = 0
-    function: int = 0
-    address: int = 0
-    detail: str = ""
-    received: bytes = b""
-    code: int = 0
-    meaning: str = ""
-    register: int = 0
-    retry_in: float | None = None
-
-
 class Failed(Message, frozen=True):
     """What became of a request that was not answered well."""
 
@@ -129,8 +105,22 @@ class StopGiven(Message, frozen=True):
     """Somebody stops devices: all that was meant for them before is void."""
 
     devices: tuple[int, ...]
+    counts: tuple[int, ...]
+    """How often the program has stopped each of them by now."""
     by: str
     program: Program
+
+
+class RollCall(Message, frozen=True):
+    """The owner stood still, and asks who is there: what was said meanwhile comes before it."""
+
+    number: int
+
+
+class Here(Message, frozen=True):
+    """The answer to a RollCall; nothing goes out past the owner any more."""
+
+    number: int
 
 
 class Claim(Message, frozen=True):
@@ -147,15 +137,15 @@ class Denied(Message, frozen=True):
     holder: Program
 
 
-class Question(Message, frozen=True):
+class AskedFor(Message, frozen=True):
     """A program asks the one that commands a device to leave it."""
 
     device: int
     program: Program
 
 
-class Reply(Message, frozen=True):
-    """The answer to a Question, to `program`."""
+class Granting(Message, frozen=True):
+    """The answer to a AskedFor, to `program`."""
 
     device: int
     program: str
@@ -177,7 +167,7 @@ class Told(Message, frozen=True):
     text: str
 
 
-class Wish(Message, frozen=True):
+class PollWish(Message, frozen=True):
     """The share of the line's time that a program's polls take, by device.
 
     `trace` where it shows frames.
@@ -193,7 +183,8 @@ class Facts(Message, frozen=True):
     programs: tuple[Program, ...]
     commanders: dict[int, str]
     """Ids of the programs that command, by device."""
-    stops: dict[int, int]
+    stops: dict[int, dict[str, int]]
+    """How many stops each device was given, by program."""
     hushed: dict[int, tuple[str, str]]
     """Who leaves which device alone, and why."""
 
@@ -217,8 +208,9 @@ class Goodbye(Message, frozen=True):
 
 
 AnyMessage = (
-    Hello | Welcome | TurnedAway | Describe | Ask | Withdraw | Answer | Failed | StopGiven | Claim
-    | Denied | Question | Reply | Told | Hush | Wish | Facts | News | Goodbye
+    Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
+    | Claim | RollCall | Here | Denied | AskedFor | Granting | Told | Hush | PollWish | Facts | News
+    | Goodbye
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()
@@ -243,9 +235,20 @@ def packed(message: AnyMessage) -> bytes:
 async def next_message(reader: asyncio.StreamReader) -> AnyMessage:
     """The next message. Raises NoMessage, EOFError where the other end is gone, OSError."""
     length = int.from_bytes(await reader.readexactly(LENGTH), "big")
-    if length > LONGEST:
+    if length > LONGEST_MESSAGE:
         raise NoMessage(f"{length} bytes")
-    data = await reader.readexactly(length)
+    return unpacked(await reader.readexactly(length))
+
+
+def message_of(data: bytes) -> AnyMessage:
+    """The one message in bytes with its length before it. Raises NoMessage."""
+    if int.from_bytes(data[:LENGTH], "big") != len(data) - LENGTH:
+        raise NoMessage(f"{len(data)} bytes")
+    return unpacked(data[LENGTH:])
+
+
+def unpacked(data: bytes) -> AnyMessage:
+    """A message without its length. Raises NoMessage."""
     try:
         return _DECODER.decode(data)
     except (msgspec.MsgspecError, UnicodeDecodeError, RecursionError) as error:
@@ -257,15 +260,19 @@ def request_form(request: Request) -> tuple[str, dict[str, Any]]:
     return type(request).__name__, msgspec.to_builtins(request, builtin_types=(bytes,))
 
 
-def request_of(message: Ask) -> Request:
+def asked_request(message: Asking) -> Request:
     """The request that a message carries. Raises NoMessage."""
     kind = KINDS.get(message.kind)
     if kind is None:
         raise NoMessage(f"request {message.kind!r}")
     try:
-        return msgspec.convert(message.fields, kind)
-    except msgspec.MsgspecError as error:
+        request = msgspec.convert(message.fields, kind)
+        bytes([request.device])
+        request.pdu()
+    except Exception as error:
+        # a request that cannot be put into bytes, for whichever reason, is none
         raise NoMessage(str(error)) from error
+    return request
 
 
 def priority_of(number: int) -> Priority:
@@ -274,40 +281,3 @@ def priority_of(number: int) -> Priority:
         return Priority(number)
     except ValueError as error:
         raise NoMessage(str(error)) from error
-
-
-_PLAIN: Mapping[str, type[LineError]] = {
-    kind.__name__: kind for kind in (RequestRefused, LineBusy, LineLost, LineClosed)
-}
-
-
-_MADE: Mapping[str, Callable[[ErrorForm], LineError]] = {
-    "NoAnswer": lambda e: NoAnswer(e.device, e.function, e.address, e.detail, retry_in=e.retry_in),
-    "ChecksumFault": lambda e: ChecksumFault(e.device, e.function, e.address, e.detail, e.received),
-    "WrongReply": lambda e: WrongReply(e.device, e.function, e.address, e.detail, e.received),
-    "DeviceException": lambda e: DeviceException(
-        e.device, e.function, e.address, e.code, e.meaning
-    ),
-    "Superseded": lambda e: Superseded(e.device, e.register),
-}
-"""How each error with fields of its own is made anew."""
-
-
-def failure(number: int, error: BaseException) -> Failed:
-    """What became of a request, as a message carries it."""
-    name = type(error).__name__
-    if name not in _MADE:
-        return Failed(number, name if name in _PLAIN else "LineError", ErrorForm(str(error)))
-    held = {
-        key: getattr(error, key)
-        for key in ErrorForm.__struct_fields__
-        if key != "text" and hasattr(error, key)
-    }
-    return Failed(number, name, ErrorForm(str(error), **held))
-
-
-def error_of(message: Failed) -> LineError:
-    """The error that a message carries."""
-    if (make := _MADE.get(message.error)) is not None:
-        return make(message.form)
-    return _PLAIN.get(message.error, LineError)(message.form.text)

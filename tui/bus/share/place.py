@@ -9,19 +9,24 @@ import hashlib
 import logging
 import os
 import re
+import socket
 import stat
-from contextlib import suppress
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import IO
 
 import msgspec
 
-from ..shared_facts import Program
+from ..program import Program
 
 log = logging.getLogger(__name__)
 
-PRIVATE_FOLDER, PRIVATE_FILE = 0o700, 0o600
+PRIVATE_FOLDER, PRIVATE_FILE, SHARED_FILE = 0o700, 0o600, 0o660
+LONGEST_SOCKET_PATH = 100
+OPEN_FOLDERS = Path("/proc/self/fd")
 LONGEST_LOCK = 4096
 """Bytes of a lock file that are read; ours hold some hundred."""
 
@@ -32,6 +37,9 @@ class Owner(msgspec.Struct, frozen=True):
     version: int
     program: Program
     socket: str
+    """Where it listens; empty where it does not yet, or has ended."""
+    quiet_until: float = 0.0
+    """Monotonic time until which a reply to an owner that has ended may come."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -56,18 +64,6 @@ class SharePlace:
     def lock_path(self) -> Path:
         """The file whose lock makes an owner."""
         return self.lock_folder / f"{self.name}.lock"
-
-    def socket_path(self) -> Path:
-        """Where to listen, its folder made; what cannot be made is passed over. Raises OSError."""
-        trouble: OSError | None = None
-        for folder in self.socket_folders:
-            try:
-                make_private(folder, shared=self.group is not None)
-            except OSError as error:
-                trouble = error
-            else:
-                return folder / f"{self.name}.sock"
-        raise trouble or FileNotFoundError("no folder for the socket of the line")
 
 
 def make_private(folder: Path, *, shared: bool = False) -> None:
@@ -104,14 +100,14 @@ class OwnerLock:
         shared = self._place.group is not None
         make_private(path.parent, shared=shared)
         descriptor = os.open(
-            path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o660 if shared else 0o600
+            path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, SHARED_FILE if shared else PRIVATE_FILE
         )
         file = os.fdopen(descriptor, "r+b", buffering=0)
         try:
             if shared:
                 with suppress(PermissionError):
                     os.fchown(descriptor, -1, self._place.group or -1)
-                    os.fchmod(descriptor, 0o660)
+                    os.fchmod(descriptor, SHARED_FILE)
             fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
             # a file that was taken away meanwhile locks nobody out
             if os.fstat(descriptor).st_ino != path.stat().st_ino:
@@ -142,11 +138,28 @@ class OwnerLock:
         except OSError:
             return False
 
-    def give_back(self) -> None:
-        """Own the line no more."""
+    def renew(self) -> bool:
+        """Lock the file that is there now, where the one before was taken away.
+
+        Returns False where another program was quicker. Raises OSError.
+        """
+        before, self._file = self._file, None
+        try:
+            taken = self.take()
+        finally:
+            if self._file is None:
+                self._file = before
+            elif before is not None:
+                before.close()
+        return taken
+
+    def give_back(self, last: Owner | None = None) -> None:
+        """Own the line no more; `last` is what the next owner has to know."""
         if self._file is not None:
             with suppress(OSError):
                 os.ftruncate(self._file.fileno(), 0)
+                if last is not None:
+                    self.tell(last)
             self._file.close()
             self._file = None
 
@@ -158,3 +171,39 @@ def owner_of(place: SharePlace) -> Owner | None:
             return msgspec.json.decode(file.read(LONGEST_LOCK), type=Owner)
     except (OSError, msgspec.MsgspecError, UnicodeDecodeError):
         return None
+
+
+@contextmanager
+def short_path(path: Path) -> Iterator[str]:
+    """A path to a socket that the system takes: it keeps little more than a hundred bytes for one.
+
+    A longer one leads through the open folder, where the system shows those. Raises OSError.
+    """
+    if len(os.fsencode(path)) <= LONGEST_SOCKET_PATH or not OPEN_FOLDERS.is_dir():
+        yield str(path)
+        return
+    folder = os.open(path.parent, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
+    try:
+        yield str(OPEN_FOLDERS / str(folder) / path.name)
+    finally:
+        os.close(folder)
+
+
+def has_ended(program: Program) -> bool:
+    """Whether a program of this machine surely is no more."""
+    try:
+        os.kill(program.pid, 0)
+    except ProcessLookupError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False
+
+
+def user_of(peer: socket.socket) -> int | None:
+    """The number of the user at the other end of a local socket; None where it is not told."""
+    try:
+        found = peer.getsockopt(socket.SOL_SOCKET, socket.SO_PEERCRED, struct.calcsize("3i"))
+    except (AttributeError, OSError):
+        return None
+    return int(struct.unpack("3i", found)[1])

@@ -11,13 +11,19 @@ from pathlib import Path
 from ..errors import NotShared
 from ..schedule.inside import LineInside
 from .client import OwnerAway, Say, ShareClient, owner_text
+from .messages import VERSION
+from .past_owner import PastOwner
 from .place import Owner, OwnerLock, SharePlace, owner_of
 from .server import ShareServer
+from .stops_past import StopsPast
+from .turn import Turn
 
 log = logging.getLogger(__name__)
 
-LOOK_INTERVAL = 0.02
+OWNER_INTERVAL = 0.02
 """Seconds between two looks for an owner that is just beginning, or has just ended."""
+LONGEST_QUIET = 30.0
+"""Seconds that a line is left quiet at most, should a lock file tell of a later time."""
 NO_OWNER = 3.0
 """Seconds after which a locked line without an owner that answers is given up."""
 
@@ -29,9 +35,11 @@ class Sharing:
         self._place = place
         self._inside = inside
         self._lock = OwnerLock(place)
+        self._attached = False
         self._server: ShareServer | None = None
         self._client: ShareClient | None = None
         self._off = False
+        self._quiet_until = 0.0
 
     @property
     def stops_only(self) -> bool:
@@ -46,11 +54,9 @@ class Sharing:
         if self._lock.held or self._off:
             return
         inside = self._inside
-        quiet_until = 0.0
         away_since: float | None = None
         served: Owner | None = None
         while True:
-            before = owner_of(self._place)
             try:
                 taken = self._lock.take()
             except OSError as error:
@@ -64,9 +70,8 @@ class Sharing:
             try:
                 if owner is None:
                     raise OwnerAway
-                served = owner
-                quiet_until = await self._attend(owner, say)
-                away_since = None
+                await self._attend(owner, say)
+                served, away_since = owner, None
             except OwnerAway:
                 now = inside.clock()
                 away_since = away_since or now
@@ -74,33 +79,36 @@ class Sharing:
                     raise NotShared(
                         f"{owner_text(owner)} holds the line and cannot be reached. Close it."
                     ) from None
-                await asyncio.sleep(LOOK_INTERVAL)
-        await self._begin(before, quiet_until, served)
+                await asyncio.sleep(OWNER_INTERVAL)
+        await self._begin(served)
 
-    async def _attend(self, owner: Owner, say: Say) -> float:
-        """Be a client of an owner until it ends; returns when its last reply cannot come."""
-        self._client = client = ShareClient(self._inside, owner, say)
+    async def _attend(self, owner: Owner, say: Say) -> None:
+        """Be a client of an owner until it ends."""
+        past = PastOwner(self._inside, StopsPast(self._place), Turn(self._place))
+        self._client = client = ShareClient(self._inside, owner, say, past)
+        client.again, self._attached = self._attached, True
         try:
             await client.serve()
         finally:
             self._client = None
         log.info("%s does not own the line any more", owner.program.text)
-        return client.heard + client.quiet
+        self._quiet_until = max(self._quiet_until, client.quiet_until)
 
-    async def _begin(self, before: Owner | None, quiet_until: float, served: Owner | None) -> None:
+    async def _begin(self, served: Owner | None) -> None:
         """Listen as the owner, and wait until no reply to an owner before may come."""
         inside = self._inside
-        if not quiet_until and before is not None:
-            quiet_until = inside.clock() + _left_of(inside.timing.late_reply, before)
+        if (before := owner_of(self._place)) is not None:
+            left = _left_of(before, inside.timing.late_reply, inside.clock())
+            self._quiet_until = max(self._quiet_until, inside.clock() + left)
+        # should this program end before it listens
+        self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until))
         server = ShareServer(self._place, self._lock, inside)
         try:
-            await server.start()
+            await server.start(served.program if served is not None else None)
         except OSError as error:
             log.error("the line cannot be shared: %s", error)
         self._server = server
-        if served is not None:
-            inside.facts.hear_gone(served.program)
-        await asyncio.sleep(max(0.0, quiet_until - inside.clock()))
+        await asyncio.sleep(max(0.0, self._quiet_until - inside.clock()))
 
     def tell_state(self) -> None:
         """The line's state has changed."""
@@ -109,18 +117,24 @@ class Sharing:
 
     async def close(self, quiet: float) -> None:
         """Give the line to whoever is attached; a reply may still come for `quiet` seconds."""
+        now = self._inside.clock()
+        quiet = max(quiet, self._quiet_until - now)
         if self._server is not None:
             await self._server.close(quiet)
             self._server = None
-        self._lock.give_back()
+        # whoever comes next may not have been attached
+        me = self._inside.facts.me
+        self._lock.give_back(Owner(VERSION, me, "", now + quiet) if quiet > 0 else None)
 
 
-def _left_of(lateness: float, dead: Owner) -> float:
-    """Seconds for which a reply to an owner that was killed may still come.
+def _left_of(before: Owner, lateness: float, now: float) -> float:
+    """Seconds for which a reply to an owner that has ended may still come.
 
-    Its socket is left behind, touched by each sign of life.
+    One that was killed has left its socket, touched by each sign of life.
     """
+    if not before.socket:
+        return min(LONGEST_QUIET, max(0.0, before.quiet_until - now))
     with suppress(OSError):
-        last = Path(dead.socket).stat().st_mtime
+        last = Path(before.socket).stat().st_mtime
         return min(lateness, max(0.0, last + lateness + 1.0 - time.time()))
-    return 0.0
+    return lateness

@@ -111,6 +111,7 @@ class TcpMaster:
         self._sending = sending
         begun = clock()
         try:
+            sending.look()
             await self._send(data)
             tally.requests += 1
             tally.bytes_out += len(data)

@@ -8,7 +8,7 @@ from .say import say
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
-    from tui.bus.shared_facts import Program
+    from tui.bus.program import Program
     from tui.session.sharing.guardian import Guardian
 
 

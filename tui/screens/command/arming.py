@@ -14,7 +14,7 @@ from tui.session.work import Outcome
 from ..base import PanelScreen
 
 if TYPE_CHECKING:
-    from tui.bus.shared_facts import Program
+    from tui.bus.program import Program
 
     from ..dialogs.now import MotorsNow
 

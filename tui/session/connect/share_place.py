@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from tui.bus.shared_facts import Program
+from tui.bus.program import Program
 
 from ..paths import state_folder
 from .line_key import line_key

@@ -27,7 +27,7 @@ from ..starts.record import StartRecord
 from ..starts.starts import Starts
 
 if TYPE_CHECKING:
-    from tui.bus.shared_facts import Program
+    from tui.bus.program import Program
 
     from ..events import EventLog
 

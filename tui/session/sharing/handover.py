@@ -18,15 +18,16 @@ from ..clock import REAL_CLOCK, Clock
 from ..events import EventLog
 
 if TYPE_CHECKING:
-    from tui.bus.shared_facts import Program
+    from tui.bus.program import Program
 
     from ..drive import DriveSession
     from ..starts.keeper import StartKeeper
 
 ANSWER_WITHIN = 15.0
 """Seconds after which a question that nobody answers is a no, or a yes where the motor stands."""
-STATE_FRESH = 2.0
-STANDING = ("stopped", "ready", "blocked")
+SEEN_WITHIN = 2.0
+"""Seconds in which a motor must have been seen to stand."""
+SURELY_STANDING = ("stopped", "ready", "blocked")
 """States in which a motor surely stands; a tripped one may coast."""
 
 
@@ -93,8 +94,8 @@ class Handover:
 
     async def _adopt(self, session: DriveSession, starts: StartKeeper) -> None:
         """A motor that runs is this program's from now on: its end stops it."""
-        state = session.state(STATE_FRESH)
-        if state.motion in STANDING:
+        state = session.state(SEEN_WITHIN)
+        if state.motion in SURELY_STANDING:
             return
         order: Literal["forward", "reverse"] = (
             "reverse" if state.direction == "reverse" else "forward"
@@ -124,7 +125,6 @@ class Handover:
         self._spawn(partial(self._expire, request), f"question about {device}")
 
     async def _expire(self, request: DriveRequest) -> None:
-        await asyncio.sleep(0)
         await self._clock.sleep(ANSWER_WITHIN)
         if self.requests.get(request.device) is request:
             self._forget(request.device)
@@ -140,7 +140,7 @@ class Handover:
     def _decide(self, device: int, program: Program) -> None:
         """Without an answer: no while the motor runs, or may run."""
         session = self._session_of(device)
-        stands = session is not None and session.state(STATE_FRESH).motion in STANDING
+        stands = session is not None and session.state(SEEN_WITHIN).motion in SURELY_STANDING
         self._reply(device, program, yes=stands)
 
     def _reply(self, device: int, program: Program, *, yes: bool) -> None:

@@ -1,0 +1,141 @@
+"""Several programs on one line, as lines of one process that meet at one place."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from tui.bus.line import Line, Timing
+from tui.bus.link import Link
+from tui.bus.program import Program
+from tui.bus.share.place import SharePlace
+
+from .conftest import WIDE
+from .peer import eventually
+
+ROOT = Path(__file__).parent.parent.parent
+QUICK = Timing(first_timeout=1.5, min_timeout=1.5, late_reply=0.2, reconnect_first=0.05)
+"""Patient with answers, quick to take a line over."""
+
+
+def place_in(folder: Path, key: str = "serial:line") -> SharePlace:
+    """Where the programs of a test meet."""
+    return SharePlace(key, folder / "lines", (folder / "run",))
+
+
+@dataclass(slots=True)
+class SharedLines:
+    """Opens programs on one line, the first of which owns it, and closes them."""
+
+    folder: Path
+    link: Link
+    opened: list[Line] = field(default_factory=list)
+
+    def open(
+        self,
+        name: str,
+        *,
+        timing: Timing = QUICK,
+        place: SharePlace | None = None,
+        wait: float | None = 5.0,
+        pid: int = 0,
+    ) -> Line:
+        """A program of this name, on the line."""
+        program = Program(name, name, pid or os.getpid())
+        place = place or place_in(self.folder)
+        line = Line(self.link, timing=timing, place=place, program=program)
+        for device in range(1, 10):
+            line.describe(device, WIDE)
+        self.opened.append(line)
+        line.open(wait=wait)
+        if wait is not None and len(self.opened) > 1:
+            everybody = [one for one in self.opened if one.state.status.value != "closed"]
+            eventually(lambda: all(knows(one, name) for one in everybody))
+        return line
+
+    @property
+    def left_behind(self) -> list[str]:
+        """What lies in the folders of the meeting place, but for the lock."""
+        return [one.name for one in self.folder.rglob("*.s*")]
+
+    def close(self) -> None:
+        """Close all."""
+        for line in self.opened:
+            line.close()
+
+
+def knows(line: Line, name: str) -> bool:
+    """Whether a program was told that another one is on the line."""
+    return line.facts.program(name) is not None
+
+
+@contextmanager
+def frozen(line: Line) -> Iterator[None]:
+    """The line's thread stands still meanwhile, as that of a program under SIGSTOP."""
+    thaw, stands = threading.Event(), threading.Event()
+
+    def stand() -> None:
+        stands.set()
+        thaw.wait(60)
+
+    in_loop(line, stand)
+    assert stands.wait(10)
+    try:
+        yield
+    finally:
+        thaw.set()
+
+
+def in_loop(line: Line, call: Callable[[], object]) -> None:
+    """Have something done in the thread of a line."""
+    loop = line._engine._loop
+    assert loop is not None
+    loop.call_soon_threadsafe(call)
+
+
+@contextmanager
+def other_program(path: str, folder: Path, name: str, late: float = 0.2) -> Iterator[OtherProgram]:
+    """A process of its own on the line; killed at the end at the latest."""
+    command = [sys.executable, "-m", "tests.bus.share_program", path, str(folder), name, str(late)]
+    process = subprocess.Popen(
+        command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, cwd=ROOT
+    )
+    program = OtherProgram(process)
+    try:
+        program.hear("ready")
+        yield program
+    finally:
+        program.kill()
+
+
+@dataclass(slots=True)
+class OtherProgram:
+    """A process on the line, told what to do."""
+
+    process: subprocess.Popen[str]
+
+    def hear(self, wanted: str) -> None:
+        """Wait for a line that it prints."""
+        assert self.process.stdout is not None
+        said = self.process.stdout.readline()
+        assert said.startswith(wanted), said
+
+    def tell(self, text: str) -> None:
+        """Have it do something, and wait until it did, or for a write began to."""
+        assert self.process.stdin is not None
+        print(text, file=self.process.stdin, flush=True)
+        self.hear("did")
+
+    def kill(self) -> float:
+        """End it as nothing can be caught; returns when."""
+        self.process.kill()
+        killed = time.monotonic()
+        self.process.communicate()
+        return killed

@@ -1,0 +1,434 @@
+"""What becomes of the others when a program on the line ends, is killed, or talks nonsense."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+import threading
+import time
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+import pytest
+
+from tui.bus.api import LineStatus, Priority
+from tui.bus.errors import LineClosed, LineLost, NotShared
+from tui.bus.line import Line
+from tui.bus.program import Program
+from tui.bus.share.messages import (
+    VERSION,
+    Answer,
+    AnyMessage,
+    Failed,
+    Hello,
+    Message,
+    Told,
+    TurnedAway,
+    packed,
+    unpacked,
+)
+from tui.bus.share.place import Owner, OwnerLock, short_path
+
+from .conftest import Share
+from .peer import PtyPeer, Step, eventually, honest, reply
+from .sharing import QUICK, SharedLines, frozen, in_loop, other_program, place_in
+
+M = TypeVar("M", bound=Message)
+STRANGER = Program("stranger", "stranger", 1)
+SLOW_REGISTER = 77
+
+
+def slow_at_77(request: bytes, _count: int) -> Sequence[Step]:
+    return [0.12, reply(request)] if request[3] == SLOW_REGISTER else [reply(request)]
+
+
+def times_sent(peer: PtyPeer, function: int) -> int:
+    return [(one[1], one[3]) for one in peer.requests].count((function, SLOW_REGISTER))
+
+
+async def come(condition: Callable[[], bool]) -> None:
+    """Wait for something while the test's own tasks go on."""
+    await asyncio.to_thread(eventually, condition)
+
+
+# The owner ends
+
+
+async def test_the_owners_end_hands_the_line_over_and_reads_are_asked_anew(share: Share) -> None:
+    with PtyPeer(slow_at_77) as peer:
+        lines = share(peer.path)
+        owner, other, third = (lines.open(name) for name in ("panel", "watch", "remote"))
+        await owner.read(1, 1)
+        in_flight = asyncio.create_task(other.read(1, SLOW_REGISTER))
+        await asyncio.to_thread(peer.await_requests, 2)
+        waiting = [asyncio.create_task(one.read(1, 30)) for one in (other, third)]
+        await asyncio.sleep(0.02)
+        await asyncio.to_thread(owner.close)
+        assert (await in_flight).words == (SLOW_REGISTER,)
+        for task in waiting:
+            assert (await task).words == (30,)
+        assert times_sent(peer, 3) == 2
+        eventually(lambda: {line.facts.programs[0].name for line in (other, third)} != {"panel"})
+        assert other.facts.programs[0] == third.facts.programs[0]
+        eventually(lambda: [len(line.facts.others) for line in (other, third)] == [1, 1])
+
+
+async def test_a_write_that_the_owner_left_unanswered_is_never_repeated_a_stop_is(
+    share: Share,
+) -> None:
+    with PtyPeer(slow_at_77) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("run")
+        await owner.read(1, 1)
+        write = asyncio.create_task(other.write(1, SLOW_REGISTER, [1]))
+        await asyncio.to_thread(peer.await_requests, 2)
+        await asyncio.to_thread(owner.close)
+        with pytest.raises(LineLost, match="Whether it was taken is not known"):
+            await write
+        assert times_sent(peer, 6) == 1
+        await come(lambda: other.facts.programs[0] == other.facts.me)
+        third = lines.open("stop")
+        stop = asyncio.create_task(third.write(1, SLOW_REGISTER, [0], priority=Priority.STOP))
+        await come(lambda: times_sent(peer, 6) == 2)
+        await asyncio.to_thread(other.close)
+        await stop
+        assert times_sent(peer, 6) == 3
+
+
+async def test_a_client_that_closes_during_a_write_tells_that_its_fate_is_not_known(
+    share: Share,
+) -> None:
+    with PtyPeer(slow_at_77) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("run")
+        await owner.read(1, 1)
+        write = asyncio.create_task(other.write(1, SLOW_REGISTER, [1]))
+        await asyncio.to_thread(peer.await_requests, 2)
+        await asyncio.to_thread(other.close)
+        with pytest.raises(LineClosed, match="Whether it was taken is not known"):
+            await write
+        assert (await owner.read(1, 4)).words == (4,)
+
+
+async def test_a_killed_owner_is_followed_once_no_reply_to_it_may_come(
+    share: Share, tmp_path: Path
+) -> None:
+    with PtyPeer(slow_at_77) as peer, other_program(peer.path, tmp_path, "run", 1.0) as owner:
+        owner.tell("read 1")
+        lines = share(peer.path)
+        line = lines.open("watch", timing=replace(QUICK, late_reply=1.0))
+        gone: list[str] = []
+        line.facts.on_gone(lambda program: gone.append(program.name))
+        owner.tell(f"write {SLOW_REGISTER} 5")
+        await come(lambda: times_sent(peer, 6) == 1)
+        killed = await asyncio.to_thread(owner.kill)
+        assert (await line.read(1, 8)).words == (8,)
+        # the reply to the write may come for a second; what it was is not asked for again
+        assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
+        assert peer.arrivals[-1] - killed < 2.0
+        assert times_sent(peer, 6) == 1
+        assert gone == ["run"]
+
+
+async def test_a_write_by_a_client_of_a_killed_owner_is_not_known_and_not_repeated(
+    share: Share, tmp_path: Path
+) -> None:
+    with PtyPeer(slow_at_77) as peer, other_program(peer.path, tmp_path, "run") as owner:
+        owner.tell("read 1")
+        line = share(peer.path).open("remote")
+        write = asyncio.create_task(line.write(1, SLOW_REGISTER, [1]))
+        await come(lambda: times_sent(peer, 6) == 1)
+        await asyncio.to_thread(owner.kill)
+        with pytest.raises(LineLost, match="Whether it was taken is not known"):
+            await write
+        await line.read(1, 4)
+        assert times_sent(peer, 6) == 1
+
+
+async def test_one_that_comes_after_a_killed_owner_keeps_the_same_silence(
+    share: Share, tmp_path: Path
+) -> None:
+    with PtyPeer(slow_at_77) as peer, other_program(peer.path, tmp_path, "run", 1.0) as owner:
+        owner.tell("read 1")
+        owner.tell(f"write {SLOW_REGISTER} 5")
+        await come(lambda: times_sent(peer, 6) == 1)
+        await asyncio.to_thread(owner.kill)
+        line = share(peer.path).open("watch", timing=replace(QUICK, late_reply=1.0))
+        await line.read(1, 8)
+        assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
+
+
+async def test_one_that_comes_after_an_owner_that_ended_keeps_it_too(share: Share) -> None:
+    """Whoever was not attached was not told."""
+    late = replace(QUICK, late_reply=1.0)
+    with PtyPeer(slow_at_77) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel", timing=late)
+        await owner.read(1, 1)
+        write = asyncio.create_task(owner.write(1, SLOW_REGISTER, [1]))
+        await asyncio.to_thread(peer.await_requests, 2)
+        await asyncio.to_thread(owner.close)
+        # one that ends before it has sent anything hands it on
+        lines.open("hasty", timing=late, wait=None)
+        await asyncio.sleep(0.1)
+        lines.opened[-1].close()
+        line = lines.open("watch", timing=late)
+        assert (await line.read(1, 8)).words == (8,)
+        assert peer.arrivals[-1] - peer.arrivals[-2] >= 0.99
+        with pytest.raises(LineClosed):
+            await write
+
+
+async def test_programs_that_went_with_the_owner_are_missed_by_the_next(
+    share: Share, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.share.server.BACK_WITHIN", 0.5)
+    with (
+        PtyPeer(honest) as peer,
+        other_program(peer.path, tmp_path, "panel") as owner,
+        other_program(peer.path, tmp_path, "run") as run,
+    ):
+        lines = share(peer.path)
+        line, third = lines.open("watch"), lines.open("remote")
+        run.tell("claim 4")
+        eventually(lambda: line.facts.commander(4) is not None)
+        gone: list[str] = []
+        for one in (line, third):
+            one.facts.on_gone(lambda program: gone.append(program.name))
+        os.kill(run.process.pid, 9)
+        os.kill(owner.process.pid, 9)
+        eventually(lambda: sorted(gone) == ["panel", "run"])
+        assert line.facts.commander(4) is None
+        # each of them once, and not the one that came back
+        await asyncio.sleep(0.7)
+        assert sorted(gone) == ["panel", "run"]
+
+
+# Clients that are no good
+
+
+def raw(lines: SharedLines) -> socket.socket:
+    """A connection to the owner's socket."""
+    (path,) = (lines.folder / "run").glob("*.sock")
+    connection = socket.socket(socket.AF_UNIX)
+    connection.settimeout(10)
+    with short_path(path) as address:
+        connection.connect(address)
+    return connection
+
+
+def hello(version: int = VERSION) -> bytes:
+    return packed(Hello(version, STRANGER, "serial:line", {}))
+
+
+def answer(connection: socket.socket) -> AnyMessage:
+    length = int.from_bytes(connection.recv(4, socket.MSG_WAITALL), "big")
+    return unpacked(connection.recv(length, socket.MSG_WAITALL))
+
+
+def answer_of_kind(connection: socket.socket, kind: type[M]) -> M:
+    """The next message of a kind, whatever is told besides."""
+    while not isinstance(told := answer(connection), kind):
+        pass
+    return told
+
+
+def ask(**fields: object) -> bytes:
+    asked: dict[str, object] = {
+        "number": 1, "kind": "Read", "fields": {"device": 1, "address": 1, "count": 1},
+        "priority": 4, "replaceable": False, "max_age": 0.0, "stamp": 0, "asked": 1e9,
+    }  # fmt: skip
+    data = msgspec.msgpack.encode({"type": "Asking", **asked, **fields})
+    return len(data).to_bytes(4, "big") + data
+
+
+NONSENSE = {
+    "nothing": b"",
+    "garbage": os.urandom(3000),
+    "a giant length": b"\xff\xff\xff\xff" + b"x" * 1000,
+    "half a message": hello()[:-3],
+    "a request before the greeting": ask(),
+    "an unknown kind": hello() + ask(kind="Erase"),
+    "a device that cannot be": hello() + ask(fields={"device": 9000, "address": 1, "count": 1}),
+    "a register that cannot be": hello() + ask(fields={"device": 1, "address": -5, "count": 1}),
+    "a priority that cannot be": hello() + ask(priority=-99),
+    "deep": hello() + (9000).to_bytes(4, "big") + b"\x91" * 9000,
+    "no end of requests": hello() + b"".join(ask(number=n) for n in range(2000)),
+}
+
+
+@pytest.mark.parametrize("said", NONSENSE.values(), ids=NONSENSE.keys())
+async def test_what_one_program_says_costs_the_others_nothing(share: Share, said: bytes) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        with raw(lines) as connection:
+            with suppress(OSError):  # the owner does not hear it out
+                connection.sendall(said)
+            for line in (owner, other):
+                assert (await asyncio.wait_for(line.read(1, 5), 10)).words == (5,)
+        eventually(lambda: [one.name for one in owner.facts.others] == ["watch"])
+        assert (await other.read(1, 6)).words == (6,)
+
+
+async def test_a_command_that_lay_in_the_socket_for_long_is_not_sent(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        await owner.read(1, 1)
+        write = {"device": 1, "address": 9, "value": 1}
+        with raw(lines) as connection:
+            old = time.monotonic() - 5
+            connection.sendall(hello() + ask(kind="WriteOne", fields=write, asked=old))
+            told = await asyncio.to_thread(answer_of_kind, connection, Failed)
+            assert told.error == "RequestRefused"
+            assert "stood still for 5 s" in told.form.text
+            # a stop is never too late
+            stop = ask(number=2, kind="WriteOne", fields=write, asked=old, priority=0)
+            connection.sendall(stop)
+            assert (await asyncio.to_thread(answer_of_kind, connection, Answer)).number == 2
+        assert [one[1] for one in peer.requests] == [3, 6]
+
+
+async def test_a_client_that_reads_nothing_is_let_go(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.share.attached.MOST_UNREAD", 1 << 14)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        with raw(lines) as connection:
+            connection.sendall(hello())
+            eventually(lambda: len(owner.facts.others) == 2)
+            for _ in range(400):
+                owner.facts.tell_all(1, "x" * 2000)
+            eventually(lambda: len(owner.facts.others) == 1)
+            assert (await other.read(1, 6)).words == (6,)
+
+
+async def test_a_client_that_was_let_go_comes_back(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("watch")
+        server = owner._engine._shared._server  # type: ignore[union-attr]
+        for _ in range(5):
+            in_loop(owner, lambda: [one.writer.transport.abort() for one in server._all()])
+            await other.read(1, 6)
+            eventually(lambda: [one.name for one in owner.facts.others] == ["watch"])
+        eventually(lambda: other.state.status is LineStatus.CONNECTED)
+
+
+async def test_another_version_is_turned_away_in_words(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        lines.open("panel")
+        with raw(lines) as connection:
+            connection.sendall(hello(VERSION + 1))
+            told = answer(connection)
+        assert isinstance(told, TurnedAway)
+        assert "panel" in told.why
+        assert "another version" in told.why
+
+
+async def test_another_user_is_turned_away_in_words(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        lines.open("panel")
+        monkeypatch.setattr("tui.bus.share.server.user_of", lambda _: os.getuid() + 4711)
+        with pytest.raises(NotShared, match="other users only"):
+            lines.open("foreign")
+
+
+async def test_an_owner_that_cannot_be_reached_is_named_at_once(
+    share: Share, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("tui.bus.share.sharing.NO_OWNER", 0.3)
+    lock = OwnerLock(place_in(tmp_path))
+    assert lock.take()
+    lock.tell(Owner(VERSION, STRANGER, str(tmp_path / "nothing.sock")))
+    try:
+        told = r"stranger \(pid 1\) holds the line and cannot be reached"
+        with PtyPeer(honest) as peer, pytest.raises(NotShared, match=told):
+            share(peer.path).open("panel")
+    finally:
+        lock.give_back()
+
+
+async def test_an_owner_that_talks_nonsense_is_left_again(share: Share, tmp_path: Path) -> None:
+    """What takes connections on the socket, and is no program of ours, must not hang the others."""
+    lock = OwnerLock(place_in(tmp_path))
+    assert lock.take()
+    path = tmp_path / "odd.sock"
+    with socket.socket(socket.AF_UNIX) as listening:
+        with short_path(path) as address:
+            listening.bind(address)
+        listening.listen()
+        lock.tell(Owner(VERSION, STRANGER, str(path)))
+        with PtyPeer(honest) as peer:
+            line = share(peer.path).open("panel", wait=None)
+            for said in (b"\xff" * 9, packed(Told(1, "hm")), b""):
+                connection, _ = listening.accept()
+                connection.sendall(said)
+                connection.close()
+            lock.give_back()
+            eventually(lambda: line.state.status is LineStatus.CONNECTED)
+            assert (await line.read(1, 2)).words == (2,)
+
+
+# Nothing is left behind
+
+
+async def test_attaching_and_leaving_again_and_again_leaves_nothing_behind(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        await owner.read(1, 1)
+
+        async def visit(number: int) -> None:
+            line = lines.open(f"visitor{number}")
+            line.facts.claim(2)
+            await line.read(1, 2)
+            await asyncio.to_thread(line.close)
+
+        await visit(0)
+        eventually(lambda: not owner.facts.others)
+        before = len(os.listdir("/proc/self/fd")), threading.active_count()
+        for number in range(1, 16):
+            await visit(number)
+        eventually(lambda: not owner.facts.others and owner.facts.commander(2) is None)
+        eventually(lambda: (len(os.listdir("/proc/self/fd")), threading.active_count()) == before)
+        loop = owner._engine._loop
+        assert loop is not None
+        assert len(asyncio.all_tasks(loop)) < 8
+        assert len(owner.facts.departed) <= 16
+
+
+async def test_a_killed_program_leaves_a_socket_that_the_next_takes_away(
+    share: Share, tmp_path: Path
+) -> None:
+    with PtyPeer(honest) as peer:
+        with other_program(peer.path, tmp_path, "run") as owner:
+            owner.kill()
+        lines = share(peer.path)
+        assert lines.left_behind != []
+        lines.open("panel")
+        lines.close()
+        assert lines.left_behind == []
+
+
+async def test_closing_while_waiting_for_a_frozen_owner_takes_no_time(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        with frozen(owner):
+            other = Line(lines.link, timing=QUICK, place=place_in(lines.folder), program=STRANGER)
+            other.open()
+            await asyncio.sleep(0.05)
+            await asyncio.wait_for(asyncio.to_thread(other.close), 5)

@@ -1,0 +1,303 @@
+"""Stops by any program: before everything else, and what they void stays void everywhere."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from tui.bus.api import Priority
+from tui.bus.errors import LineError, LineLost, RequestRefused
+from tui.bus.line import Line
+from tui.bus.program import Program
+from tui.bus.share.messages import StopGiven
+from tui.bus.share.stops_past import StopsPast
+from tui.bus.stop_counts import StopCounts
+
+from .conftest import Share
+from .peer import PtyPeer, Step, eventually, honest, reply
+from .sharing import SharedLines, frozen, place_in
+
+STOP, RUN = 0, 15
+
+
+def slow(request: bytes, _count: int) -> Sequence[Step]:
+    return [0.1, reply(request)]
+
+
+def written(peer: PtyPeer) -> list[tuple[int, int]]:
+    """Device and value of every single write on the wire."""
+    return [(one[0], one[5]) for one in peer.requests if one[1] == 6]
+
+
+def stop(line: Line, *devices: int) -> list[asyncio.Task[float]]:
+    """What a stop key does: nothing that was meant before goes out, and the stop goes first."""
+    line.facts.give_stop(devices, "the stop key")
+    return [asyncio.create_task(look_and_stop(line, one)) for one in devices]
+
+
+async def look_and_stop(line: Line, device: int) -> float:
+    await line.read(device, 3, priority=Priority.STOP)
+    return await line.write(device, 1, [STOP], priority=Priority.STOP)
+
+
+def notes(lines: SharedLines) -> list[Path]:
+    """The notes of stops that went past an owner."""
+    return sorted(place_in(lines.folder).lock_folder.glob("*.stop*"))
+
+
+def all_know(programs: Sequence[Line], stops: int) -> bool:
+    return all(one.facts.stops.stamp(0) == stops for one in programs)
+
+
+async def refused(task: asyncio.Task[float]) -> str:
+    with pytest.raises(RequestRefused) as caught:
+        await task
+    return str(caught.value)
+
+
+async def test_a_stop_voids_what_any_program_meant_for_that_drive_and_only_that(
+    share: Share,
+) -> None:
+    with PtyPeer(slow) as peer:
+        lines = share(peer.path)
+        programs = [lines.open(name) for name in ("panel", "remote", "run")]
+        await programs[0].read(1, 1)
+        reading = asyncio.create_task(programs[0].read(1, 1))
+        await asyncio.to_thread(peer.await_requests, 2)
+        runs = [asyncio.create_task(one.write(1, 1, [RUN])) for one in programs]
+        others = [asyncio.create_task(one.write(2, 1, [RUN])) for one in programs]
+        await asyncio.sleep(0.03)
+        programs[1].facts.give_stop([1], "the stop key")
+        stops = [asyncio.create_task(programs[1].write(1, 1, [STOP], priority=Priority.STOP))]
+        for task in runs:
+            assert "a stop came after it (the stop key" in await refused(task)
+        await asyncio.gather(reading, *stops, *others)
+        assert written(peer) == [(1, STOP), (2, RUN), (2, RUN), (2, RUN)]
+        # what is meant afterwards goes out
+        eventually(lambda: all(one.facts.stops.stamp(1) == 1 for one in programs))
+        for one in programs:
+            await one.write(1, 1, [RUN])
+
+
+async def test_each_is_told_of_a_stop_once_and_by_whom(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        programs = [lines.open(name) for name in ("panel", "remote", "run")]
+        heard: list[tuple[str, str]] = []
+        for line in programs:
+            me = line.facts.me.name
+
+            def hear(_devices: object, _by: str, program: object, me: str = me) -> None:
+                heard.append((me, getattr(program, "name", "")))
+
+            line.facts.on_stop(hear)
+        for number, line in enumerate(programs, 1):
+            line.facts.give_stop([1, 2], "a key")
+            eventually(partial(all_know, programs, 2 * number))
+        names = {line.facts.me.name for line in programs}
+        assert sorted(heard) == sorted((me, by) for me in names for by in names if me != by)
+
+
+async def test_a_write_of_before_a_stop_is_refused_though_it_arrives_after_it(
+    share: Share,
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("panel"), lines.open("run")
+        await owner.read(1, 1)
+        # a client that has not heard of the stop yet
+        with frozen(other):
+            run = asyncio.create_task(other.write(1, 1, [RUN]))
+            await asyncio.sleep(0.02)
+            await asyncio.gather(*stop(owner, 1))
+        assert "a stop came after it" in await refused(run)
+        assert written(peer) == [(1, STOP)]
+
+
+async def test_stops_of_two_that_cannot_hear_each_other_add_up(share: Share) -> None:
+    """A greatest count of both would be the same for a write of after the one stop only."""
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        first, second = lines.open("one"), lines.open("two")
+        await owner.read(1, 1)
+        with frozen(first), frozen(second):
+            # both are without an owner: each stops, and the first means to run again
+            owner.close()
+            first.facts.give_stop([1], "its key")
+            run = asyncio.create_task(first.write(1, 1, [RUN]))
+            await asyncio.sleep(0.02)
+            second.facts.give_stop([1], "its key")
+        with pytest.raises(LineError):
+            await run
+        eventually(lambda: [line.facts.stops.stamp(1) for line in (first, second)] == [2, 2])
+        assert written(peer) == []
+
+
+async def test_a_stop_that_nobody_could_hear_is_heard_on_coming_back(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("panel")
+        first, second = lines.open("one"), lines.open("two")
+        heard: list[str] = []
+        for line in (first, second):
+            line.facts.on_stop(lambda devices, _by, _program: heard.append(str(devices)))
+        with frozen(first), frozen(second):
+            owner.close()
+            first.facts.give_stop([1], "its key")
+        eventually(lambda: heard == ["(1,)"])
+        assert [line.facts.stops.stamp(1) for line in (first, second)] == [1, 1]
+
+
+def test_counts_only_go_up_and_one_telling_counts_once() -> None:
+    one, other = StopCounts(), StopCounts()
+    one.give("a", (1, 2), "key")
+    other.give("b", (1,), "key")
+    assert other.learn(one.given) == (1, 2)
+    assert other.learn(one.given) == ()
+    assert (other.stamp(1), other.stamp(2), other.stamp(0)) == (2, 1, 3)
+    # what the owner tells replaces all but the own count
+    assert one.replace(other.given, "a") == (1,)
+    one.give("a", (1,), "key")
+    assert one.replace(other.given, "a") == ()
+    assert one.stamp(1) == 3
+    # a program that left keeps its count without its name
+    other.fold("a")
+    assert other.given == {1: {"b": 1, "": 1}, 2: {"": 1}}
+    assert (other.stamp(1), other.stamp(2)) == (2, 1)
+
+
+# An owner that is frozen
+
+
+async def test_a_stop_goes_past_a_frozen_owner_and_nothing_of_before_goes_out_after_it(
+    share: Share,
+) -> None:
+    """The owner goes on with commands in its queue, and in its sockets, that a stop has voided."""
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other, third = (lines.open(name) for name in ("run", "stop", "remote"))
+        await owner.read(1, 1)
+        with frozen(owner):
+            # by the owner itself, by one that does not know of the stop, and for another drive
+            runs = [
+                asyncio.create_task(owner.write(1, 1, [RUN])),
+                asyncio.create_task(third.write(1, 1, [RUN])),
+            ]
+            await asyncio.sleep(0.05)
+            await asyncio.wait_for(asyncio.gather(*stop(other, 1)), 10)
+            assert written(peer) == [(1, STOP)]
+            assert "does not answer. Stops go out past it" in other.state.reason
+        for run in runs:
+            assert "Not sent" in await refused(run)
+        eventually(lambda: owner.facts.stops.stamp(1) == 1)
+        await owner.write(2, 1, [RUN])
+        # the stop once more: a frame may have been on its way as the owner froze
+        assert written(peer) == [(1, STOP), (1, STOP), (2, RUN)]
+        assert notes(lines) == []
+
+
+async def test_the_owner_finds_a_stop_of_a_program_that_is_gone_again(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("run")
+        await owner.read(1, 1)
+        with frozen(owner):
+            run = asyncio.create_task(owner.write(1, 1, [RUN]))
+            late = lines.open("stop", wait=None)
+            eventually(lambda: "does not answer" in late.state.reason)
+            await asyncio.gather(*stop(late, 1))
+            late.close()
+        assert "Not sent" in await refused(run)
+        await owner.write(1, 1, [RUN])
+        assert written(peer) == [(1, STOP), (1, RUN)]
+
+
+async def test_the_note_of_a_stop_is_enough(share: Share) -> None:
+    """Also where nothing comes through a socket any more."""
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner = lines.open("run")
+        await owner.read(1, 1)
+        gone = Program("gone", "stop", 0)
+        with frozen(owner):
+            run = asyncio.create_task(owner.write(1, 1, [RUN]))
+            await asyncio.sleep(1.0)
+            past = StopsPast(place_in(lines.folder))
+            past.note(StopGiven((1,), (1,), "the stop key", gone))
+            # one that cannot be read keeps the others from nothing
+            (note,) = notes(lines)
+            note.with_name(f"{place_in(lines.folder).name}-0.stop").write_bytes(b"\xc1" * 99)
+        assert "a stop came after it (the stop key, stop" in await refused(run)
+        assert notes(lines) == []
+        await owner.write(1, 1, [RUN])
+        # the next owner finds what was left for one that was killed
+        owner.close()
+        past.note(StopGiven((1,), (2,), "the stop key", gone))
+        late = lines.open("late")
+        assert late.facts.stops.stamp(1) == 2
+
+
+async def test_a_command_that_waited_for_a_frozen_owner_is_too_old_to_be_sent(
+    share: Share,
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("run"), lines.open("remote")
+        await owner.read(1, 1)
+        with frozen(owner):
+            runs = [asyncio.create_task(one.write(1, 1, [RUN])) for one in (owner, other)]
+            reading = asyncio.create_task(other.read(1, 7))
+            await asyncio.sleep(2.3)
+        for run in runs:
+            assert "stood still for" in await refused(run)
+        assert (await reading).words == (7,)
+        assert written(peer) == []
+
+
+async def test_a_program_that_stood_still_itself_takes_no_owner_for_frozen(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        lines.open("run")
+        other = lines.open("remote")
+        said: list[str] = []
+        other.on_state(lambda state: said.append(state.reason))
+        with frozen(other):
+            await asyncio.sleep(1.3)
+        await other.read(1, 1)
+        await asyncio.sleep(0.15)
+        assert [one for one in said if "does not answer" in one] == []
+
+
+async def test_what_waits_for_a_frozen_owner_too_long_is_told_so_and_never_sent(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.share.client.WAITED_ENOUGH", 0.3)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("run"), lines.open("remote")
+        await owner.read(1, 1)
+        with frozen(owner), pytest.raises(LineLost, match="does not answer"):
+            await other.write(1, 1, [RUN])
+        await other.read(1, 2)
+        assert written(peer) == []
+
+
+async def test_stops_and_the_reads_of_a_stopped_drive_pass_a_frozen_owner_polls_do_not(
+    share: Share,
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("run"), lines.open("stop")
+        await owner.read(1, 1)
+        with frozen(owner):
+            waits = asyncio.create_task(other.read(1, 5))
+            await asyncio.gather(*stop(other, 1))
+            look = await other.read(1, 6, priority=Priority.OPERATOR_READ)
+            assert look.words == (6,)
+            assert not waits.done()
+        assert (await waits).words == (5,)

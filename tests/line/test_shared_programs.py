@@ -1,0 +1,172 @@
+"""Programs that share a line, as processes of their own: killed, frozen, hung up on."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from tests.programs import DRIVEPANEL, PATIENCE, Served, drivepanel, served, wait_until
+from tui.simulator import Simulation
+
+from .terminal import Terminal, runs
+from .test_commands import bench, stands, turns
+from .test_ways_to_end import running as panel_running
+
+Start = Callable[[list[str]], Terminal]
+
+
+@pytest.fixture
+def programs() -> Iterator[ExitStack]:
+    """Programs that end with the test."""
+    with ExitStack() as stack:
+        yield stack
+
+
+def runs_a_motor(line: str, *extra: str, device: int = 1) -> list[str]:
+    reference = ("--reference", "20Hz", "--arm", "-p", "atv71", "-d", str(device))
+    return [*DRIVEPANEL, "run", line, *reference, *extra]
+
+
+def records(line: str, device: int = 1) -> list[str]:
+    more = ("-p", "atv71", "-d", str(device), "--every", "0.2", "--json")
+    return [*DRIVEPANEL, "watch", line, "RFR", *more]
+
+
+def sockets() -> list[str]:
+    """Sockets and notes of stops that lie in the state folder."""
+    state = Path(os.environ["DRIVEPANEL_STATE"])
+    return [one.name for one in state.rglob("*.s*") if one.suffix in (".sock", ".stop")]
+
+
+def stopped_by_commands(simulation: Simulation, device: int = 1) -> bool:
+    """Whether the motor stands without a trip: nobody fed it, and nobody cut it off."""
+    return stands(simulation, device) and simulation.drive(device).fault is None
+
+
+@contextmanager
+def motor_run(
+    programs: ExitStack, first: str, *extra: str
+) -> Iterator[tuple[Simulation, str, Served, Served]]:
+    """`run` and a recorder on one line, whichever is the `first` and owns it."""
+    with bench() as (simulation, line):
+        recorder = None
+        if first == "watch":
+            recorder = programs.enter_context(served(records(line), ready="{"))
+        runner = programs.enter_context(served(runs_a_motor(line, *extra), ready="running forward"))
+        if recorder is None:
+            recorder = programs.enter_context(served(records(line), ready="{"))
+        wait_until(lambda: turns(simulation), "the motor turns")
+        yield simulation, line, runner, recorder
+
+
+@pytest.mark.parametrize("first", ["watch", "run"])
+def test_a_motor_whose_program_was_killed_is_stopped_by_who_goes_on(
+    programs: ExitStack, first: str
+) -> None:
+    """A recorder asks the drive on and on: its own time-out would never stop the motor."""
+    with motor_run(programs, first) as (simulation, _, runner, recorder):
+        runner.process.kill()
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+        starts = Path(os.environ["DRIVEPANEL_STATE"], "starts")
+        wait_until(lambda: not list(starts.iterdir()), "the record of the start goes")
+        _, said = recorder.end()
+        assert "is gone: its motor is stopped" in said
+        assert sockets() == []
+
+
+@pytest.mark.parametrize("first", ["watch", "run"])
+def test_a_motor_that_is_meant_to_be_left_running_runs_on(programs: ExitStack, first: str) -> None:
+    with motor_run(programs, first, "--leave-running") as (simulation, _, runner, recorder):
+        runner.process.kill()
+        time.sleep(3)
+        assert turns(simulation)
+        assert recorder.process.poll() is None
+
+
+@pytest.mark.parametrize("named", [("-p", "atv71"), (), ("--all", "--addresses", "1-2")])
+def test_a_stop_goes_past_a_frozen_owner_and_lasts(
+    programs: ExitStack, named: tuple[str, ...]
+) -> None:
+    with motor_run(programs, "run") as (simulation, line, runner, _):
+        runner.process.send_signal(signal.SIGSTOP)
+        target = named if "--all" in named else ("-d", "1", *named)
+        done = drivepanel("stop", line, *target)
+        assert done.returncode == 0, done.stderr
+        assert stopped_by_commands(simulation)
+        before = simulation.drive(1).raw("CMD")
+        runner.process.send_signal(signal.SIGCONT)
+        said, _ = runner.process.communicate(timeout=PATIENCE)
+        assert "was stopped by drivepanel stop, stop" in said
+        assert runner.process.returncode == 5
+        assert stopped_by_commands(simulation)
+        assert simulation.drive(1).raw("CMD") == before
+
+
+def test_a_stop_beside_run_ends_it_and_says_by_whom(programs: ExitStack) -> None:
+    with motor_run(programs, "run") as (simulation, line, runner, recorder):
+        assert drivepanel("stop", line, "-d", "1", "-p", "atv71").returncode == 0
+        assert stopped_by_commands(simulation)
+        said, _ = runner.process.communicate(timeout=PATIENCE)
+        assert runner.process.returncode == 5
+        assert "was stopped by drivepanel stop, stop" in said
+        # the owner went, the recorder records on
+        assert recorder.process.stdout is not None
+        for _ in range(3):
+            assert '"RFR"' in recorder.process.stdout.readline()
+        status, said = recorder.end()
+        assert status == -signal.SIGTERM
+        assert said == f"drivepanel: Shared with run (pid {runner.process.pid}).\n"
+        assert sockets() == []
+
+
+def test_a_drive_that_run_commands_takes_nothing_from_another_command(
+    programs: ExitStack,
+) -> None:
+    with motor_run(programs, "run") as (simulation, line, runner, _):
+        asked = ("run", line, "--reference", "5Hz", "--arm", "-p", "atv71", "-d", "1")
+        done = drivepanel(*asked)
+        assert done.returncode == 5
+        assert f"Drive 1 is commanded by run (pid {runner.process.pid})" in done.stderr
+        assert turns(simulation)
+        assert drivepanel("read", line, "RFR", "-d", "1", "-p", "atv71").returncode == 0
+
+
+# Two panels
+
+
+def test_a_stop_in_one_panel_stops_the_motor_of_the_other(
+    terminal_with: Start, second_terminal: Start
+) -> None:
+    with panel_running(terminal_with) as made:
+        other = second_terminal([sys.executable, "-m", "tui", made.line, "-d", "1"])
+        other.wait_for("FORWARD")
+        made.terminal.wait_for("FORWARD")
+        other.press("F12")
+        made.stopped()
+        made.terminal.wait_for("STANDBY", "Stop from panel")
+        other.wait_for("STANDBY")
+        assert runs(made.pid)
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGKILL])
+def test_a_motor_of_a_panel_that_goes_is_stopped_and_the_other_panel_goes_on(
+    terminal_with: Start, second_terminal: Start, number: signal.Signals
+) -> None:
+    with panel_running(terminal_with) as made:
+        # the drive's own watch would act after 300 s: the other panel waits for a key 10 s
+        other = second_terminal([sys.executable, "-m", "tui", made.line, "-d", "1"])
+        other.wait_for("FORWARD")
+        os.kill(made.pid, number)
+        made.ended()
+        made.stopped()
+        other.wait_for("STANDBY")
+        assert made.simulation.drive(1).fault is None
+        made.simulation.drive(1).run(30.0)
+        other.wait_for("FORWARD")

@@ -1,0 +1,252 @@
+"""Motors of programs that are gone: stopped by who owns the line, unless somebody takes them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import os
+from collections.abc import AsyncIterator, Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.bus.peer import eventually
+from tui.bus.line import Line
+from tui.bus.link import RtuTcpLink, label
+from tui.bus.program import Program
+from tui.drive.profile import library
+from tui.session.connect.identify import DriveIdentity
+from tui.session.drive import DriveSession
+from tui.session.events import EventLog
+from tui.session.journal import Journal
+from tui.session.sharing.guardian import LONGEST_GRACE, TAKEN_OVER_WITHIN, Guardian
+from tui.session.starts.processes import Processes
+from tui.session.starts.record import StartRecord
+from tui.session.starts.starts import Starts
+from tui.simulator import DriveSpec, Simulation
+
+from .fake_clock import FakeClock
+
+GONE = Program("gone", "run", 900_002, "", "pts/3")
+LIVING = 900_001
+WATCH = Program("watch", "watch", LIVING)
+PANEL = Program("panel", "panel", LIVING)
+
+
+async def come(condition: Callable[[], bool]) -> None:
+    await asyncio.to_thread(eventually, condition, 20.0)
+
+
+class MadeUp(Processes):
+    """This program, one other that lives, and no more."""
+
+    def started(self, pid: int) -> str | None:
+        return "100" if pid in (os.getpid(), LIVING) else None
+
+
+class Bench:
+    """Two simulated drives whose motors run, on a line that this program owns."""
+
+    def __init__(self) -> None:
+        self.simulation = Simulation([DriveSpec("atv71", 1), DriveSpec("atv312", 2)])
+        self.simulation.start()
+        self.line = Line(RtuTcpLink(*self.simulation.serve_rtu_tcp()))
+        self.line.open(wait=5.0)
+        self.line.facts.set_programs((self.line.facts.me, GONE))
+        self.clock = FakeClock()
+        self.starts = Starts(processes=MadeUp(), clock=self.clock)
+        self.journal = Journal()
+        self.events = EventLog()
+        self.told: list[tuple[int, str]] = []
+        self.line.facts.on_text(lambda device, text: self.told.append((device, text)))
+
+    def guardian(self, *, person: bool = False, timeout: float | None = None) -> Guardian:
+        sessions = {
+            one: DriveSession(self.line, one, library.load(profile), clock=self.clock)
+            for one, profile in ((1, "atv71"), (2, "atv312"))
+        }
+        return Guardian(
+            self.line,
+            self.journal,
+            timeout_of=lambda _: timeout,
+            clock=self.clock,
+            session_of=sessions.get,
+            person=person,
+            events=self.events,
+            starts=self.starts,
+        )
+
+    def started(self, device: int, *, pid: int = GONE.pid, left_running: bool = False) -> None:
+        """A program has started a motor, which runs."""
+        self.simulation.drive(device).run(20.0)
+        profile = "atv71" if device == 1 else "atv312"
+        identity = DriveIdentity(device, "V", "R", "0201", "", profile, (profile,))
+        record = self.starts.record(
+            label(self.line.link), identity, profile, "forward",
+            program="run", left_running=left_running,
+        )  # fmt: skip
+        self.starts.begin(replace(record, pid=pid, started="100"))
+        self.starts.sent(label(self.line.link), device)
+
+    def turns(self, device: int) -> bool:
+        return self.simulation.drive(device).motor.frequency > 1
+
+    async def stopped(self, device: int) -> None:
+        """Wait until the motor stands, not by a trip, and its record is gone."""
+        drive = self.simulation.drive(device)
+        await come(lambda: drive.motor.frequency == 0)
+        assert drive.fault is None
+        await come(lambda: device not in self.records)
+
+    @property
+    def records(self) -> list[int]:
+        """The drives of which a start is on record."""
+        return [json.loads(one.read_text())["device"] for one in self.files()]
+
+    def files(self) -> list[Path]:
+        return list(Path(os.environ["DRIVEPANEL_STATE"], "starts").glob("*.json"))
+
+    def gone(self, program: Program = GONE) -> None:
+        """A program left the line."""
+        loop = self.line._engine._loop
+        assert loop is not None
+        loop.call_soon_threadsafe(self.line.facts.hear_gone, program)
+
+    def says(self, text: str) -> bool:
+        return any(text in one for _, one in self.told)
+
+    def close(self) -> None:
+        self.line.close()
+        self.simulation.stop()
+        self.starts.close()
+        self.journal.close()
+
+
+@pytest.fixture
+async def bench() -> AsyncIterator[Bench]:
+    """Two drives whose motors other programs have started."""
+    made = await asyncio.to_thread(Bench)
+    yield made
+    await asyncio.to_thread(made.close)
+
+
+async def test_the_motors_of_a_killed_program_are_stopped_at_once_and_no_others(
+    bench: Bench,
+) -> None:
+    bench.started(1)
+    bench.started(2, pid=LIVING)
+    await come(lambda: bench.turns(1) and bench.turns(2))
+    bench.guardian()
+    bench.gone()
+    await bench.stopped(1)
+    assert bench.told[0] == (1, "run on pts/3 (pid 900002) is gone: its motor is stopped.")
+    assert bench.turns(2)
+    # the stop is one for all: what anybody meant for the drive before is void
+    assert bench.line.facts.stops.stamp(1) >= 1
+    assert bench.line.facts.stops.stamp(2) == 0
+
+
+async def test_a_motor_that_is_meant_to_run_on_runs_on(bench: Bench) -> None:
+    bench.started(1, left_running=True)
+    bench.guardian()
+    bench.gone()
+    await asyncio.sleep(0.1)
+    bench.clock.advance(20)
+    await asyncio.sleep(0.3)
+    assert bench.told == []
+    assert bench.line.facts.stops.stamp(1) == 0
+
+
+async def test_a_program_that_ended_well_leaves_nothing_to_look_after(bench: Bench) -> None:
+    bench.guardian()
+    bench.gone()
+    await asyncio.sleep(0.3)
+    assert bench.told == []
+
+
+async def test_a_process_that_is_just_ending_is_waited_for(bench: Bench) -> None:
+    """Its socket closes before its number is free: its start would be a living program's."""
+    bench.started(1)
+    living = {"100"}
+    bench.starts._processes.started = lambda pid: (  # type: ignore[method-assign]
+        "100" if living or pid in (os.getpid(), LIVING) else None
+    )
+    bench.guardian()
+    bench.gone()
+    await asyncio.sleep(0.2)
+    assert bench.told == []
+    living.clear()
+    await bench.stopped(1)
+
+
+@pytest.mark.parametrize(
+    ("timeout", "grace"), [(None, TAKEN_OVER_WITHIN), (4.0, 4.0), (300.0, LONGEST_GRACE)]
+)
+async def test_a_person_has_the_drives_own_time_out_to_take_the_motor_over(
+    bench: Bench, timeout: float | None, grace: float
+) -> None:
+    bench.started(1)
+    await come(lambda: bench.turns(1))
+    bench.guardian(person=True, timeout=timeout)
+    bench.gone()
+    await come(lambda: bench.says(f"stopped in {grace:g} s, unless a and T take it over here"))
+    bench.clock.advance(grace - 0.5)
+    await asyncio.sleep(0.2)
+    assert bench.line.facts.stops.stamp(1) == 0
+    bench.clock.advance(1.0)
+    await bench.stopped(1)
+
+
+async def test_a_motor_that_was_taken_over_runs_on(bench: Bench) -> None:
+    bench.started(1)
+    bench.guardian(person=True)
+    bench.gone()
+    await come(lambda: bench.says("unless a and T take it over"))
+    (found,) = bench.starts.all_found(label(bench.line.link))
+    assert isinstance(found, StartRecord)
+    taken = bench.starts.taken_over(found, label(bench.line.link), "panel")
+    await asyncio.to_thread(bench.starts.begin, taken)
+    await come(lambda: bench.says("was taken over"))
+    bench.clock.advance(20)
+    await asyncio.sleep(0.2)
+    assert bench.line.facts.stops.stamp(1) == 0
+
+
+@pytest.mark.parametrize(("other", "waits"), [(PANEL, True), (WATCH, False)])
+async def test_a_recorder_waits_for_the_person_of_an_attached_panel_only(
+    bench: Bench, other: Program, waits: bool
+) -> None:
+    facts = bench.line.facts
+    facts.set_programs((facts.me, other, GONE))
+    bench.started(1)
+    bench.guardian()
+    bench.gone()
+    await come(lambda: bench.says("is gone"))
+    assert bench.says("unless a and T") is waits
+
+
+async def test_a_drive_whose_profile_is_not_here_is_told_of(bench: Bench) -> None:
+    bench.started(1)
+    guardian = bench.guardian()
+    guardian._session_of = lambda _: None
+    (path,) = bench.files()
+    path.write_text(path.read_text().replace('"profile": "atv71"', '"profile": "gone99"'))
+    bench.gone()
+    await come(lambda: bench.says("Stop it at the machine"))
+
+
+async def test_after_the_line_was_closed_nothing_is_looked_after(bench: Bench) -> None:
+    bench.started(1)
+    guardian = bench.guardian()
+    await asyncio.to_thread(bench.line.close)
+    guardian.gone(GONE)
+    assert bench.told == []
+
+
+async def test_a_guardian_that_was_closed_hears_nothing(bench: Bench) -> None:
+    bench.started(1)
+    bench.guardian().close()
+    bench.gone()
+    await asyncio.sleep(0.3)
+    assert bench.told == []

@@ -1,0 +1,291 @@
+"""Who commands a drive when two programs want to: a question, its answer, and what it means."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+import pytest
+
+from tests.bus.peer import eventually
+from tui.bus.fake import FakeLine
+from tui.bus.program import Program
+from tui.drive.profile import library
+from tui.session.arming import ARMED_FOR, CommandedElsewhere
+from tui.session.drive import DriveSession
+from tui.session.events import EventLog
+from tui.session.sharing.handover import ANSWER_WITHIN, Handover
+from tui.session.starts.keeper import StartKeeper
+from tui.session.starts.starts import Starts
+
+from .fake_clock import FakeClock
+
+REMOTE = Program("remote", "panel", 77, "", "pts/9")
+
+
+class Told:
+    """The voice of this program, as another one would hear it."""
+
+    def __init__(self) -> None:
+        self.said: list[tuple[object, ...]] = []
+
+    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
+        self.said.append(("stop", devices, by))
+
+    def claim(self, device: int, take: bool) -> None:
+        self.said.append(("claim", device, take))
+
+    def ask(self, device: int) -> None:
+        self.said.append(("ask", device))
+
+    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
+        self.said.append(("reply", device, program, yes))
+
+    def hushed(self, device: int, why: str) -> None:
+        self.said.append(("hushed", device, why))
+
+    def told(self, device: int, text: str) -> None:
+        self.said.append(("told", device, text))
+
+
+class Bench:
+    """One drive on a line that is shared with another program."""
+
+    def __init__(self) -> None:
+        self.line = FakeLine({1: {}})
+        self.clock = FakeClock()
+        self.voice = Told()
+        self.facts = self.line.facts
+        self.facts.set_programs((self.facts.me, REMOTE))
+        self.facts.voice = self.voice
+        self.events = EventLog(self.clock.wall)
+        self.starts = StartKeeper("panel", Starts(clock=self.clock), self.clock)
+        self.session = DriveSession(self.line, 1, library.load("atv71"), clock=self.clock)
+        self.session.starts = self.starts
+        self.handover = Handover(
+            self.line, self.events, lambda one: self.session if one == 1 else None, self.clock
+        )
+        self.handover.person = True
+
+    def shows(self, status: int) -> None:
+        """The drive's status word was read now."""
+        self.session.image.confirm("ETA", status, self.clock.monotonic())
+
+    @property
+    def told(self) -> list[str]:
+        return [one.text for one in self.events.events]
+
+    def starts_files(self) -> list[Path]:
+        """The starts on record."""
+        return list(Path(os.environ["DRIVEPANEL_STATE"], "starts").glob("*.json"))
+
+    @property
+    def answers(self) -> list[tuple[object, ...]]:
+        return [one for one in self.voice.said if one[0] == "reply"]
+
+    def close(self) -> None:
+        self.handover.close()
+        self.starts.close()
+
+
+@pytest.fixture
+async def bench() -> AsyncIterator[Bench]:
+    """A drive that this program and another one share."""
+    made = Bench()
+    yield made
+    made.close()
+
+
+def commanded_there(bench: Bench) -> None:
+    bench.facts.note_commander(1, REMOTE.id)
+
+
+async def expires(bench: Bench) -> None:
+    """Let the time for an answer go by."""
+    await asyncio.sleep(0.05)
+    bench.clock.advance(ANSWER_WITHIN + 1)
+    await asyncio.to_thread(eventually, lambda: len(bench.answers) > 0)
+
+
+# Arming is a claim
+
+
+async def test_arming_claims_the_drive_and_disarming_gives_it_back(bench: Bench) -> None:
+    bench.session.arming.arm()
+    assert bench.facts.commanders == {1: bench.facts.me.id}
+    bench.session.arming.disarm()
+    assert bench.facts.commanders == {}
+    assert bench.voice.said == [("claim", 1, True), ("claim", 1, False)]
+
+
+async def test_a_drive_commanded_elsewhere_is_not_armed_and_says_by_whom(
+    bench: Bench,
+) -> None:
+    commanded_there(bench)
+    with pytest.raises(CommandedElsewhere, match=r"commanded by panel on pts/9 \(pid 77\)"):
+        bench.session.arming.arm()
+    assert not bench.session.arming.armed
+    assert bench.voice.said == []
+
+
+async def test_an_arming_that_ends_by_itself_gives_the_drive_back(bench: Bench) -> None:
+    bench.session.arming.arm()
+    bench.clock.advance(ARMED_FOR + 1)
+    assert not bench.session.arming.armed
+    assert bench.voice.said[-1] == ("claim", 1, False)
+
+
+async def test_a_claim_that_the_owner_denies_disarms_with_its_reason(bench: Bench) -> None:
+    bench.session.arming.arm()
+    commanded_there(bench)
+    bench.facts.hear_denied(1, "Drive 1 is commanded by panel on pts/9 (pid 77).")
+    assert not bench.session.arming.armed
+    assert "pts/9" in bench.session.arming.refusal()
+    # another drive's is not this one's business
+    bench.facts.note_commander(1, None)
+    bench.session.arming.arm()
+    bench.facts.hear_denied(2, "no")
+    assert bench.session.arming.armed
+
+
+async def test_a_stop_of_another_program_ends_arming_and_work_and_is_told(bench: Bench) -> None:
+    bench.session.arming.arm()
+    before = bench.session.work.stops
+    bench.facts.hear_stop((1,), "the stop key", REMOTE)
+    assert not bench.session.arming.armed
+    assert bench.session.work.stops == before + 1
+    assert any("Stop from panel on pts/9 (pid 77)" in one for one in bench.told)
+    bench.session.arming.arm()
+    bench.facts.hear_stop((2,), "the stop key", REMOTE)
+    assert bench.session.arming.armed
+
+
+# Asked here
+
+
+async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> None:
+    bench.session.arming.arm()
+    bench.facts.hear_question(1, REMOTE)
+    assert bench.handover.requests[1].program == REMOTE
+    assert any("asks for this drive. G answers" in one for one in bench.told)
+    bench.handover.answer(1, yes=True)
+    assert bench.handover.requests == {}
+    assert bench.answers == [("reply", 1, REMOTE.id, True)]
+    assert not bench.session.arming.armed
+    assert "Given to panel" in bench.session.arming.refusal()
+    # a second answer answers nothing
+    bench.handover.answer(1, yes=False)
+    assert len(bench.answers) == 1
+
+
+async def test_a_person_may_keep_the_drive(bench: Bench) -> None:
+    bench.session.arming.arm()
+    bench.facts.hear_question(1, REMOTE)
+    bench.handover.answer(1, yes=False)
+    assert bench.answers == [("reply", 1, REMOTE.id, False)]
+    assert bench.session.arming.armed
+
+
+@pytest.mark.parametrize(
+    ("status", "yes"), [(0x0233, True), (0x0637, False), (None, False)], ids=str
+)
+async def test_an_unanswered_question_is_a_no_unless_the_motor_surely_stands(
+    bench: Bench, status: int | None, yes: bool
+) -> None:
+    bench.session.arming.arm()
+    bench.facts.hear_question(1, REMOTE)
+    await asyncio.sleep(0.05)
+    bench.clock.advance(ANSWER_WITHIN + 1)
+    if status is not None:
+        bench.shows(status)
+    await asyncio.to_thread(eventually, lambda: len(bench.answers) > 0)
+    assert bench.answers == [("reply", 1, REMOTE.id, yes)]
+    assert bench.session.arming.armed is False or not yes
+
+
+async def test_an_answered_question_does_not_expire_into_another_answer(bench: Bench) -> None:
+    bench.session.arming.arm()
+    bench.facts.hear_question(1, REMOTE)
+    bench.handover.answer(1, yes=False)
+    bench.facts.hear_question(1, REMOTE)
+    await expires(bench)
+    await asyncio.sleep(0.05)
+    assert [one[3] for one in bench.answers] == [False, False]
+
+
+@pytest.mark.parametrize(("status", "yes"), [(0x0233, True), (0x0637, False), (None, False)])
+async def test_a_command_without_a_person_decides_at_once(
+    bench: Bench, status: int | None, yes: bool
+) -> None:
+    bench.handover.person = False
+    if status is not None:
+        bench.shows(status)
+    bench.facts.hear_question(1, REMOTE)
+    assert bench.answers == [("reply", 1, REMOTE.id, yes)]
+
+
+async def test_a_question_about_a_drive_that_is_not_known_here_is_a_no(bench: Bench) -> None:
+    bench.handover.person = False
+    bench.facts.hear_question(4, REMOTE)
+    assert bench.answers == [("reply", 4, REMOTE.id, False)]
+
+
+async def test_a_drive_that_is_given_away_is_not_stopped_by_the_end_of_this_program(
+    bench: Bench,
+) -> None:
+    await asyncio.to_thread(bench.starts.begin, bench.session, "forward")
+    bench.starts.sent(bench.session)
+    records = bench.starts_files
+    assert len(records()) == 1
+    bench.session.arming.arm()
+    bench.facts.hear_question(1, REMOTE)
+    bench.handover.answer(1, yes=True)
+    await asyncio.to_thread(eventually, lambda: not records())
+
+
+# Asked elsewhere
+
+
+async def test_asking_is_told_there_and_the_answer_here(bench: Bench) -> None:
+    commanded_there(bench)
+    bench.handover.ask_for(1)
+    assert bench.voice.said == [("ask", 1)]
+    bench.facts.hear_reply(1, "Drive 1 is commanded by panel.", yes=False)
+    assert bench.told[-1] == "Drive 1 is commanded by panel."
+    assert bench.facts.commander(1) == REMOTE
+    bench.facts.hear_reply(1, "", yes=True)
+    assert bench.told[-1] == "This drive is free: a arms it."
+    bench.session.arming.arm()
+
+
+async def test_asking_for_a_free_drive_says_so(bench: Bench) -> None:
+    bench.handover.ask_for(1)
+    assert bench.voice.said == []
+    assert "Nobody else commands this drive" in bench.told[-1]
+
+
+@pytest.mark.parametrize(("status", "adopted"), [(0x0637, 1), (0x0233, 0)])
+async def test_a_motor_that_runs_is_this_programs_once_it_was_given(
+    bench: Bench, status: int, adopted: int
+) -> None:
+    """From then on its end stops it, and a kill of it is found."""
+    commanded_there(bench)
+    bench.shows(status)
+    bench.facts.hear_reply(1, "", yes=True)
+    await asyncio.sleep(0.1)
+    await asyncio.to_thread(eventually, lambda: len(bench.starts_files()) == adopted)
+
+
+async def test_who_comes_and_goes_and_who_commands_is_told_once(bench: Bench) -> None:
+    other = Program("other", "watch", 78)
+    bench.facts.set_programs((bench.facts.me, REMOTE, other))
+    bench.facts.note_commander(1, REMOTE.id)
+    bench.facts.set_programs((bench.facts.me, REMOTE))
+    assert bench.told == [
+        "The line is shared with panel on pts/9 (pid 77).",
+        "The line is shared with watch (pid 78).",
+        "Panel on pts/9 (pid 77) commands this drive now.",
+        "Watch (pid 78) has left the line.",
+    ]

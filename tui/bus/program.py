@@ -1,0 +1,24 @@
+"""A program on a line that several share, as the others know it."""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class Program(msgspec.Struct, frozen=True):
+    """A program on the line, as others name it."""
+
+    id: str
+    """Its own among all programs."""
+    name: str
+    """`panel`, `run` and the like."""
+    pid: int = 0
+    user: str = ""
+    where: str = ""
+    """Its terminal; empty where that is unknown."""
+
+    @property
+    def text(self) -> str:
+        """How people are told of it: `panel on pts/3 (pid 812)`."""
+        where = f" on {self.where}" if self.where else ""
+        return f"{self.name}{where} (pid {self.pid})"

@@ -1,0 +1,160 @@
+"""What becomes of a request once its exchange is over: an answer, an error, or another try."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from ..errors import ChecksumFault, DeviceException, LineError, NoAnswer, WrongReply
+from ..limits import STANDARD_EXCEPTIONS
+from ..master import MonotonicClock
+from ..model import Priority, Timing
+from ..requests import BROADCAST
+from ..result import ExchangeResult, Piece, ResultKind
+from ..shared_facts import SharedFacts
+from ..tally import Tally
+from .patience import Devices
+from .queue import Job
+from .shared_values import SharedValues
+
+GATEWAY_EXCEPTIONS = frozenset({10, 11})
+"""Exceptions by which a gateway says that a device behind it did not answer."""
+UNKNOWN_FATE = " Whether it was taken is not known; read the register back before trying again."
+STILL = 1.0
+"""Seconds past the time-out after which an answer cannot have come just now."""
+REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL))
+
+
+class Outcomes:
+    """Notes the ends of exchanges, and hands them back; lives in the line's loop."""
+
+    def __init__(
+        self,
+        devices: Devices,
+        tally: Tally,
+        timing: Timing,
+        clock: MonotonicClock,
+        facts: SharedFacts,
+        *,
+        gateway: bool,
+    ) -> None:
+        self.values = SharedValues()
+        """What was read a moment ago."""
+        self._devices = devices
+        self._tally = tally
+        self._timing = timing
+        self._clock = clock
+        self._facts = facts
+        self._gateway = gateway
+
+    def waited_for_us(self, job: Job, result: ExchangeResult) -> bool:
+        """Whether a read is asked anew: when its answer came is not known.
+
+        This program may have been stopped in between, and the answer have waited for it.
+        """
+        if job.request.changes or result.kind not in (ResultKind.REPLY, ResultKind.EXCEPTION):
+            return False
+        request = job.request
+        longest = self._devices.time_out(request.device, request.function, job.priority)
+        return self._clock() - result.sent > longest + STILL
+
+    def conclude(self, job: Job, result: ExchangeResult) -> bool:
+        """Note what became of a request, and hand it back; True where it is to be sent again."""
+        request, now = job.request, self._clock()
+        if job.expectation is None:
+            self.note_strays(result.strays, result.end)
+            job.finish(b"", result.sent)
+            return False
+        if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
+            result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
+        if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
+            self._tally.replies += 1
+            exchanged = (job.pdu, result.pdu)
+            self._devices.answered(
+                request.device, job.expectation, result.turnaround, now, exchanged
+            )
+        unexplained = self.note_strays(result.strays, result.end)
+        if result.kind is ResultKind.WRONG and result.strays and request.device not in unexplained:
+            result.kind = ResultKind.NOTHING
+        match result.kind:
+            case ResultKind.REPLY:
+                self._share(job, result)
+                job.finish(result.pdu, result.end)
+            case ResultKind.EXCEPTION:
+                self._tally.exceptions += 1
+                job.fail(self._exception(job, result.exception))
+            case _:
+                return self._failed(job, result, now)
+        return False
+
+    def _share(self, job: Job, result: ExchangeResult) -> None:
+        """Keep what was read, while there is another program that may want it."""
+        if len(self._facts.programs) > 1:
+            self.values.note(job.request, job.request.words(result.pdu), result.end)
+
+    def _failed(self, job: Job, result: ExchangeResult, now: float) -> bool:
+        request, expectation = job.request, job.expectation
+        assert expectation is not None
+        place = (request.device, request.function, request.register)
+        error: LineError
+        match result.kind:
+            case ResultKind.DAMAGED:
+                self._tally.checksum += 1
+                if not result.recognised:
+                    self._devices.may_come(request.device, expectation, result.sent, now)
+                error = ChecksumFault(*place, received=result.received)
+            case ResultKind.WRONG:
+                self._tally.wrong += 1
+                self._devices.may_come(request.device, expectation, result.sent, now)
+                error = WrongReply(*place, result.detail, result.received)
+            case _:
+                known = self._devices[request.device].ever_answered
+                self._tally.count_silence(job.priority, known=known)
+                self._devices.silent(request.device, expectation, result.sent, now)
+                error = NoAnswer(*place, self._no_answer(job, result.detail))
+        if self._is_repeated(job, result.kind):
+            job.repeats += 1
+            return True
+        job.fail(error)
+        return False
+
+    def _is_repeated(self, job: Job, kind: ResultKind) -> bool:
+        """Whether a request is sent again: never one that changes anything."""
+        if job.request.changes or job.repeats >= self._timing.retries:
+            return False
+        if kind is ResultKind.DAMAGED:
+            return job.priority < Priority.BACKGROUND
+        known = self._devices[job.request.device].ever_answered
+        return kind is ResultKind.NOTHING and known and job.priority in REPEATED_WHEN_SILENT
+
+    def note_strays(self, strays: Iterable[Piece], time: float) -> set[int]:
+        """Pass on frames that came beside the reply; returns the devices of unexplained ones."""
+        unexplained = set()
+        for piece in strays:
+            self._tally.stale += 1
+            if not self._devices.stray(piece, time):
+                unexplained.add(piece.device)
+        return unexplained
+
+    def _is_gateways(self, job: Job, code: int) -> bool:
+        meanings = job.limits.exceptions
+        own = code in meanings and meanings is not STANDARD_EXCEPTIONS
+        return self._gateway and code in GATEWAY_EXCEPTIONS and not own
+
+    def _exception(self, job: Job, code: int) -> DeviceException:
+        request = job.request
+        meaning = job.limits.exceptions.get(code) or STANDARD_EXCEPTIONS.get(code, "")
+        return DeviceException(request.device, request.function, request.register, code, meaning)
+
+    def _no_answer(self, job: Job, detail: str) -> str:
+        request = job.request
+        what = f"function {request.function}"
+        if request.register:
+            what += f", register {request.register}"
+        text = f"Device {request.device} did not answer ({what})"
+        return with_fate(job, f"{text}: {detail}." if detail else f"{text}.")
+
+
+def with_fate(job: Job, text: str) -> str:
+    """Add to an error of a write that it may have been taken nevertheless."""
+    unknown = job.request.changes and job.request.device != BROADCAST
+    return text + UNKNOWN_FATE if unknown else text

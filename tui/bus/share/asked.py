@@ -1,0 +1,130 @@
+"""The requests that a client has handed to the owner of its line, until they are answered."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+from collections.abc import Callable
+from contextlib import suppress
+
+from ..errors import LineClosed, LineLost, RequestRefused
+from ..model import Priority
+from ..requests import BROADCAST
+from ..schedule.inside import LineInside
+from ..schedule.queue import Job
+from .failures import error_of
+from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw, request_form
+from .past_owner import PastOwner
+
+OWNER_ENDED = "The program that owned the line ended"
+FATE = " Whether it was taken is not known; read the register back before trying again."
+
+
+class RequestsAsked:
+    """One attachment's requests; lives in the line's loop."""
+
+    def __init__(
+        self, inside: LineInside, past: PastOwner, tell: Callable[[AnyMessage], None]
+    ) -> None:
+        self._inside = inside
+        self._past = past
+        self._tell = tell
+        self._loop = asyncio.get_running_loop()
+        self._numbers = itertools.count(1)
+        self._asked: dict[int, Job] = {}
+        self._described: dict[int, object] = {}
+
+    def send(self, job: Job) -> None:
+        """Hand a job to the owner, unless it must not be sent; past it where it belongs there."""
+        if job.answer.cancelled():
+            return
+        request = job.request
+        if why := self._inside.dispatcher.forbidden(job):
+            job.fail(RequestRefused(why))
+            return
+        if self._past.take(job):
+            return
+        self._describe(request.device, job)
+        kind, fields = request_form(request)
+        number = next(self._numbers)
+        self._asked[number] = job
+        job.answer.add_done_callback(lambda answer: self._withdrawn(number, answer.cancelled()))
+        limits = job.limits if request.device == BROADCAST else None
+        self._tell(
+            Asking(
+                number, kind, fields, int(job.priority), job.replaceable, job.max_age,
+                job.stamp, job.asked, limits,
+            )
+        )  # fmt: skip
+
+    def _describe(self, device: int, job: Job) -> None:
+        if device != BROADCAST and self._described.get(device) is not job.limits:
+            self._described[device] = job.limits
+            self._tell(Describe(device, job.limits))
+
+    def _withdrawn(self, number: int, cancelled: bool) -> None:
+        """Called in any thread: nobody waits for the answer any more."""
+        if cancelled:
+            with suppress(RuntimeError):
+                self._loop.call_soon_threadsafe(self._withdraw, number)
+
+    def _withdraw(self, number: int) -> None:
+        if self._asked.pop(number, None) is not None:
+            self._tell(Withdraw(number))
+
+    def answered(self, message: Answer | Failed) -> None:
+        """The owner tells what became of a request."""
+        job = self._asked.pop(message.number, None)
+        if job is None or not (job.begun or job.answer.set_running_or_notify_cancel()):
+            return
+        job.begun = True
+        if isinstance(message, Answer):
+            self._inside.devices[job.request.device].heard = message.time
+            job.finish(message.pdu, message.time)
+        else:
+            self._failed(job, message)
+
+    def _failed(self, job: Job, message: Failed) -> None:
+        if message.error == "LineClosed":
+            # the owner's end is not this program's
+            self._give_up(job, sent=FATE in message.form.text)
+        else:
+            job.fail(error_of(message.error, message.form))
+
+    def send_past(self) -> None:
+        """Take back what belongs to a stop, and send it past the owner."""
+        for number, job in list(self._asked.items()):
+            if self._past.take(job):
+                self._withdraw(number)
+
+    def give_up_older(self, than: float, why: str) -> None:
+        """Fail what has waited since before a moment; it is not sent any more."""
+        for number, job in list(self._asked.items()):
+            if job.asked < than and not job.answer.done():
+                self._withdraw(number)
+                job.fail(LineLost(why + (FATE if job.request.changes else "")))
+
+    def give_up_all(self, *, closing: bool) -> None:
+        """The owner is gone, or `closing`: this program leaves it."""
+        asked, self._asked = self._asked, {}
+        for job in asked.values():
+            if closing and job.request.changes:
+                job.fail(LineClosed(f"The line was closed during the request.{FATE}"))
+            else:
+                self._give_up(job, sent=True)
+
+    def _give_up(self, job: Job, *, sent: bool) -> None:
+        """The owner ended before it answered: a read is asked anew, a write never is.
+
+        A stop is sent again: it may have got lost, and does no harm twice.
+        """
+        if not job.request.changes or job.priority is Priority.STOP:
+            if not job.answer.cancelled():
+                self._inside.dispatcher.put_back(job)
+            return
+        text = (
+            f"{OWNER_ENDED} during the request.{FATE}"
+            if sent
+            else f"{OWNER_ENDED}; this was not sent."
+        )
+        job.fail(LineLost(text))

@@ -1,0 +1,114 @@
+"""A program that is attached to the owner of a line, as the owner knows it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from concurrent.futures import Future
+from dataclasses import dataclass, field
+from functools import partial
+
+from ..errors import RequestRefused
+from ..limits import CAUTIOUS, Limits
+from ..model import DeviceState, Reply
+from ..program import Program
+from ..schedule.inside import LineInside
+from ..schedule.queue import Job
+from .failures import failure_of
+from .lease import TOO_LATE, stood_still
+from .messages import (
+    Answer,
+    AnyMessage,
+    Asking,
+    Failed,
+    News,
+    NoMessage,
+    asked_request,
+    packed,
+    priority_of,
+)
+
+log = logging.getLogger(__name__)
+
+MOST_ASKED = 256
+"""Requests of one client that may wait."""
+MOST_UNREAD = 1 << 20
+"""Bytes that a client may leave unread; one that stalls is let go, and may come back."""
+FRAMES_TOLD = 200
+
+
+@dataclass(eq=False, slots=True)
+class Client:
+    """One attached program."""
+
+    program: Program
+    writer: asyncio.StreamWriter
+    shares: dict[int, float] = field(default_factory=dict)
+    trace: bool = False
+    frames: int = 0
+    """How many frames of the line it was told of."""
+    limits: dict[int, Limits] = field(default_factory=dict)
+    asked: dict[int, Job] = field(default_factory=dict)
+    known: dict[int, DeviceState] = field(default_factory=dict)
+    present: int = 0
+    """The last roll call that it has answered."""
+
+    def say(self, message: AnyMessage) -> None:
+        """Tell it something; never waits."""
+        transport = self.writer.transport
+        if transport.is_closing():
+            return
+        if transport.get_write_buffer_size() > MOST_UNREAD:
+            log.warning("%s reads nothing any more and is let go", self.program.text)
+            transport.abort()
+            return
+        self.writer.write(packed(message))
+
+    def ask(self, inside: LineInside, message: Asking) -> None:
+        """It asks for something on the line. Raises NoMessage."""
+        if len(self.asked) >= MOST_ASKED:
+            raise NoMessage("too many requests at once")
+        request, priority = asked_request(message), priority_of(message.priority)
+        limits = message.limits or self.limits.get(request.device, CAUTIOUS)
+        job = Job(request, priority, limits, replaceable=message.replaceable)
+        job.program, job.stamp = self.program.id, message.stamp
+        job.max_age, job.asked = message.max_age, message.asked
+        self.asked[message.number] = job
+        job.answer.add_done_callback(partial(self._answered, message.number))
+        late = inside.clock() - message.asked
+        if job.commands and late > TOO_LATE:
+            job.fail(RequestRefused(stood_still(late)))
+        else:
+            inside.submit(job)
+
+    def _answered(self, number: int, answer: Future[Reply]) -> None:
+        if self.asked.pop(number, None) is None or answer.cancelled():
+            return
+        error = answer.exception()
+        if error is not None:
+            self.say(Failed(number, *failure_of(error)))
+        else:
+            reply = answer.result()
+            self.say(Answer(number, reply.pdu, reply.time))
+
+    def withdraw(self, number: int) -> None:
+        """It does not wait for a request any more."""
+        job = self.asked.get(number)
+        if job is not None:
+            job.answer.cancel()
+
+    def news(self, inside: LineInside, shares: dict[int, float]) -> News:
+        """What is new to it on the line."""
+        changed = {}
+        for device in inside.devices.known:
+            state = inside.devices.state(device)
+            if self.known.get(device) != state:
+                self.known[device] = changed[device] = state
+        frames: tuple[tuple[float, str, bytes, str], ...] = ()
+        count = inside.around.trace.count
+        if self.trace:
+            new = min(count - self.frames, FRAMES_TOLD)
+            last = inside.around.trace.frames()[-new:] if new else ()
+            frames = tuple((one.time, one.direction, one.data, one.note) for one in last)
+        self.frames = count
+        return News(inside.state(), inside.around.tally.frozen(), changed, shares, frames)

@@ -1,0 +1,59 @@
+"""Who commands which device, granted by the owner of the line; questions and their answers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+from ..program import Program
+from ..shared_facts import SharedFacts, commanded_by
+from .attached import Client
+from .messages import AskedFor, Claim, Denied, Granting
+
+
+class Commanding:
+    """Grants and hands on for the programs of one line; in the line's loop."""
+
+    def __init__(
+        self,
+        facts: SharedFacts,
+        clients: Mapping[str, Client],
+        tell_facts: Callable[[], None],
+    ) -> None:
+        self._facts = facts
+        self._clients = clients
+        self._tell_facts = tell_facts
+
+    def claimed(self, program: Program, claim: Claim) -> None:
+        """A program wants to command a device, or no longer."""
+        facts, device, take = self._facts, claim.device, claim.take
+        holder = facts.commanders.get(device)
+        if take and holder not in (None, program.id):
+            other = facts.program(holder or "")
+            client = self._clients.get(program.id)
+            if other is not None and client is not None:
+                client.say(Denied(device, other))
+                return
+        if take or holder == program.id:
+            facts.note_commander(device, program.id if take else None)
+        self._tell_facts()
+
+    def asked_for(self, program: Program, device: int) -> None:
+        """Hand a question on to the program that commands a device."""
+        facts = self._facts
+        holder = facts.commanders.get(device)
+        if holder == facts.me.id:
+            facts.hear_question(device, program)
+        elif holder is not None and (client := self._clients.get(holder)) is not None:
+            client.say(AskedFor(device, program))
+
+    def replied(self, program: Program, reply: Granting) -> None:
+        """Hand an answer on to the program that asked; a yes frees the device."""
+        facts = self._facts
+        if reply.yes and facts.commanders.get(reply.device) == program.id:
+            facts.note_commander(reply.device, None)
+            self._tell_facts()
+        why = reply.why or ("" if reply.yes else commanded_by(reply.device, program))
+        if reply.program == facts.me.id:
+            facts.hear_reply(reply.device, why, yes=reply.yes)
+        elif (client := self._clients.get(reply.program)) is not None:
+            client.say(Granting(reply.device, reply.program, reply.yes, why))

@@ -1,0 +1,95 @@
+"""The socket on which the owner of a line listens: private, made anew, never left behind."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import socket
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from pathlib import Path
+
+from ..program import Program
+from .messages import VERSION
+from .place import PRIVATE_FILE, SHARED_FILE, Owner, OwnerLock, SharePlace, make_private, short_path
+
+log = logging.getLogger(__name__)
+
+TakeIn = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
+
+
+class Listening:
+    """Listens for programs of one line; lives in the line's loop."""
+
+    def __init__(self, place: SharePlace, lock: OwnerLock, me: Program, welcome: TakeIn) -> None:
+        self._place = place
+        self._lock = lock
+        self._me = me
+        self._welcome = welcome
+        self._server: asyncio.Server | None = None
+        self._path: Path | None = None
+
+    async def start(self) -> None:
+        """Listen in the first folder that takes a socket. Raises OSError where none does."""
+        trouble: OSError = FileNotFoundError("no folder for the socket of the line")
+        for folder in self._place.socket_folders:
+            try:
+                await self._listen(folder)
+            except OSError as error:
+                trouble = error
+            else:
+                return
+        raise trouble
+
+    async def _listen(self, folder: Path) -> None:
+        shared = self._place.group is not None
+        # nobody else may enter it, so that nobody connects before the socket has its own mode
+        make_private(folder, shared=shared)
+        path = folder / f"{self._place.name}.sock"
+        with suppress(FileNotFoundError):
+            path.unlink()
+        listening = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
+        try:
+            with short_path(path) as address:
+                listening.bind(address)
+            path.chmod(SHARED_FILE if shared else PRIVATE_FILE)
+            if self._place.group is not None:
+                os.chown(path, -1, self._place.group)
+            self._server = await asyncio.start_unix_server(self._welcome, sock=listening)
+        except BaseException:
+            listening.close()
+            raise
+        self._path = path
+        self._lock.tell(Owner(VERSION, self._me, str(path)))
+
+    async def keep(self) -> None:
+        """Note a sign of life on the socket; made anew where its folder was taken away.
+
+        As at the end of a log-in. The lock is taken anew where its file was taken away.
+        """
+        if not self._lock.stands:
+            await self._renew_lock()
+        if self._path is not None:
+            with suppress(OSError):
+                os.utime(self._path)  # the last sign of life, should this program be killed
+                return
+        if self._server is not None:
+            self._server.close()
+        with suppress(OSError):
+            await self.start()
+
+    async def _renew_lock(self) -> None:
+        with suppress(OSError):
+            if self._lock.renew() and self._path is not None:
+                log.error("the lock of the line was taken away, and is made anew")
+                self._lock.tell(Owner(VERSION, self._me, str(self._path)))
+
+    def close(self) -> None:
+        """Listen no more, and leave no socket behind."""
+        if self._server is not None:
+            self._server.close()
+        if self._path is not None:
+            with suppress(OSError):
+                self._path.unlink()
+            self._path = None

@@ -1,0 +1,78 @@
+"""What a client does past an owner that is frozen: its stops go out on the port itself."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from contextlib import suppress
+
+from ..model import Priority
+from ..requests import BROADCAST
+from ..schedule.inside import LineInside
+from ..schedule.queue import Job
+from .direct import DirectStops
+from .messages import StopGiven
+from .stops_past import StopsPast
+from .turn import Turn
+
+
+class PastOwner:
+    """The stops of one client past one owner; lives in the line's loop."""
+
+    def __init__(self, inside: LineInside, stops_past: StopsPast, turn: Turn) -> None:
+        self.at_work = False
+        """Whether the owner is frozen."""
+        self._inside = inside
+        self._stops_past = stops_past
+        self._turn = turn
+        self._direct: DirectStops | None = None
+        self._ending: asyncio.Task[None] | None = None
+        self._noted: dict[int, tuple[int, ...]] = {}
+
+    def begin(self) -> None:
+        """The owner does not answer: take stops from now on."""
+        self.at_work = True
+
+    def leave(self) -> None:
+        """The owner answers again: what is left goes its usual way."""
+        self.at_work = False
+        direct, self._direct = self._direct, None
+        if direct is not None:
+            self._ending = asyncio.get_running_loop().create_task(direct.end())
+
+    def when_ended(self, call: Callable[[], None]) -> None:
+        """Call when nothing goes out past the owner any more."""
+        if self._ending is None or self._ending.done():
+            call()
+        else:
+            self._ending.add_done_callback(lambda _: call())
+
+    async def end(self) -> None:
+        """The owner is gone, or this program leaves it."""
+        self.leave()
+        if self._ending is not None:
+            with suppress(asyncio.CancelledError):
+                await self._ending
+
+    def take(self, job: Job) -> bool:
+        """Send what belongs to a stop directly; False where the job does not."""
+        if not self.at_work:
+            return False
+        if self._direct is None:
+            if job.priority is not Priority.STOP:
+                return False
+            self._direct = DirectStops(self._inside, self._turn)
+        if job.priority is Priority.STOP and job.request.changes:
+            self._note(job.request.device)
+        return self._direct.take(job)
+
+    def _note(self, device: int) -> None:
+        """Let the owner find that a stop went past it, before the stop goes out."""
+        facts = self._inside.facts
+        mine = {one: counts.get(facts.me.id, 0) for one, counts in facts.stops.given.items()}
+        devices = tuple(one for one, n in mine.items() if n and device in (one, BROADCAST))
+        counts = tuple(mine[one] for one in devices)
+        if devices and self._noted.get(device) != counts:
+            self._noted[device] = counts
+            by = facts.stops.by.get(devices[0], "")
+            self._stops_past.note(StopGiven(devices, counts, by, facts.me))

@@ -1,0 +1,41 @@
+"""How what is done in one program reaches the others; called in any thread."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..shared_facts import SharedFacts
+from .messages import AnyMessage, AskedFor, Claim, Granting, Hush, StopGiven, Told
+
+
+class ProgramVoice:
+    """Makes messages of it for whoever hands them on; `send` may be called in any thread."""
+
+    def __init__(self, facts: SharedFacts, send: Callable[[AnyMessage], None]) -> None:
+        self._facts = facts
+        self._send = send
+
+    def stop_given(self, devices: tuple[int, ...], by: str) -> None:
+        """Devices are stopped by this program."""
+        me = self._facts.me
+        self._send(StopGiven(devices, self._facts.stops.of(me.id, devices), by, me))
+
+    def claim(self, device: int, take: bool) -> None:
+        """This program commands a device now, or no longer."""
+        self._send(Claim(device, take))
+
+    def ask(self, device: int) -> None:
+        """This program wants a device that another one commands."""
+        self._send(AskedFor(device, self._facts.me))
+
+    def reply(self, device: int, program: str, yes: bool, why: str) -> None:
+        """This program answers one that asked."""
+        self._send(Granting(device, program, yes, why))
+
+    def hushed(self, device: int, why: str) -> None:
+        """A device is left alone by this program, or with no reason no longer."""
+        self._send(Hush(device, why))
+
+    def told(self, device: int, text: str) -> None:
+        """This program has something for all to read."""
+        self._send(Told(device, text))
