@@ -10,7 +10,7 @@ from ..opening import DEMO_LINE, LEAVE_RUNNING, STOP, open_panel, terminal_troub
 from ..shared.completion import complete_line
 from ..shared.devices import SLAVE_ADDRESS, one_device
 from ..shared.errors import USAGE, Failure, told
-from ..shared.line_argument import LineArgument
+from ..shared.line_argument import LineArgument, share_group_option
 from ..shared.lines import is_line
 from ..shared.options import read_only_option
 
@@ -85,6 +85,7 @@ def demo(low_bandwidth: bool, on_hangup: str, mouse: bool, bell: bool, ascii: bo
     metavar="ADDRESS",
     help="Slave address of the drive to open; without it the line is searched.",
 )
+@share_group_option
 @read_only_option
 @low_bandwidth_option
 @on_hangup_option

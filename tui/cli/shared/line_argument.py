@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
 
 LINE_VARIABLE = "DRIVEPANEL_LINE"
+GROUP_SETTING = "DRIVEPANEL_SHARE_GROUP"
+"""Environment variable: the group of users that may attach to lines opened from here."""
 _ACCEPTED = "drivepanel.accept-line"
 _WRITTEN_OUT = re.compile(
     r"(?:serial|tcp|rtu-tcp|sim):|/dev/|\\\\\.\\|COM\d+(?:,|$)", re.IGNORECASE
@@ -170,12 +172,26 @@ _accept_option = click.option(
 )
 
 
+def _note_group(_ctx: click.Context, _option: click.Parameter, group: str | None) -> None:
+    if group:
+        os.environ[GROUP_SETTING] = group  # where the environment of a service says it, too
+
+
+share_group_option = click.option(
+    "--share-group",
+    metavar="GROUP",
+    expose_value=False,
+    callback=_note_group,
+    help="Let users of this group attach to the line; unless told, this user alone may.",
+)
+
+
 def takes_line(command: Callable[..., Any]) -> Callable[..., Any]:
-    """LINE, and the option that accepts one that is not as it was."""
+    """LINE, the option that accepts one that is not as it was, and with whom it is shared."""
     argument = click.argument(
         "line_text", metavar="LINE", cls=LineArgument, shell_complete=complete_line
     )
-    return argument(_accept_option(command))
+    return argument(_accept_option(share_group_option(command)))
 
 
 def mind_the_line(opened: OpenLine) -> None:

@@ -90,8 +90,8 @@ def open_line(
     from .share_place import share_place, this_program
 
     link = parse_link(text, usual)
-    place, me = share_place(text), this_program(program)
-    line = Line(link, read_only=read_only, place=place if program else None, program=me)
+    place = share_place(text) if program else None
+    line = Line(link, read_only=read_only, place=place, program=this_program(program))
     return _opened(OpenLine(text, line), wait)
 
 

@@ -6,9 +6,11 @@ import os
 import sys
 import uuid
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from tui.bus.errors import NotShared
 from tui.bus.program import Program
 
 from ..paths import state_folder
@@ -18,23 +20,59 @@ if TYPE_CHECKING:
     from tui.bus.share.place import SharePlace
 
 PROGRAM = "drivepanel"
+GROUP_SETTING = "DRIVEPANEL_SHARE_GROUP"
+"""Environment variable: the group of users that may attach to lines opened from here."""
+FOLDER_SETTING = "DRIVEPANEL_SHARE_FOLDER"
+USUAL_GROUP_FOLDER = "/run/drivepanel"
+"""Where users of a group meet, unless the environment names another; the administrator makes it."""
 
 
 def share_place(text: str) -> SharePlace | None:
     """The meeting place of a line as it was typed; None on a system without local sockets.
 
     The socket lies in the user's runtime folder, else in the state folder. The lock lies in the
-    state folder, which no log-out takes away.
+    state folder, which no log-out takes away. Where a group may share the line both lie in the
+    group's folder, where who belongs to it finds them without being told.
+
+    Raises NotShared where a group is named and has no such folder.
     """
     if os.name != "posix":
         return None
     from tui.bus.share.place import SharePlace
 
+    key = line_key(text)
+    folder = Path(os.environ.get(FOLDER_SETTING) or USUAL_GROUP_FOLDER)
+    if group := os.environ.get(GROUP_SETTING):
+        return SharePlace(key, folder, (folder,), group_number(group, folder))
+    common = SharePlace(key, folder, (folder,), 0)
+    if os.access(common.lock_path, os.R_OK | os.W_OK):
+        return replace(common, group=common.lock_path.stat().st_gid)
     state = state_folder()
     folders = [state / "run"]
     if runtime := os.environ.get("XDG_RUNTIME_DIR"):
         folders.insert(0, Path(runtime) / PROGRAM)
-    return SharePlace(line_key(text), state / "lines", tuple(folders))
+    return SharePlace(key, state / "lines", tuple(folders))
+
+
+def group_number(group: str, folder: Path) -> int:
+    """The number of a group whose users share lines in a folder. Raises NotShared."""
+    import grp
+
+    try:
+        number = grp.getgrnam(group).gr_gid
+    except KeyError:
+        text = f"There is no group {group}; a line is shared with a group of users."
+        raise NotShared(text) from None
+    try:
+        found = folder.stat()
+    except OSError:
+        found = None
+    if found is None or found.st_gid != number or not os.access(folder, os.W_OK):
+        raise NotShared(
+            f"To share lines with the group {group}, {folder} has to belong to it:"
+            f" sudo install -d -m 2770 -g {group} {folder}"
+        )
+    return number
 
 
 def this_program(name: str) -> Program:

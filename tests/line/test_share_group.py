@@ -1,0 +1,123 @@
+"""A line that users of a group share: off unless asked for, and closed to everybody else."""
+
+from __future__ import annotations
+
+import grp
+import os
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tui.simulator import DriveSpec, Simulation
+
+ROOT = Path(__file__).resolve().parents[2]
+GROUP, MEMBER, STRANGER = "dialout", 65533, 65534
+ROOT_NEEDED = "needs root, to be two users"
+
+
+@pytest.fixture
+def tcp_line() -> Iterator[str]:
+    """A simulated drive that every user can reach."""
+    with Simulation([DriveSpec("atv71", 1)]) as simulation:
+        host, port = simulation.serve_tcp()
+        yield f"tcp:{host}:{port}"
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """A folder of the group that everybody may reach."""
+    if os.geteuid() != 0:
+        pytest.skip(ROOT_NEEDED)
+    for part in (tmp_path, *tmp_path.parents):
+        if part.stat().st_uid == 0 and not part.stat().st_mode & 0o001 and part != Path("/"):
+            part.chmod(part.stat().st_mode | 0o011)
+    found = tmp_path / "group"
+    found.mkdir()
+    os.chown(found, -1, grp.getgrnam(GROUP).gr_gid)
+    found.chmod(0o2770)
+    return found
+
+
+PROGRAM = """
+import os, sys, tempfile
+user, groups = int(sys.argv[1]), [int(g) for g in sys.argv[2].split(",") if g]
+from tui.bus.errors import LineError
+from tui.bus.share import client, server, sharing
+from tui.session.connect.open_line import open_line
+# all that is imported later lies where another user may not look
+open_line(sys.argv[3], wait=10.0).close()
+os.setgroups(groups); os.setgid(user); os.setuid(user)
+os.environ["DRIVEPANEL_STATE"] = tempfile.mkdtemp()
+try:
+    opened = open_line(sys.argv[3], wait=10.0, program="p" + sys.argv[1])
+except LineError as error:
+    print("ERROR", error, flush=True)
+    sys.exit(1)
+print([one.name for one in opened.line.facts.others], flush=True)
+sys.stdin.readline()
+opened.close()
+"""
+
+
+def program(line: str, user: int, groups: str, folder: Path, **more: str) -> subprocess.Popen[str]:
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "DRIVEPANEL_SHARE_FOLDER": str(folder)}
+    environment.pop("XDG_RUNTIME_DIR", None)
+    return subprocess.Popen(
+        [sys.executable, "-c", PROGRAM, str(user), groups, line],
+        cwd="/",
+        env={**environment, **more},
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+
+
+def said(one: subprocess.Popen[str]) -> str:
+    assert one.stdout is not None
+    return one.stdout.readline().strip()
+
+
+def end(*programs: subprocess.Popen[str]) -> None:
+    for one in programs:
+        one.communicate("\n", timeout=20.0)
+
+
+def test_a_member_attaches_without_being_told_and_a_stranger_does_not(
+    folder: Path, tcp_line: str
+) -> None:
+    number = str(grp.getgrnam(GROUP).gr_gid)
+    owner = program(tcp_line, MEMBER, number, folder, DRIVEPANEL_SHARE_GROUP=GROUP)
+    assert said(owner) == "[]"
+    member = program(tcp_line, MEMBER - 1, number, folder)
+    assert said(member) == f"['p{MEMBER}']"
+    stranger = program(tcp_line, STRANGER, "", folder)
+    assert said(stranger) == "[]"
+    end(member, stranger, owner)
+    assert not list(folder.glob("*.sock"))
+
+
+def test_nobody_of_another_user_attaches_unless_it_was_asked_for(
+    folder: Path, tcp_line: str
+) -> None:
+    number = str(grp.getgrnam(GROUP).gr_gid)
+    owner = program(tcp_line, MEMBER, number, folder)
+    assert said(owner) == "[]"
+    other = program(tcp_line, MEMBER - 1, number, folder)
+    assert said(other) == "[]"
+    end(other, owner)
+
+
+def test_a_group_without_a_folder_is_told_what_to_do(tmp_path: Path, tcp_line: str) -> None:
+    if os.geteuid() != 0:
+        pytest.skip(ROOT_NEEDED)
+    one = program(tcp_line, 0, "", tmp_path / "none", DRIVEPANEL_SHARE_GROUP=GROUP)
+    told = said(one)
+    end(one)
+    assert "sudo install -d -m 2770 -g dialout" in told
+    one = program(tcp_line, 0, "", tmp_path, DRIVEPANEL_SHARE_GROUP="no-such-group")
+    told = said(one)
+    end(one)
+    assert "There is no group no-such-group" in told
