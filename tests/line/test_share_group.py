@@ -42,10 +42,11 @@ def folder(tmp_path: Path) -> Path:
 
 
 PROGRAM = """
-import os, sys, tempfile
+import grp, os, sys, tempfile
 user, groups = int(sys.argv[1]), [int(g) for g in sys.argv[2].split(",") if g]
 from tui.bus.errors import LineError
 from tui.bus.share import client, server, sharing
+from tui.session.connect import share_place
 from tui.session.connect.open_line import open_line
 # all that is imported later lies where another user may not look
 open_line(sys.argv[3], wait=10.0).close()
