@@ -15,7 +15,7 @@ from tui.cli.documents.json_schema import DOCUMENTS, document_of, documents_sche
 from tui.cli.main import COMMANDS
 
 from . import test_fault_status as fault_status
-from .commands import ended, invoked
+from .commands import ended, invoked, tcp_line
 
 SCHEMA = Path(__file__).resolve().parents[2] / "docs" / "cli.schema.json"
 NO_JSON = {"demo"}
@@ -130,6 +130,14 @@ def test_what_a_stop_sent_first_is_told() -> None:
     assert told["timeout"]["begun"] is True
 
 
+def test_a_proof() -> None:
+    with tcp_line("atv312@1", "--set", "ttO=5", "--any-settings") as line:
+        (told,) = documents(ended(0, "prove", line, "--arm", "--reset", "--json").stdout)
+    assert told["as_set"] is True
+    assert told["not_before_ms"] < 500 < told["not_after_ms"]
+    assert told["reset"] is True
+
+
 async def test_a_drive_in_fault() -> None:
     async with fault_status.line("atv71") as opened:
         fault_status.provoke(opened, "ObF")
@@ -149,7 +157,13 @@ def test_a_simulated_line() -> None:
 
 
 def test_every_command_has_json() -> None:
-    tried = {words[0] for _, words, _ in RUNS.values()} | {"run", "reset", "simulate", "hold"}
+    tried = {words[0] for _, words, _ in RUNS.values()} | {
+        "run",
+        "reset",
+        "simulate",
+        "hold",
+        "prove",
+    }
     assert tried == set(COMMANDS) - NO_JSON
     for name in tried:
         assert "--json" in invoked(name, "--help").stdout

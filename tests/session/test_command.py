@@ -258,7 +258,7 @@ REFUSALS = [
     ("powerdrive", {"6.43": 0}, "forward", r"6\.43 is Terminals\. .*t takes the control"),
     ("atv312", {"rFC": 97}, "forward", r"reference channel 2 \(Fr2\), which counts, is None"),
     ("atv71", {}, "reset", r"possible in the states: Fault"),
-    ("atv31", {}, "take-control", r"no order 'take control'"),
+    ("atv31", {}, "take-control", r"no command 'take control'"),
 ]
 
 

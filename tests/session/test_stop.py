@@ -225,7 +225,7 @@ def test_orders_that_no_state_allows_are_refused_in_words() -> None:
     chart = profile.data.charts[0]
     with pytest.raises(OrderRefused, match=r"possible in the states: .*Fault.* It is now: Standby"):
         choose(chart, "reset", {"FD01": 0x4000})
-    with pytest.raises(OrderRefused, match="no order 'take control'"):
+    with pytest.raises(OrderRefused, match="no command 'take control'"):
         choose(chart, "take-control", {"FD01": 0x4000})
     leroy = library.load("powerdrive").data.charts[0]
     with pytest.raises(OrderRefused, match=r"needs 6\.43 = 1"):

@@ -253,7 +253,7 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
         else:
             factor = known
     try:
-        number = factor * Decimal(bare.replace(",", ".").replace(" ", "").replace("_", ""))
+        number = Decimal(bare.replace(",", ".").replace(" ", "").replace("_", ""))
     except InvalidOperation:
         number = Decimal("NaN")
     if not number.is_finite():
@@ -263,7 +263,7 @@ def _number(parameter: Parameter, typed: str, names: Mapping[int, str]) -> Decim
     if number and not -LONGEST_NUMBER <= number.adjusted() <= LONGEST_NUMBER:
         # its digits alone would fill the screen, or the memory
         raise ValueRefused(f"{parameter.code}: {typed[:40]!r} is out of range.")
-    return number
+    return factor * number
 
 
 def percent_of(percent: Decimal, rating: Decimal) -> Decimal:
