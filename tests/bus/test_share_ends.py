@@ -385,6 +385,11 @@ async def test_an_owner_that_talks_nonsense_is_left_again(share: Share, tmp_path
 # Nothing is left behind
 
 
+def held() -> tuple[int, int]:
+    """How many files and threads this process has."""
+    return len(os.listdir("/proc/self/fd")), threading.active_count()
+
+
 async def test_attaching_and_leaving_again_and_again_leaves_nothing_behind(share: Share) -> None:
     with PtyPeer(honest) as peer:
         lines = share(peer.path)
@@ -399,15 +404,31 @@ async def test_attaching_and_leaving_again_and_again_leaves_nothing_behind(share
 
         await visit(0)
         eventually(lambda: not owner.facts.others)
-        before = len(os.listdir("/proc/self/fd")), threading.active_count()
+        before = held()
         for number in range(1, 16):
             await visit(number)
         eventually(lambda: not owner.facts.others and owner.facts.commander(2) is None)
-        eventually(lambda: (len(os.listdir("/proc/self/fd")), threading.active_count()) == before)
+        # one more of each may be the test's own; a leak would be fifteen
+        eventually(lambda: all(now <= then + 2 for now, then in zip(held(), before, strict=True)))
         loop = owner._engine._loop
         assert loop is not None
         assert len(asyncio.all_tasks(loop)) < 8
         assert len(owner.facts.departed) <= 16
+
+
+async def test_one_that_ends_as_it_begins_to_listen_leaves_no_socket_behind(
+    share: Share, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async def takes_long(*_: object, **__: object) -> None:
+        await asyncio.sleep(60)
+
+    monkeypatch.setattr("tui.bus.share.listening.asyncio.start_unix_server", takes_long)
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        lines.open("hasty", wait=None)
+        eventually(lambda: lines.left_behind != [])
+        lines.close()
+        assert lines.left_behind == []
 
 
 async def test_a_killed_program_leaves_a_socket_that_the_next_takes_away(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -19,7 +20,7 @@ from tui.bus.stop_counts import StopCounts
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
-from .sharing import SharedLines, frozen, place_in
+from .sharing import QUICK, SharedLines, frozen, place_in
 
 STOP, RUN = 0, 15
 
@@ -301,3 +302,43 @@ async def test_stops_and_the_reads_of_a_stopped_drive_pass_a_frozen_owner_polls_
             assert look.words == (6,)
             assert not waits.done()
         assert (await waits).words == (5,)
+
+
+async def test_two_that_stop_past_a_frozen_owner_take_turns(share: Share) -> None:
+    """Both would have the port open, and each hear a part of the answers."""
+
+    def takes_a_while(request: bytes, _count: int) -> Sequence[Step]:
+        return [0.02, reply(request)]
+
+    with PtyPeer(takes_a_while) as peer:
+        lines = share(peer.path)
+        owner = lines.open("run")
+        stoppers = [lines.open(name) for name in ("stop", "panel", "remote")]
+        await owner.read(1, 1)
+        with frozen(owner):
+            stops = [task for number, one in enumerate(stoppers, 1) for task in stop(one, number)]
+            await asyncio.gather(*stops)
+            looks = [
+                one.read(number, 40 + number + turn, priority=Priority.OPERATOR_READ)
+                for turn in range(5)
+                for number, one in enumerate(stoppers, 1)
+            ]
+            answers = [answer.words for answer in await asyncio.gather(*looks)]
+            assert answers == [(40 + number + turn,) for turn in range(5) for number in (1, 2, 3)]
+            assert sorted(written(peer)) == [(1, STOP), (2, STOP), (3, STOP)]
+        assert [len(one) for one in peer.bursts] == [8] * len(peer.requests)
+
+
+async def test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew(
+    share: Share,
+) -> None:
+    """Nobody can tell when it came: its time would be that of the program's going on."""
+    brisk = replace(QUICK, first_timeout=0.3, min_timeout=0.3)
+    with PtyPeer(slow) as peer:
+        line = share(peer.path).open("panel", timing=brisk)
+        reading = asyncio.create_task(line.read(1, 5, priority=Priority.OPERATOR_READ))
+        await asyncio.to_thread(peer.await_requests, 1)
+        with frozen(line):
+            await asyncio.sleep(1.6)
+        assert (await reading).time >= peer.departures[-1] - 0.05
+        assert len(peer.requests) == 2

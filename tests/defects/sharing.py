@@ -160,4 +160,20 @@ DEFECTS = (
         "Work on a drive goes on although another program has stopped it.",
         ("tests/session/test_handover.py",),
     ),
+    Defect(
+        "stops-past-without-turns",
+        "tui/bus/share/turn.py",
+        "await self._lock(descriptor)",
+        "pass",
+        "Of two that stop past a frozen owner one takes the answer of the other for its own.",
+        (f"{STOPS}::test_two_that_stop_past_a_frozen_owner_take_turns",),
+    ),
+    Defect(
+        "answer-of-before-a-standstill",
+        "tui/bus/schedule/outcomes.py",
+        "return self._clock() - result.sent > longest + STILL",
+        "return False",
+        "After a standstill of the program an old value has the time of now.",
+        (f"{STOPS}::test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew",),
+    ),
 )

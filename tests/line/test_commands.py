@@ -224,8 +224,8 @@ def test_a_stop_by_another_program_ends_it_and_is_told(order: list[str]) -> None
             assert drivepanel("stop", line, *order).returncode == 0
             said, error = program.process.communicate(timeout=PATIENCE)
             assert program.process.returncode == 5, error
-            assert "It was stopped by another program or master on the line: CMD" in error
-            assert "It was stopped by another program" in said
+            assert "It was stopped by drivepanel stop, stop" in error
+            assert "It was stopped by drivepanel stop, stop" in said
             assert stands(simulation)
 
 

@@ -58,7 +58,10 @@ class Listening:
                 os.chown(path, -1, self._place.group)
             self._server = await asyncio.start_unix_server(self._welcome, sock=listening)
         except BaseException:
+            # this program may end in the midst of it
             listening.close()
+            with suppress(OSError):
+                path.unlink()
             raise
         self._path = path
         self._lock.tell(Owner(VERSION, self._me, str(path)))

@@ -102,12 +102,11 @@ class Sharing:
             self._quiet_until = max(self._quiet_until, inside.clock() + left)
         # should this program end before it listens
         self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until))
-        server = ShareServer(self._place, self._lock, inside)
+        self._server = server = ShareServer(self._place, self._lock, inside)
         try:
             await server.start(served.program if served is not None else None)
         except OSError as error:
             log.error("the line cannot be shared: %s", error)
-        self._server = server
         await asyncio.sleep(max(0.0, self._quiet_until - inside.clock()))
 
     def tell_state(self) -> None:
