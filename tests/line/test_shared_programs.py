@@ -121,7 +121,7 @@ def test_a_stop_beside_run_ends_it_and_says_by_whom(programs: ExitStack) -> None
         for _ in range(3):
             assert '"RFR"' in recorder.process.stdout.readline()
         status, said = recorder.end()
-        assert status == -signal.SIGTERM
+        assert status == 128 + signal.SIGTERM
         assert said == f"drivepanel: Shared with run (pid {runner.process.pid}).\n"
         assert sockets() == []
 

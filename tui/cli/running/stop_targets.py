@@ -42,6 +42,7 @@ async def first_stopped(
     opened: OpenLine, target: Target, order: OrderId, journal: Journal, telling: StopTelling
 ) -> StoppableDrive:
     """Send the first word, then find out what the drive is; both are told."""
+    from tui.bus.api import Priority
     from tui.bus.errors import ExchangeError, NoAnswer
     from tui.drive.profile import library
     from tui.drive.profile.stop_facts import stop_facts
@@ -61,7 +62,8 @@ async def first_stopped(
     identity = DriveIdentity(device, "", "", "", "", None, ())
     silent: ExchangeError | None = None
     try:
-        identity = await identify_drive(opened.line, device)
+        # before all polls, and past an owner of the line that is frozen
+        identity = await identify_drive(opened.line, device, priority=Priority.STOP)
         says = f"it says it is {identity.reference}" if identity.reference else "it names nothing"
     except ExchangeError as error:
         silent, says = error, "it does not say what it is"
@@ -143,11 +145,14 @@ async def found_at(
 
     Raises Failure where it cannot be stopped, and why.
     """
-    from tui.bus.api import Priority
+    from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import LineError, NoAnswer
     from tui.session.connect.identify import identify_drive
 
     priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
+    if opened.line.state.status is LineStatus.LOST:
+        # the program that owns the line is frozen: nothing else goes past it
+        priority = Priority.STOP
     try:
         identity = await identify_drive(opened.line, device, priority=priority)
     except NoAnswer:
