@@ -10,6 +10,8 @@ import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+from tui.drive.small_file import read_small_text
+
 from .action import KEY_NAMES, Action
 from .table import ACTIONS
 
@@ -55,7 +57,7 @@ def _actions(of: str) -> Iterator[Action]:
 def write_pages(folder: Path) -> None:
     """Bring every page of a folder up to date."""
     for path in sorted(folder.glob("*.md")):
-        path.write_text(with_tables(path.read_text("utf-8")), "utf-8")
+        path.write_text(with_tables(read_small_text(path)), "utf-8")
 
 
 if __name__ == "__main__":
