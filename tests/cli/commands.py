@@ -19,7 +19,7 @@ from tui.cli.main import main
 def tcp_line(*arguments: str) -> Iterator[str]:
     """What `drivepanel simulate` serves with these arguments, in this process; the LINE to it."""
     with simulate.make_context("simulate", [*arguments]) as context:
-        places = ("pty", "serial", "tcp", "rtu_tcp")
+        places = ("pty", "serial", "tcp", "rtu_tcp", "as_json")
         options = {name: given for name, given in context.params.items() if name not in places}
         with simulation_of(**options) as simulation:
             host, port = simulation.serve_tcp()
