@@ -15,7 +15,7 @@ from .question import KeyQuestion, hint
 if TYPE_CHECKING:
     from .now import MotorsNow
 
-SHARE, OTHER_ROWS, LEAST_ROWS = 0.8, 6, 3
+DIALOG_SHARE, OTHER_ROWS, LEAST_ROWS = 0.8, 6, 3
 """Of the screen's rows those of the dialog; its border, question, keys and margins; the least."""
 
 LeaveChoice = Literal["stop", "leave", "stay"]
@@ -55,7 +55,7 @@ class Leave(KeyQuestion[LeaveChoice]):
     def _rows_left(self) -> int:
         """Rows for what happens, so that the keys below stay on the screen."""
         motors = len(self._now().plain.splitlines()) if self._now is not None else 0
-        return max(LEAST_ROWS, int(self.app.size.height * SHARE) - OTHER_ROWS - motors)
+        return max(LEAST_ROWS, int(self.app.size.height * DIALOG_SHARE) - OTHER_ROWS - motors)
 
     def action_choose(self, choice: LeaveChoice) -> None:
         """Give the choice back."""
