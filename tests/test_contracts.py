@@ -205,13 +205,31 @@ def test_links_of_readme_lead_somewhere() -> None:
     assert missing == []
 
 
-def test_readme_names_every_profile_and_every_command() -> None:
+def test_readme_names_every_profile_and_its_page_every_command() -> None:
     for path in (ROOT / "profiles").glob("*.toml"):
         assert f"`{path.stem}`" in README
     from tui.cli.main import COMMANDS
 
+    assert "](docs/cli.md)" in README
+    page = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
     for command in COMMANDS:
-        assert f"drivepanel {command}" in README
+        assert re.search(rf"^drivepanel {command}\b", page, re.MULTILINE), command
+
+
+def test_readme_stays_short() -> None:
+    """What it is, install, five commands, safety, drives, links: the rest has pages of its own."""
+    heads = re.findall(r"^## (.+)$", README, re.MULTILINE)
+    assert heads == ["Install", "Five commands", "Safety", "Drives", "Documents", "Licence"]
+    assert len(README.splitlines()) <= 120
+    five = README.partition("## Five commands")[2].partition("\n## ")[0]
+    assert len(re.findall(r"^drivepanel ", five, re.MULTILINE)) == 5
+
+
+def test_readme_leads_to_every_page() -> None:
+    pages = {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")}
+    pages |= {"docs/screens/README.md", "docs/decisions", "profiles/README.md"}
+    targets = {target.partition("#")[0] for target in re.findall(r"\]\(([^)]+)\)", README)}
+    assert pages - targets == set()
 
 
 def pins() -> dict[str, str]:
@@ -298,24 +316,3 @@ def test_a_test_that_hangs_fails_and_the_run_goes_on(
     assert "2 failed, 1 passed" in done.stdout
     assert "FAILED test_hanging.py::test_thread" in done.stdout
     assert "FAILED test_hanging.py::test_loop" in done.stdout
-
-
-def test_readme_tells_every_key_and_no_other() -> None:
-    from tui.screens.keys.action import KEY_NAMES
-    from tui.screens.keys.table import ACTIONS
-
-    rows = README.partition("## Keys")[2].partition("\n## ")[0]
-    table = re.findall(r"^\| ([^|]+) \| [^|]+ \|$", rows, re.MULTILINE)
-    told = {word for cell in table for word in re.split(r" and | or |, ", cell.strip())}
-    told -= {"key"}
-
-    def named(key: str) -> str:
-        """A key as README writes it."""
-        if "+" in key[:-1]:
-            return "+".join(part.capitalize() for part in key.split("+"))
-        return KEY_NAMES.get(key, key.capitalize() if len(key) > 1 else key)
-
-    keys = {named(key) for action in ACTIONS for key in action.keys.split(",") if key}
-    assert {"Ctrl+P", "Shift+Tab", "PgUp", "Space", "?", "a", "A"} <= keys
-    assert keys - told == set()
-    assert told - keys == set()

@@ -1,4 +1,4 @@
-"""Every command of docs/cli.md, run as it is printed there."""
+"""Every command of docs/cli.md and docs/tour.md, run as it is printed there."""
 
 from __future__ import annotations
 
@@ -13,26 +13,47 @@ from tui.cli.main import COMMANDS
 
 from .commands import ended
 
-PAGE = Path(__file__).resolve().parents[2] / "docs" / "cli.md"
+DOCS = Path(__file__).resolve().parents[2] / "docs"
+PAGE = DOCS / "cli.md"
 BLOCK = re.compile(r"^```sh\n(.*?)^```$", re.MULTILINE | re.DOTALL)
 STATUS = re.compile(r"(\d+):")
 PANEL = ("demo", "sim:atv71")
 
 
-def printed() -> list[tuple[str, int]]:
-    """Each command with the status that it ends with."""
-    blocks = BLOCK.findall(PAGE.read_text("utf-8"))
+def sections(page: Path = PAGE) -> dict[str, str]:
+    """The text of each section of a page, by its head."""
+    parts = re.split(r"^## (.+)$", page.read_text("utf-8"), flags=re.MULTILINE)
+    return dict(zip(parts[1::2], parts[2::2], strict=True))
+
+
+def printed(text: str) -> list[tuple[str, int]]:
+    """Each command of a text with the status that it ends with."""
     found = []
-    for line in (line for block in blocks for line in block.splitlines()):
+    for line in (line for block in BLOCK.findall(text) for line in block.splitlines()):
         typed, _, remark = line.partition("  # ")
         status = STATUS.match(remark)
         found.append((typed, int(status[1]) if status else 0))
     return found
 
 
-def test_the_commands_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    run = []
-    for line, status in printed():
+def commands_of(text: str) -> list[str]:
+    """The names of the commands of a text."""
+    return [word for line, _ in printed(text) for word in shlex.split(line)[1:2]]
+
+
+EXAMPLES = {
+    f"{page.stem}: {head}": text
+    for page in (PAGE, DOCS / "tour.md")
+    for head, text in sections(page).items()
+    if printed(text)
+}
+
+
+@pytest.mark.parametrize("text", EXAMPLES.values(), ids=EXAMPLES.keys())
+def test_the_commands_of_a_section(
+    text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for line, status in printed(text):
         name, *words = shlex.split(line)
         assert name == "drivepanel"
         if words[:1] == ["run"]:
@@ -49,18 +70,22 @@ def test_the_commands_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
             with monkeypatch.context() as there:
                 there.chdir(tmp_path)  # programs of their own are run where the checkout is
                 assert ended(status, *words).exit_code == status, line
-        run += words[:1]
-    assert set(COMMANDS) <= set(run)
+
+
+def test_every_command_is_printed_in_its_own_section() -> None:
+    for head, text in sections().items():
+        named = set(head.split(", ")) & set(COMMANDS)
+        assert named <= set(commands_of(text)), head
 
 
 def test_every_command_has_a_section() -> None:
-    heads = re.findall(r"^## (.+)$", PAGE.read_text("utf-8"), re.MULTILINE)
-    named = {name for head in heads for name in head.split(", ")}
+    named = {name for head in sections() for name in head.split(", ")}
     assert set(COMMANDS) - {"demo"} <= named
+    assert set(COMMANDS) <= set(commands_of(PAGE.read_text("utf-8")))
 
 
 def test_every_option_is_in_the_help_of_its_command() -> None:
-    for line, _ in printed():
+    for line, _ in printed(PAGE.read_text("utf-8")):
         words = shlex.split(line)[1:]
         if words and words[0] in COMMANDS:
             told = ended(0, words[0], "--help").stdout

@@ -39,7 +39,7 @@ DEFECTS = (
     ),
     Defect(
         "old-values-called-good",
-        "tui/cli/shared/cycles.py",
+        "tui/session/monitor/cycle.py",
         "elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):",
         "elif reading.quality is Quality.GOOD and not snapshot.cycle:",
         "A recorder goes on with values of a drive that is gone.",

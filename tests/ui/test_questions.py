@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any, cast
 
 import pytest
+from rich.text import Text
 from textual.screen import ModalScreen
 
 from tui.drive.profile import library
@@ -438,3 +439,21 @@ async def test_the_panel_is_not_left_past_a_question() -> None:
         await until(made.pilot, lambda: made.app.screen is asked)
         assert made.app._exit is False
         assert writes(made.app) == []
+
+
+@pytest.mark.parametrize("motors", [1, 5])
+@pytest.mark.parametrize("size", [(80, 24), (120, 40)])
+async def test_the_keys_of_leaving_stand_below_however_much_is_told(
+    size: tuple[int, int], motors: int
+) -> None:
+    def runs() -> Text:
+        return Text("\n".join(["Now  running forward"] * motors))
+
+    told = "\n".join(f"Device {n}: on loss of communication it acts 3 s after." for n in range(40))
+    asked = Asked(Leave(told, cast(MotorsNow, runs)))
+    async with asked.app.run_test(size=size) as pilot:
+        await asked.put(pilot)
+        await pilot.pause()
+        box = asked.question.query_one("#dialog").content_region
+        assert box.contains_region(asked.question.query_one("#hint").region)
+        assert asked.question.query_one("#says").max_scroll_y > 0

@@ -124,27 +124,18 @@ async def _staged(
     Raises ValueRefused where a value would be rounded to another without a person's wish.
     """
     from tui.drive.errors import ValueRefused
-    from tui.drive.settings.edits import Edits, consequences
-    from tui.drive.shown import scale_sources
-    from tui.session.read.retrying_reader import RetryingReader
+    from tui.drive.settings.edits import consequences
+    from tui.session.settings.typed import WouldRound, stage_typed
 
     profile = session.profile
     pairs = [(profile.find(code).code, value) for code, value in typed]
     codes = [code for code, _ in pairs]
     if twice := ", ".join(code for code in dict.fromkeys(codes) if codes.count(code) > 1):
         raise click.UsageError(f"{twice}: given more than once. Which value is meant?")
-    sources = scale_sources(profile)
-    follow = [p.code for p in profile.parameters if p.scale_by and {c for c, _ in pairs} & sources]
-    retrying = RetryingReader(session)
-    await retrying.ask_many([code for code, _ in pairs] + sorted(sources) + follow)
-    edits = Edits()
-    # scale sources first: what is typed for a ramp holds under the new scale
-    for code, value in sorted(pairs, key=lambda pair: pair[0] not in sources):
-        if profile[code].access == "r":
-            raise ValueRefused(f"{code} can only be read.")
-        edits = edits.stage(profile, code, value, retrying.raws, retrying.lacking)
-    if not rounded and (losses := [edit.loss for edit in edits.asked if edit.loss]):
-        raise ValueRefused(f"{'; '.join(losses)}. --round writes that all the same.")
+    try:
+        edits, retrying = await stage_typed(session, pairs, rounded=rounded)
+    except WouldRound as loss:
+        raise ValueRefused(f"{loss} --round writes that all the same.") from loss
     for edit in edits.asked:
         if edit.remark:
             messages.tell(edit.remark)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from tui.session.drive_state import drive_state
-from tui.session.reading import Quality, Reading
+from tui.session.monitor.cycle import as_read
 
 if TYPE_CHECKING:
     from tui.session.drive import DriveSession
@@ -44,20 +42,6 @@ class Cycles:
         return await self._waiting.get()
 
     def as_read(self, snapshot: Snapshot) -> Snapshot:
-        """The cycle with all codes in their order; what was not read in it is stale.
-
-        What was never read is bad, and says why. Its state is what those of now tell.
-        """
+        """The cycle with all codes; what was not read in it is stale."""
         since, self._before = self._before, snapshot.time
-        readings: dict[str, Reading] = {}
-        for code in self._codes:
-            reading = snapshot.readings.get(code)
-            if reading is None:
-                parameter = self.session.profile[code]
-                reading = Reading.bad(parameter, snapshot.time, snapshot.error)
-            elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):
-                reading = replace(reading, quality=Quality.STALE)
-            readings[code] = reading
-        return replace(
-            snapshot, readings=readings, state=drive_state(self.session.profile, readings)
-        )
+        return as_read(self.session.profile, self._codes, snapshot, since)

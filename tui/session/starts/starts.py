@@ -35,7 +35,7 @@ START_PATIENCE = 5.0
 """Seconds that begin() waits for the disk; a slow memory card flushes in two."""
 OVERTAKEN = "a stop came first"
 
-Drive = tuple[str, int]
+DriveKey = tuple[str, int]
 """A line's text and a device: one program calls one line by one text."""
 
 
@@ -63,7 +63,7 @@ class StartOvertaken(StartNotRecorded):
 class _Task:
     """Work for the disk: a record to write, or with None those of a drive to remove."""
 
-    drive: Drive
+    drive: DriveKey
     record: StartRecord | None
     done: threading.Event = field(default_factory=threading.Event)
     trouble: str = ""
@@ -92,7 +92,7 @@ class Starts:
         self._waiting: deque[_Task] = deque()
         self._current: _Task | None = None
         self._thread: threading.Thread | None = None
-        self._sent: dict[Drive, float] = {}
+        self._sent: dict[DriveKey, float] = {}
         """Since when a standstill says that the motor stopped; never while a start is under way."""
 
     @property
@@ -232,7 +232,7 @@ class Starts:
                 lambda: not self._waiting and self._current is None, timeout
             )
 
-    def _take_away(self, drive: Drive) -> None:
+    def _take_away(self, drive: DriveKey) -> None:
         self._sent.pop(drive, None)
         for task in [task for task in self._waiting if task.drive == drive]:
             if task.record is None:

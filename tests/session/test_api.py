@@ -1,0 +1,194 @@
+"""What scripts are given of a line and its drives, over simulated ones; docs/api.md as printed."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Iterator
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+
+import tui.session.api as api
+from tui.session.api import (
+    Drive,
+    DriveError,
+    DriveLine,
+    LineError,
+    NotStopped,
+    NotWritten,
+    WouldRound,
+    open_drives,
+)
+from tui.session.arming import NotArmed
+from tui.session.connect.contradiction import Contradiction
+from tui.session.connect.open_line import demo_line
+from tui.session.journal import Journal
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "api.md"
+EXAMPLES = re.findall(r"^```python\n(.*?)^```$", PAGE.read_text("utf-8"), re.M | re.S)
+
+
+@pytest.fixture
+def line() -> Iterator[DriveLine]:
+    with open_drives("sim:atv71@1,atv312@2,powerdrive@3") as opened:
+        yield opened
+
+
+@pytest.fixture
+def drive(line: DriveLine) -> Drive:
+    return line.drive()
+
+
+@pytest.mark.parametrize("example", EXAMPLES)
+def test_the_page_as_printed(example: str, capsys: pytest.CaptureFixture[str]) -> None:
+    exec(compile(example, "api.md", "exec"), {})
+    printed = capsys.readouterr().out
+    assert printed
+    assert "not read now" not in printed
+    if "NotWritten" in example:
+        assert "HSP: " in printed
+        assert "would be held as 0.0 Hz" in printed
+
+
+def test_the_page_names_all_of_it() -> None:
+    text = PAGE.read_text("utf-8")
+    for name in api.__all__:
+        assert f"`{name}`" in text, name
+    for owner in (Drive, DriveLine):
+        for part in vars(owner):
+            if not part.startswith("_"):
+                assert f"`{owner.__name__}.{part}`" in text, part
+
+
+def test_values_go_by_what_was_asked_for(drive: Drive) -> None:
+    found = drive.read("hsp", "W3201", "NMA1")
+    assert list(found) == ["hsp", "W3201", "NMA1"]
+    assert (found["hsp"].code, found["hsp"].number, found["hsp"].unit) == ("HSP", Decimal(50), "Hz")
+    assert (found["W3201"].code, found["W3201"].number) == ("ETA", None)
+    assert all(value.good and not value.error for value in found.values())
+
+
+def test_an_unknown_code_is_a_drive_error(drive: Drive) -> None:
+    with pytest.raises(DriveError, match="NONE"):
+        drive.read("NONE")
+
+
+def test_nobody_at_an_address_is_a_line_error(line: DriveLine) -> None:
+    with pytest.raises(LineError, match="9 did not answer"):
+        line.drive(9)
+
+
+def test_a_drive_is_what_it_says(line: DriveLine) -> None:
+    other = line.drive(2)
+    assert (other.address, other.profile) == (2, "atv312")
+    assert other.reference.startswith("ATV312")
+    with pytest.raises(Contradiction):
+        line.drive(2, profile="atv71")
+
+
+def test_one_that_says_nothing_needs_a_profile(line: DriveLine) -> None:
+    with pytest.raises(DriveError, match=r"name its profile: .*powerdrive"):
+        line.drive(3)
+    assert line.drive(3, profile="powerdrive").profile == "powerdrive"
+
+
+def test_nothing_is_written_without_arming(drive: Drive) -> None:
+    with pytest.raises(NotArmed, match=r"with drive\.armed"):
+        drive.write({"HSP": 40})
+    with drive.armed():
+        pass
+    with pytest.raises(NotArmed):
+        drive.save()
+    assert drive.read("HSP")["HSP"].number == Decimal(50)
+
+
+def test_what_is_written_is_read_back_and_on_record(drive: Drive) -> None:
+    with drive.armed():
+        told = drive.write({"HSP": 40.5, "ACC": "3500ms"})
+    assert told["HSP"] == "HSP: 50.0 Hz -> 40.5 Hz"
+    found = drive.read("HSP", "ACC")
+    assert (found["HSP"].number, found["ACC"].number) == (Decimal("40.5"), Decimal("3.5"))
+
+
+def test_the_journal_has_what_a_script_wrote() -> None:
+    with open_drives("sim:atv71") as line:
+        drive = line.drive()
+        with drive.armed():
+            drive.write({"HSP": 40})
+    entries = (Journal().path).read_text("utf-8").splitlines()
+    assert ['"HSP"' in entry and '"script"' in entry for entry in entries] == [True]
+
+
+def test_a_refused_value_is_told_with_its_code(drive: Drive) -> None:
+    with drive.armed(), pytest.raises(NotWritten) as refused:
+        drive.write({"HSP": 700, "ACC": 4})
+    assert list(refused.value.why) == ["HSP"]
+    found = drive.read("HSP", "ACC")
+    assert (found["HSP"].number, found["ACC"].number) == (Decimal(50), Decimal(4))
+
+
+def test_a_value_that_would_be_another_is_refused(line: DriveLine) -> None:
+    drive = line.drive(2)
+    with drive.armed():
+        with pytest.raises(WouldRound, match=r"LSP: 0\.04 would be held as 0\.0 Hz"):
+            drive.write({"LSP": 0.04})
+        assert drive.write({"LSP": 0.06}, rounded=True) == {"LSP": "LSP: 0.0 Hz -> 0.1 Hz"}
+
+
+def test_one_parameter_twice_is_refused(drive: Drive) -> None:
+    with drive.armed(), pytest.raises(DriveError, match="more than once"):
+        drive.write({"ACC": 3, "W9001": 4})
+
+
+def test_a_line_that_is_read_only_arms_nothing() -> None:
+    with open_drives("sim:atv71", read_only=True) as line:
+        drive = line.drive()
+        with pytest.raises(DriveError, match="read-only"), drive.armed():
+            pass
+
+
+def test_samples_follow_one_another(drive: Drive) -> None:
+    samples = []
+    for sample in drive.watch("RFR", "ETA", every=0.05):
+        samples.append(sample)
+        if len(samples) == 4:
+            break
+    assert all(one.values["RFR"].good and not one.error for one in samples)
+    assert {one.state for one in samples} == {"not ready"}
+    times = [one.values["ETA"].time for one in samples]
+    assert times == sorted(set(times))
+
+
+def test_watching_ends_with_the_line() -> None:
+    line = open_drives("sim:atv71")
+    samples = line.drive().watch("ETA", every=0.05)
+    next(samples)
+    threading.Timer(0.1, line.close).start()
+    with pytest.raises(LineError, match="closed"):
+        for _ in samples:
+            pass
+
+
+def test_a_call_on_a_closed_line_ends() -> None:
+    with open_drives("sim:atv71") as line:
+        drive = line.drive()
+    with pytest.raises(LineError, match="closed"):
+        drive.read("ETA")
+
+
+def test_a_stop_stands_and_ends_arming() -> None:
+    with DriveLine(demo_line({"atv71": 20.0})) as line:
+        drive = line.drive()
+        assert drive.read("RFR")["RFR"].number
+        with drive.armed():
+            assert "stopped" in drive.stop()
+            with pytest.raises(NotArmed, match="Stopped"):
+                drive.write({"ACC": 4})
+        assert drive.read("RFR")["RFR"].number == 0
+
+
+def test_a_motor_that_cannot_be_stopped_is_an_error() -> None:
+    with open_drives("sim:atv71", read_only=True) as line, pytest.raises(NotStopped):
+        line.drive().stop()

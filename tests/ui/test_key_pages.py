@@ -1,0 +1,90 @@
+"""The pages of docs/screens have the keys of the table of actions, every one and no other."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tui.screens.keys.action import EVERYWHERE, KEY_NAMES
+from tui.screens.keys.pages import EVERY_SCREEN, TABLE, key_table, with_tables, write_pages
+from tui.screens.keys.table import ACTIONS, PLACES
+
+PAGES = sorted((Path(__file__).resolve().parents[2] / "docs" / "screens").glob("*.md"))
+MAKE = "python -m tui.screens.keys.pages docs/screens"
+ROW = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
+
+
+def tables() -> dict[str, str]:
+    """Every table of keys of the pages, by the screen that it is of."""
+    found = [one for path in PAGES for one in TABLE.finditer(path.read_text("utf-8"))]
+    assert len({one["of"] for one in found}) == len(found), "one table a screen"
+    return {one["of"]: one[0] for one in found}
+
+
+def named(key: str) -> str:
+    """A key as the pages write it."""
+    if "+" in key[:-1]:
+        return "+".join(part.capitalize() for part in key.split("+"))
+    return KEY_NAMES.get(key, key.capitalize() if len(key) > 1 else key)
+
+
+@pytest.mark.parametrize("path", PAGES, ids=lambda path: path.name)
+def test_a_page_has_the_keys_of_now(path: Path) -> None:
+    text = path.read_text("utf-8")
+    assert text == with_tables(text), MAKE
+
+
+def test_every_screen_has_its_table() -> None:
+    assert set(tables()) == {*EVERYWHERE, EVERY_SCREEN}
+
+
+def test_the_pages_tell_every_key_and_no_other() -> None:
+    told = {
+        (of, key)
+        for of, table in tables().items()
+        for cell, _ in ROW.findall(table)
+        for key in cell.split(" or ")
+    }
+    told = {(of, key) for of, key in told if key != "key"}
+    wanted = {
+        (of, named(key))
+        for action in ACTIONS
+        for of in ([EVERY_SCREEN] if action.app or action.first else action.screens)
+        for key in action.keys.split(",")
+        if key
+    }
+    keys = {key for _, key in wanted}
+    assert {"Ctrl+P", "Shift+Tab", "PgUp", "Space", "?", "a", "A"} <= keys
+    assert wanted - told == set()
+    assert told - wanted == set()
+
+
+def test_every_action_is_told_in_its_words() -> None:
+    for action in ACTIONS:
+        of = EVERY_SCREEN if action.app or action.first else action.screens[0]
+        assert action.help in tables()[of]
+
+
+def test_the_screens_stand_by_their_digits() -> None:
+    index = (PAGES[0].parent / "README.md").read_text("utf-8")
+    for screen, key, name in PLACES:
+        assert f"| {key} | [{name}]({screen}.md) |" in index
+
+
+def test_a_page_that_lags_behind_is_written_anew(tmp_path: Path) -> None:
+    page = tmp_path / "frames.md"
+    page.write_text("A\n<!-- keys of frames -->\n| h | Old. |\n<!-- end of keys -->\nB\n", "utf-8")
+    write_pages(tmp_path)
+    written = page.read_text("utf-8")
+    assert written.startswith("A\n<!-- keys of frames -->\n\n| key |")
+    assert written.endswith("<!-- end of keys -->\nB\n")
+    assert "| h | Hold the list still, or let it run. |" in written
+    assert "Old." not in written
+
+
+def test_what_has_no_key_is_told_behind_the_table() -> None:
+    table = key_table("line")
+    assert "- Close the line; asks where a drive acts on that." in table
+    assert "|  |" not in table

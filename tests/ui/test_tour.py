@@ -1,0 +1,75 @@
+"""Every step of docs/tour.md on the demo, as printed: what is typed, and what is to be seen."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+from textual.widgets import OptionList
+
+from tui.app import DrivePanelApp
+from tui.drive.profile.library import demo_drives
+from tui.session.connect.open_line import OpenLine, demo_line
+
+from .test_flows import until
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "tour.md"
+STEP = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
+SEEN = re.compile(r"`([^`]+)`")
+NAMES = {".": "full_stop", "/": "slash", "?": "question_mark", "Esc": "escape"}
+QUOTES = 20
+"""Texts of the screen that the page quotes, at least."""
+
+
+def steps() -> list[tuple[list[str], list[str]]]:
+    """Keys, as Textual names them, with the texts that are quoted beside them."""
+    text = PAGE.read_text("utf-8")
+    rows = [row for row in STEP.findall(text) if row[0] != "type" and "---" not in row[0]]
+    return [([_key(key) for key in typed.split()], SEEN.findall(see)) for typed, see in rows]
+
+
+def _key(told: str) -> str:
+    return NAMES.get(told, told if len(told) == 1 else told.lower())
+
+
+def plain(text: str) -> str:
+    """Without the spaces that only place it."""
+    return " ".join(text.split())
+
+
+def on_screen(app: DrivePanelApp) -> str:
+    """All that stands on the screen."""
+    strips = app.screen._compositor.render_strips()
+    return plain("\n".join(strip.text for strip in strips))
+
+
+def demo(*_: object, **__: object) -> OpenLine:
+    return demo_line({id: hertz for id, (_, hertz) in demo_drives().items()})
+
+
+def test_the_tour_has_its_steps() -> None:
+    told = steps()
+    assert len(told) >= 24
+    assert ["ctrl+u", "3", "full_stop", "5"] in [keys for keys, _ in told]
+    assert sum(len(texts) for _, texts in told) >= QUOTES
+
+
+async def test_the_tour(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+    monkeypatch.chdir(tmp_path)
+    app = DrivePanelApp(open_line=demo, start="demo")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.connection.drives.option_count == len(demo_drives()))
+        app.connection.query_one("#drives", OptionList).focus()
+        await pilot.press("down", "down", "down", "enter")
+        await until(pilot, lambda: "MACHINE 4 ▶ FORWARD" in on_screen(app))
+        for keys, texts in steps():
+            for key in keys:
+                await pilot.press(key)
+            for text in texts:
+                await until(pilot, lambda text=text: plain(text) in on_screen(app))  # type: ignore[misc]
+            if keys == ["space"]:
+                await until(pilot, lambda: "STANDBY 0.0" in on_screen(app))
+            elif keys == ["up", "up"]:
+                await until(pilot, lambda: "→ 32.0 Hz" in on_screen(app))

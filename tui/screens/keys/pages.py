@@ -1,0 +1,64 @@
+"""The tables of keys in the pages of docs/screens, made from the table of actions.
+
+python -m tui.screens.keys.pages docs/screens
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+from tui.drive.small_file import read_small_text
+
+from .action import KEY_NAMES, Action
+from .table import ACTIONS
+
+EVERY_SCREEN = "every screen"
+"""What the table of the app's own actions is called in a page."""
+TABLE = re.compile(r"(<!-- keys of (?P<of>[a-z ]+) -->\n).*?(<!-- end of keys -->)", re.DOTALL)
+
+
+def with_tables(text: str) -> str:
+    """A page with its tables of keys as the actions are now."""
+    return TABLE.sub(lambda found: f"{found[1]}{key_table(found['of'])}{found[3]}", text)
+
+
+def key_table(of: str) -> str:
+    """The keys of a screen, or of every screen, in Markdown; then what has no key."""
+    actions = list(_actions(of))
+    rows = [f"| {_keys(action)} | {action.help} |" for action in actions if action.keys]
+    lines = ["", "| key | what it does |", "|---|---|", *rows, ""]
+    if without := [f"- {action.help}" for action in actions if not action.keys]:
+        lines += ["Without a key, in the list of actions (Ctrl+P):", "", *without, ""]
+    return "\n".join(lines) + "\n"
+
+
+def key_text(key: str) -> str:
+    """A key as a page writes it: Ctrl+P, Shift+Tab, PgUp, a."""
+    if "+" in key[:-1]:
+        return "+".join(part.capitalize() for part in key.split("+"))
+    return KEY_NAMES.get(key, key.capitalize() if len(key) > 1 else key)
+
+
+def _keys(action: Action) -> str:
+    return " or ".join(key_text(key) for key in action.keys.split(","))
+
+
+def _actions(of: str) -> Iterator[Action]:
+    """Those of a screen alone, or those of the app and the stops, which every screen has."""
+    for action in ACTIONS:
+        everywhere = action.app or action.first
+        if everywhere if of == EVERY_SCREEN else not everywhere and of in action.screens:
+            yield action
+
+
+def write_pages(folder: Path) -> None:
+    """Bring every page of a folder up to date."""
+    for path in sorted(folder.glob("*.md")):
+        path.write_text(with_tables(read_small_text(path)), "utf-8")
+
+
+if __name__ == "__main__":
+    write_pages(Path(sys.argv[1]))

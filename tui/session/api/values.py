@@ -1,0 +1,72 @@
+"""What a script is given of a drive: values, samples, and what went wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from decimal import Decimal
+
+from tui.drive.errors import DriveError
+
+from ..clock import Clock
+from ..reading import Quality, Reading
+
+
+class NotWritten(DriveError):
+    """Some settings were not written; `why` has a sentence for each, by code."""
+
+    def __init__(self, why: Mapping[str, str]) -> None:
+        super().__init__(" ".join(why.values()))
+        self.why = dict(why)
+
+
+class NotStopped(DriveError):
+    """The motor could not be stopped from here."""
+
+
+@dataclass(frozen=True, slots=True)
+class DriveValue:
+    """A parameter's value as it was read."""
+
+    code: str
+    number: Decimal | None
+    """In `unit`; None for a name, a word of bits, or no value."""
+    text: str
+    """As a person reads it, without the unit."""
+    unit: str
+    raw: int | None
+    good: bool
+    """Whether it was read now; in a sample, in that very cycle."""
+    time: datetime
+    """When its reply came, UTC."""
+    error: str = ""
+    """Why there is no value."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sample:
+    """One cycle of a drive that is watched."""
+
+    time: datetime
+    values: Mapping[str, DriveValue]
+    """By code, as they were asked for."""
+    state: str
+    """The drive's state in words; empty where its status word is not watched."""
+    error: str
+    """Why this cycle brought nothing; empty where it did."""
+
+
+def told_value(reading: Reading, clock: Clock) -> DriveValue:
+    """A reading as a script has it."""
+    wall = clock.wall() - reading.age(clock.monotonic())
+    return DriveValue(
+        reading.parameter.code,
+        reading.value.number if reading.value is not None else None,
+        reading.text,
+        reading.unit,
+        reading.raw,
+        reading.quality is Quality.GOOD,
+        datetime.fromtimestamp(wall, UTC),
+        reading.error,
+    )

@@ -1,0 +1,29 @@
+"""A cycle of a watched drive for who records it: good is what was read in that very cycle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from tui.drive.profile.profile import Profile
+
+from ..drive_state import drive_state
+from ..reading import Quality, Reading
+from .snapshot import Snapshot
+
+
+def as_read(profile: Profile, codes: Sequence[str], snapshot: Snapshot, since: float) -> Snapshot:
+    """The cycle with all codes in their order; what was not read after `since` is stale.
+
+    `since` is when the cycle before ended (monotonic). What was never read is bad, and says why.
+    Its state is what those of now tell.
+    """
+    readings: dict[str, Reading] = {}
+    for code in codes:
+        reading = snapshot.readings.get(code)
+        if reading is None:
+            reading = Reading.bad(profile[code], snapshot.time, snapshot.error)
+        elif reading.quality is Quality.GOOD and (snapshot.error or reading.time <= since):
+            reading = replace(reading, quality=Quality.STALE)
+        readings[code] = reading
+    return replace(snapshot, readings=readings, state=drive_state(profile, readings))
