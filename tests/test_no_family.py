@@ -27,7 +27,7 @@ TITLES = {"Faults", "Monitoring", "Identification"}
 """Groups that are titles of screens or tables of the language as well."""
 GROUPS = {parameter.group for profile in PROFILES for parameter in profile.parameters} - TITLES
 WORDS = {"add", "cos", "cod", "inr", "in", "os", "typ", "fan", "pro", "dis", "bit", "no", "if",
-         "run", "time", "int", "f1", "f2"}  # fmt: skip
+         "run", "time", "int", "f1", "f2", "day"}  # fmt: skip
 """Codes that are words of English or of programs as well."""
 SPOKEN = re.compile(r"\b(HSP|LSP|TFR|FRH|RFR|ETA|CMD|LFRD?|CMI|CHCF|DOTD|FA\d\d|F\d{3})\b")
 """Codes that would be said to a person."""

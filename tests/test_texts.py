@@ -92,9 +92,9 @@ def _name(node: ast.expr) -> str:
 
 
 def _dotted(node: ast.expr) -> str:
-    """The name of what is called: `click.echo`; empty where it is no name of one or two parts."""
-    if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name):
-        return f"{node.value.id}.{node.attr}"
+    """The name of what is called: `sys.stdout.write`; empty where it is more than a name."""
+    if isinstance(node, ast.Attribute):
+        return f"{before}.{node.attr}" if (before := _dotted(node.value)) else ""
     return node.id if isinstance(node, ast.Name) else ""
 
 

@@ -12,7 +12,7 @@ from types import MappingProxyType
 GivenStops = Mapping[int, Mapping[str, int]]
 """Counts of stops, by device and program."""
 
-NOBODY = ""
+GIVEN_BY_NOBODY = ""
 """Under which the stops of programs are counted that have left."""
 
 
@@ -90,7 +90,7 @@ class StopCounts:
             for device, counts in self.given.items():
                 rest = {one: count for one, count in counts.items() if one != program}
                 if program in counts:
-                    rest[NOBODY] = rest.get(NOBODY, 0) + counts[program]
+                    rest[GIVEN_BY_NOBODY] = rest.get(GIVEN_BY_NOBODY, 0) + counts[program]
                 folded[device] = rest
             self._put(folded)
 

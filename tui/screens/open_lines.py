@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from tui.session.events import Event, EventLog
 
@@ -13,8 +12,7 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
 
 
-@dataclass(frozen=True, slots=True)
-class PanelLine:
+class PanelLine(NamedTuple):
     """An open line with the drives on it."""
 
     opened: OpenLine

@@ -14,7 +14,7 @@ from ..model import DeviceState, Reply
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
-from .failures import failure_of
+from .failures import failure_told
 from .lease import TOO_LATE, stood_still
 from .messages import (
     Answer,
@@ -86,7 +86,7 @@ class Client:
             return
         error = answer.exception()
         if error is not None:
-            self.say(Failed(number, *failure_of(error)))
+            self.say(Failed(number, *failure_told(error)))
         else:
             reply = answer.result()
             self.say(Answer(number, reply.pdu, reply.time))

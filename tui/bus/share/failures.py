@@ -52,7 +52,7 @@ _MADE: Mapping[str, Callable[[ErrorForm], LineError]] = {
 """How each error with fields of its own is made anew."""
 
 
-def failure_of(error: BaseException) -> tuple[str, ErrorForm]:
+def failure_told(error: BaseException) -> tuple[str, ErrorForm]:
     """The kind of an error and what it tells, as a message carries them."""
     name = type(error).__name__
     if name not in _MADE:

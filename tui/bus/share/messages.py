@@ -216,7 +216,7 @@ AnyMessage = (
 _ENCODER = msgspec.msgpack.Encoder()
 _DECODER: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessage)
 
-KINDS: Mapping[str, type[Request]] = {
+REQUEST_KINDS: Mapping[str, type[Request]] = {
     kind.__name__: kind
     for kind in (Read, ReadInput, WriteOne, WriteMany, ReadWrite, Diagnose, Identify)
 }
@@ -262,7 +262,7 @@ def request_form(request: Request) -> tuple[str, dict[str, Any]]:
 
 def asked_request(message: Asking) -> Request:
     """The request that a message carries. Raises NoMessage."""
-    kind = KINDS.get(message.kind)
+    kind = REQUEST_KINDS.get(message.kind)
     if kind is None:
         raise NoMessage(f"request {message.kind!r}")
     try:

@@ -28,7 +28,6 @@ from .messages import (
     Hello,
     Here,
     Hush,
-    News,
     NoMessage,
     PollWish,
     StopGiven,
@@ -159,7 +158,7 @@ class ShareServer:
             # given while nobody owned the line
             self._hear_stops(unheard, "while nobody owned the line", client.program)
         self._tell_facts()
-        client.say(self._news_for(client))
+        self._tell_line(client)
         return client
 
     def _may_attach(self, writer: asyncio.StreamWriter) -> bool:
@@ -303,13 +302,13 @@ class ShareServer:
 
     def tell_state(self) -> None:
         """The line's state has changed: say so at once."""
-        for client in list(self._clients.values()):
-            client.say(self._news_for(client))
+        for client in self._all():
+            self._tell_line(client)
+
+    def _tell_line(self, client: Client) -> None:
+        shares = greatest(self._inside.pace.own, self._wishes(but=client))
+        client.say(client.news(self._inside, shares))
 
     def _wishes(self, but: Client | None = None) -> dict[int, float]:
         """What the clients' polls wish for, by device."""
         return greatest(*(one.shares for one in self._clients.values() if one is not but))
-
-    def _news_for(self, client: Client) -> News:
-        shares = greatest(self._inside.pace.own, self._wishes(but=client))
-        return client.news(self._inside, shares)

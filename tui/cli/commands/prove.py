@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.proof.result import ProofResult
 
-STOPPED_WITHIN = 60.0
+STOPPED_AFTER_PROOF_WITHIN = 60.0
 """Seconds that a motor may take to its standstill after a proof on the run."""
 
 
@@ -86,7 +86,9 @@ async def _proved(
     finally:
         if turning:
             fleet.stop([session], by="the end of the proof")
-            summary = await asyncio.to_thread(fleet.stopper.wait, [session], STOPPED_WITHIN)
+            summary = await asyncio.to_thread(
+                fleet.stopper.wait, [session], STOPPED_AFTER_PROOF_WITHIN
+            )
             if summary.failed:
                 raise Failure(f"Device {session.device}: NOT STOPPED.", DRIVE_REFUSED)
     console.journal.add(proof_entry(session, result))

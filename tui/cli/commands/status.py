@@ -28,6 +28,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.say import say, say_row
+from ..shared.watch_rows import watch_json, watch_text
 
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
@@ -200,18 +201,6 @@ def status_json(line_text: str, status: Status) -> dict[str, Any]:
     }
 
 
-def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
-    """A drive's watch over the line; null where it has none."""
-    if watch is None:
-        return None
-    return {
-        "timeout_s": watch.timeout,
-        "reaction": watch.reaction.name if watch.reaction else None,
-        "does": watch.reaction.does if watch.reaction else None,
-        "begun": watch.active,
-    }
-
-
 def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
     """What is SHOWN, by quantity; null where the family does not tell it or it was not read.
 
@@ -245,13 +234,13 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         *status.channels.items(),
         *(("Besides", text) for text in status.switches),
         ("From here", status.refused or "commands can have an effect"),
-        ("Comm. time-out", _watch_text(status)),
+        ("Comm. time-out", watch_text(status.watch)),
         *control_row(status.session),
         *shown_values(profile, status.readings).items(),
     ]
 
 
-def status_line(status: Status) -> str:
+def drive_in_a_line(status: Status) -> str:
     """A drive in one line: address, model, state, figures, and the fault if it is in one."""
     session, state = status.session, status.state
     shown = shown_values(session.profile, status.readings)
@@ -261,15 +250,6 @@ def status_line(status: Status) -> str:
     return (
         f"{session.device:>3}  {name:<18.18}  {state.headline:<18.18}  {figures}  {fault}".rstrip()
     )
-
-
-def _watch_text(status: Status) -> str:
-    watch = status.watch
-    if watch is None:
-        return "none: it goes on without communication"
-    reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
-    begins = "" if watch.active else " It begins with the first command or reference."
-    return f"{watch.timeout:g} s, then: {reaction.rstrip('.')}.{begins}"
 
 
 @click.command()
@@ -307,7 +287,7 @@ def status(
         sessions.append(session)
         found = await status_of_drive(session, opened)
         if every and not as_json:
-            say(plain(status_line(found)))
+            say(plain(drive_in_a_line(found)))
         elif not as_json:
             for title, text in status_table(found):
                 say_row(title, plain(text) or "-----", STATUS_TITLES)

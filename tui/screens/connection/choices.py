@@ -59,8 +59,8 @@ class LineChoice(NamedTuple):
     """The drive that is meant by the name."""
 
 
-LineMark = Literal["", "open", "shown", "fault"]
-LINE_MARKS: dict[LineMark, tuple[str, Style]] = {
+ListMark = Literal["", "open", "shown", "fault"]
+LIST_MARKS: dict[ListMark, tuple[str, Style]] = {
     "": ("  ", PLAIN),
     "open": ("● ", PLAIN),
     "shown": ("● ", RUNNING),
@@ -162,10 +162,10 @@ def line_in(text: str, width: int) -> str:
     return short(rest, width) if len(rest) <= width else f"…{plain(rest)[1 - width :]}"
 
 
-def choice_line(choice: LineChoice, width: int, mark: LineMark = "") -> Text:
+def choice_line(choice: LineChoice, width: int, mark: ListMark = "") -> Text:
     """A line that can be opened, with as much of its description as there is room for."""
     here = bool(mark)
-    sign, style = LINE_MARKS[mark]
+    sign, style = LIST_MARKS[mark]
     text = Text(sign, style)
     text.append(line_in(choice.name or choice.text, width - 2), STRONG if here else PLAIN)
     room = width - text.cell_len - 2

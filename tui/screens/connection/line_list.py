@@ -14,7 +14,7 @@ from tui.widgets.drawing import short
 from tui.widgets.palette import FAINT
 from tui.widgets.plain import entry
 
-from .choices import Group, LineChoice, LineMark, choice_line, groups
+from .choices import Group, LineChoice, ListMark, choice_line, groups
 
 
 class LineList(OptionList):
@@ -113,7 +113,7 @@ class LineList(OptionList):
             found.append(entry(Text(short(f"  {group.empty}", width), FAINT), disabled=True))
         return found
 
-    def _mark(self, line: str) -> LineMark:
+    def _mark(self, line: str) -> ListMark:
         if line not in self._open:
             return ""
         if line == self._here:

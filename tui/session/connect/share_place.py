@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from tui.bus.share.place import SharePlace
 
 PROGRAM = "drivepanel"
-GROUP_SETTING = "DRIVEPANEL_SHARE_GROUP"
+SHARE_GROUP_SETTING = "DRIVEPANEL_SHARE_GROUP"
 """Environment variable: the group of users that may attach to lines opened from here."""
 FOLDER_SETTING = "DRIVEPANEL_SHARE_FOLDER"
 USUAL_GROUP_FOLDER = "/run/drivepanel"
@@ -42,7 +42,7 @@ def share_place(text: str) -> SharePlace | None:
 
     key = line_key(text)
     folder = Path(os.environ.get(FOLDER_SETTING) or USUAL_GROUP_FOLDER)
-    if group := os.environ.get(GROUP_SETTING):
+    if group := os.environ.get(SHARE_GROUP_SETTING):
         return SharePlace(key, folder, (folder,), group_number(group, folder))
     common = SharePlace(key, folder, (folder,), 0)
     if os.access(common.lock_path, os.R_OK | os.W_OK):

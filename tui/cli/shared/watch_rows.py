@@ -1,0 +1,29 @@
+"""What `status` tells of a drive's watch over the line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from tui.session.timeout_told import TimeoutWatch
+
+
+def watch_json(watch: TimeoutWatch | None) -> dict[str, Any] | None:
+    """A drive's watch over the line; null where it has none."""
+    if watch is None:
+        return None
+    return {
+        "timeout_s": watch.timeout,
+        "reaction": watch.reaction.name if watch.reaction else None,
+        "does": watch.reaction.does if watch.reaction else None,
+        "begun": watch.active,
+    }
+
+
+def watch_text(watch: TimeoutWatch | None) -> str:
+    """What a drive does on a loss of communication, for a person."""
+    if watch is None:
+        return "none: it goes on without communication"
+    reaction = watch.reaction.does if watch.reaction else "its own reaction follows"
+    begins = "" if watch.active else " It begins with the first command or reference."
+    return f"{watch.timeout:g} s, then: {reaction.rstrip('.')}.{begins}"
