@@ -37,6 +37,7 @@ PRINTING = {
 PRINTS_THEMSELVES = (
     PACKAGE / "drive" / "profile" / "json_schema.py",
     PACKAGE / "cli" / "documents" / "json_schema.py",
+    PACKAGE / "cli" / "man_page.py",
 )
 """Print what they have made themselves, for a redirection."""
 READS_ITSELF = {

@@ -163,11 +163,8 @@ class ShareServer:
 
     def _may_attach(self, writer: asyncio.StreamWriter) -> bool:
         """Whether the user at the other end may share the line: the socket's mode, twice."""
-        return self._group is not None or user_of(writer.get_extra_info("socket")) in (
-            os.getuid(),
-            0,
-            None,
-        )
+        mine = (os.getuid(), 0, None)
+        return self._group is not None or user_of(writer.get_extra_info("socket")) in mine
 
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
@@ -310,5 +307,4 @@ class ShareServer:
         client.say(client.news(self._inside, shares))
 
     def _wishes(self, but: Client | None = None) -> dict[int, float]:
-        """What the clients' polls wish for, by device."""
         return greatest(*(one.shares for one in self._clients.values() if one is not but))
