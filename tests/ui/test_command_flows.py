@@ -195,7 +195,17 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+SWEPT_FAMILIES = ("atv31", "proxidrive", "varmeca")
+"""Alike to others at the panel: the Altivar 312, the Powerdrive."""
+
+
+@pytest.mark.parametrize(
+    "family",
+    [
+        pytest.param(one, marks=pytest.mark.sweep if one in SWEPT_FAMILIES else ())
+        for one in FAMILIES
+    ],
+)
 async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
     async with bench(family) as made:
         await made.running()
