@@ -220,6 +220,7 @@ async def test_a_drive_that_another_program_commands_takes_no_write(share: Share
         await third.write(2, 8, [3])
         await third.write(1, 8, [0], priority=Priority.STOP)
         other.facts.release(1)
+        eventually(lambda: owner.facts.commander(1) is None)
         eventually(lambda: third.facts.claim(1) == "")
         eventually(lambda: owner.facts.commander(1) is not None)
         await third.write(1, 8, [4])

@@ -77,7 +77,7 @@ def test_without_arguments_nothing_is_taken_apart(
 
 
 def test_without_arguments_an_error_is_told_as_by_every_command(
-    panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    panel: type[FakePanel], monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     def fail(panel: FakePanel) -> None:
         raise PortBusy("/dev/ttyUSB0")
@@ -88,17 +88,17 @@ def test_without_arguments_an_error_is_told_as_by_every_command(
     with pytest.raises(SystemExit) as ended:
         run()
     assert ended.value.code == LINE_TROUBLE
-    assert capsys.readouterr().err.startswith("drivepanel: /dev/ttyUSB0 is in use")
+    assert capfd.readouterr().err.startswith("drivepanel: /dev/ttyUSB0 is in use")
 
 
 def test_without_arguments_and_without_a_terminal_it_says_so(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("sys.argv", ["drivepanel"])
     with pytest.raises(SystemExit) as ended:
         run()
     assert ended.value.code == USAGE
-    assert "needs a terminal" in capsys.readouterr().err
+    assert "needs a terminal" in capfd.readouterr().err
 
 
 def test_the_demo_opens_a_line_of_its_own(panel: type[FakePanel]) -> None:
@@ -121,7 +121,7 @@ def test_a_line_chosen_in_the_demo_is_that_line(
     )
     assert CliRunner().invoke(main, ["demo"]).exit_code == 0
     panel.given["open_line"]("/dev/ttyUSB0", read_only=True, wait=4.0)
-    assert asked == [("/dev/ttyUSB0", {"read_only": True, "wait": 4.0})]
+    assert asked == [("/dev/ttyUSB0", {"read_only": True, "wait": 4.0, "program": ""})]
 
 
 def test_a_panel_that_had_to_stop_is_no_success(

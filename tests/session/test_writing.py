@@ -224,7 +224,12 @@ async def test_a_drive_that_takes_its_time_is_read_when_it_has_answered(
     order: list[str] = []
     read = line.read
 
-    async def slow(*args: int, priority: Priority = Priority.POLL, function: int = 3) -> object:
+    async def slow(
+        *args: int,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
+        max_age: float = 0.0,
+    ) -> object:
         order.append("read")
         await asyncio.sleep(0)
         return await read(*args, priority=priority, function=function)

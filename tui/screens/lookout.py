@@ -67,9 +67,10 @@ class Lookout(Panel):
     def _cry_for_stops(self) -> None:
         """Say over everything, once, that a motor does not stop."""
         failed = []
-        for one in self.panel_lines:
-            line = f"{one.opened.label}: " if len(self.panel_lines) > 1 else ""
-            for report in one.fleet.stopper.reports.values():
+        labels = {id(one.fleet): f"{one.opened.label}: " for one in self.panel_lines}
+        for fleet in self.fleets:
+            line = labels.get(id(fleet), "") if len(labels) > 1 else ""
+            for report in fleet.stopper.reports.values():
                 if report.phase.value == "failed":
                     failed.append(report)
                     if report not in self._cried:
