@@ -120,6 +120,7 @@ def test_a_source_package_holds_all_that_is_in_the_repository(unpacked: Path) ->
     assert [name for name in names if not (unpacked / name).is_file()] == []
 
 
+@pytest.mark.sweep  # the gate does it, too
 def test_a_source_package_passes_tests_of_its_own(unpacked: Path) -> None:
     command = [sys.executable, "-m", "pytest", "-q", "-n", "0", "-p", "no:cacheprovider"]
     part = ["tests/wire", "tests/drive/test_library.py", "tests/drive/test_values.py"]

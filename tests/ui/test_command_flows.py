@@ -16,6 +16,7 @@ from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
 from tests.programs import rtu_tcp
+from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.screens.command.options import OptionsScreen
 from tui.screens.connection.screen import ConnectionScreen
@@ -195,17 +196,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-SWEPT_FAMILIES = ("atv31", "proxidrive", "varmeca")
-"""Alike to others at the panel: the Altivar 312, the Powerdrive."""
-
-
-@pytest.mark.parametrize(
-    "family",
-    [
-        pytest.param(one, marks=pytest.mark.sweep if one in SWEPT_FAMILIES else ())
-        for one in FAMILIES
-    ],
-)
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "atv312", "powerdrive"))
 async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
     async with bench(family) as made:
         await made.running()
