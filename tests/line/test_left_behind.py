@@ -63,7 +63,7 @@ def test_a_motor_that_is_disowned_is_not_left_without_a_question(
         terminal = again(second_terminal, made.line)
         terminal.wait_for("FORWARD", "Runs since")
         terminal.press("q")
-        terminal.wait_for("Leave the panel?", "30 s after the last")
+        terminal.wait_for("Leave the panel?", "30 s after")
         terminal.press("Escape")
         terminal.wait_for("FORWARD")
         assert made.speed > 2
