@@ -21,6 +21,10 @@ DEMO_LINE = "demo"
 """The LINE of the demo inside the panel; every other text is opened as it is written."""
 
 
+CANNOT_DRAW = ("", "dumb", "unknown")
+"""Terminals on which the drawing library sends nothing at all."""
+
+
 def open_panel(
     start: str | None,
     device: int | None,
@@ -42,6 +46,8 @@ def open_panel(
     abilities = abilities_of(
         given_environment(os.environ), written_as=sys.stderr.encoding, ascii=ascii
     )
+    if os.environ.get("TERM", "") in CANNOT_DRAW:
+        os.environ["TERM"] = "vt100"  # what draws would send nothing; its abilities are known
     app = DrivePanelApp(
         open_line=_open_with_demo if start == DEMO_LINE else open_line,
         start=start,
