@@ -19,7 +19,7 @@ from tui.wire.frames import frame
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
-from .sharing import QUICK, place_in
+from .sharing import QUICK, frozen, place_in
 
 UNANSWERED = 98
 
@@ -235,7 +235,9 @@ async def test_of_two_that_claim_at_once_one_is_told_no(share: Share) -> None:
         denied: list[str] = []
         for line in programs:
             line.facts.on_denied(partial(note_denied, denied, line.facts.me.name))
-        assert [line.facts.claim(4) for line in programs] == ["", ""]
+        # neither can hear of the other's claim before its own is on its way
+        with frozen(programs[0]), frozen(programs[1]):
+            assert [line.facts.claim(4) for line in programs] == ["", ""]
         eventually(lambda: len(denied) == 1)
         winner = next(line for line in programs if line.facts.me.name not in denied)
         loser = next(line for line in programs if line is not winner)
