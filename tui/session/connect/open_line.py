@@ -135,11 +135,13 @@ def demo_line(drives: Mapping[str, float]) -> OpenLine:
 def _simulated(
     specs: Sequence[DriveSpec], *, read_only: bool = False, wait: float | None = None
 ) -> OpenLine:
-    from tui.bus.line import Line
+    from tui.bus.line import Line, Timing
     from tui.simulator import Simulation
 
     simulation = Simulation(specs)
-    line = Line(_serve(simulation), read_only=read_only)
+    # drives in this very program are late when the computer is: no reason to call them silent
+    timing = Timing(min_timeout=1.0)
+    line = Line(_serve(simulation), timing=timing, read_only=read_only)
     text = SIMULATED_PREFIX + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
     devices = tuple(spec.address for spec in specs)
     return _opened(OpenLine(text, line, simulation, devices), wait)
