@@ -8,6 +8,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import chain, count, groupby
 from pathlib import Path
 
 import pytest
@@ -21,8 +22,22 @@ from tui.cli.shared.logs import stop_logging
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+COSTLY_FIRST = {"ui": 0, "session": 1, "cli": 2, "bus": 3}
+"""Rooms whose tests take long; all others come after them."""
+FOLDERS = count()
+
 settings.register_profile("drivepanel", deadline=None)
 settings.load_profile("drivepanel")
+
+
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Deal the modules to the workers, the costly first: no long test is left for the end."""
+    workers: int = getattr(config, "workerinput", {}).get("workercount", 1)
+    if workers > 1:
+        modules = [list(of_one) for _, of_one in groupby(items, lambda item: item.path)]
+        modules.sort(key=lambda of_one: COSTLY_FIRST.get(of_one[0].path.parent.name, 9))
+        dealt = [module for worker in range(workers) for module in modules[worker::workers]]
+        items[:] = chain.from_iterable(dealt)
 
 
 def pytest_collection_finish() -> None:
@@ -30,6 +45,20 @@ def pytest_collection_finish() -> None:
     gc.collect()
     gc.freeze()
     gc.set_threshold(50_000, 20, 10)
+
+
+def pytest_sessionfinish() -> None:
+    """Look for garbage once more: pytest's five looks at the end find all that lives put aside."""
+    gc.collect()
+    gc.freeze()
+
+
+@pytest.fixture
+def tmp_path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder of the test's own. Pytest's own one reads the whole list of folders for each."""
+    folder = tmp_path_factory.getbasetemp() / str(next(FOLDERS))
+    folder.mkdir(mode=0o700)
+    return folder
 
 
 @pytest.fixture(autouse=True)
