@@ -196,7 +196,7 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
-@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "atv312", "powerdrive"))
+@pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "powerdrive"))
 async def test_arm_run_reverse_stop_trip_reset(family: str) -> None:
     async with bench(family) as made:
         await made.running()
@@ -324,7 +324,7 @@ async def test_space_stops_outside_texts_only() -> None:
         await made.stopped()
 
 
-@pytest.mark.parametrize("typed", ["", "4x"])
+@pytest.mark.parametrize("typed", kept(["", "4x"], "4x"))
 @pytest.mark.parametrize("way", ["3 slash a c c enter enter", "1 tab tab tab"])
 async def test_space_stops_where_a_number_is_typed(way: str, typed: str) -> None:
     """A value, an address: no space is ever typed there. A reference: `test_run_line`."""

@@ -178,7 +178,7 @@ OTHER_SIZES = {
 }
 
 
-@pytest.mark.parametrize("size", kept(OTHER_SIZES, *list(OTHER_SIZES)[:4]))
+@pytest.mark.parametrize("size", kept(OTHER_SIZES, *list(OTHER_SIZES)[:2]))
 @pytest.mark.parametrize("name", ["running", "fault", "run"])
 def test_other_sizes(
     snap_compare: Compare, name: str, size: str, monkeypatch: pytest.MonkeyPatch

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.widgets import OptionList
 
+from tests.sweeps import kept
 from tui.screens.blocks.screen import BlocksScreen
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.control.screen import ControlSourceScreen
@@ -62,7 +63,7 @@ def test_what_fits_best_comes_first() -> None:
     assert find("W", "parameters")[0].action.id == "write_one"
 
 
-@pytest.mark.parametrize("screen", EVERYWHERE)
+@pytest.mark.parametrize("screen", kept(EVERYWHERE, "line", "monitor", "control"))
 def test_every_action_is_found_from_everywhere(screen: str) -> None:
     for action in ACTIONS:
         if action.id.startswith(NOT_FOUND):

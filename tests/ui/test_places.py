@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from rich.text import Text
 
+from tests.sweeps import kept
 from tui.bus.line import Frame
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
@@ -70,7 +71,7 @@ def room_of(profile: Profile, size: tuple[int, int]) -> Arrangement:
     return arrange(*size, len(other_values(profile)))
 
 
-@pytest.mark.parametrize("profile_id", PROFILES)
+@pytest.mark.parametrize("profile_id", kept(PROFILES, "atv21", "atv71", "powerdrive"))
 @settings(max_examples=40)
 @given(data=st.data())
 def test_every_part_keeps_its_size_and_its_width(profile_id: str, data: st.DataObject) -> None:
@@ -113,7 +114,7 @@ def test_the_parts_have_the_rows_that_they_are_given(
     assert max(len(parts[part]) for part in parts if part.startswith("word")) <= room.words
 
 
-@pytest.mark.parametrize("profile_id", PROFILES)
+@pytest.mark.parametrize("profile_id", kept(PROFILES, "atv21", "atv71", "powerdrive"))
 @settings(max_examples=40)
 @given(data=st.data())
 def test_numbers_end_and_units_begin_at_one_place(profile_id: str, data: st.DataObject) -> None:

@@ -390,7 +390,7 @@ FAMILY = {
 """The drive that is asked about, where it is not an Altivar 71."""
 
 
-@pytest.mark.parametrize("name", kept(QUESTIONS, "write", "block", "control", "reset", "coast"))
+@pytest.mark.parametrize("name", kept(QUESTIONS, "write", "control", "coast"))
 async def test_nothing_is_written_on_any_key_but_y(name: str) -> None:
     way, kind = QUESTIONS[name]
     async with bench(FAMILY.get(name, "atv71")) as made:
