@@ -232,9 +232,13 @@ def module_name(path: Path) -> str:
     return ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
 
 
-def in_project() -> Iterator[tuple[str, Use]]:
+@cache
+def in_project() -> tuple[tuple[str, Use], ...]:
     """Every use of a private part of Textual in the project, with the module's path."""
-    for path in sorted(PACKAGE.rglob("*.py")):
-        below = bases_in_project().get(module_name(path), {})
-        for use in uses(path.read_text(encoding="utf-8"), below):
-            yield path.relative_to(PACKAGE).as_posix(), use
+    return tuple(
+        (path.relative_to(PACKAGE).as_posix(), use)
+        for path in sorted(PACKAGE.rglob("*.py"))
+        for use in uses(
+            path.read_text(encoding="utf-8"), bases_in_project().get(module_name(path), {})
+        )
+    )
