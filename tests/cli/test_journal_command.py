@@ -7,11 +7,14 @@ import os
 from dataclasses import asdict, replace
 from datetime import UTC, datetime, timedelta
 from pathlib import Path
+from typing import Any, get_args, get_type_hints
 
 import pytest
 
 from tests.session.test_journal import entry
 from tui.cli.commands.journal import since
+from tui.cli.documents.json_schema import document_of
+from tui.session.journal import Entry
 
 from .commands import ended, held, put, refused, run, tcp_line
 
@@ -53,6 +56,16 @@ def test_drive_and_time_select(journal: Path) -> None:
     assert run(0, "journal", "--since", "1m") == "No entry of the journal fits.\n"
     assert "300 is no slave address" in refused(2, "journal", "--drive", "300")
     assert "'soon' is no time" in refused(2, "journal", "--since", "soon")
+
+
+@pytest.mark.parametrize("kind", get_args(get_type_hints(Entry)["kind"]))
+def test_every_kind_of_entry_has_its_line_and_its_form(kind: Any, journal: Path) -> None:
+    made = replace(entry(1), kind=kind, new="4.0 s", answer="as it was")
+    journal.write_text(json.dumps(asdict(made)) + "\n")
+    document_of(run(0, "journal", "--json"))
+    told = run(0, "journal")
+    assert told.count("as it was") == 1
+    assert ("->" in told) is (kind == "write")
 
 
 def test_as_json(journal: Path) -> None:

@@ -86,7 +86,7 @@ def since(text: str, now: datetime) -> datetime | None:
 @json_option
 @told
 def journal(wanted: WantedDrive, begin: datetime | None, as_json: bool) -> None:
-    """Show what was written to drives from this computer, and the trips that were seen.
+    """Show what was written to drives from this computer, trips that were seen, and proofs.
 
     Of each write: when, which drive, from what to what, what the drive said, and why. What a
     damaged journal still holds is shown, too.
@@ -138,6 +138,8 @@ def entry_line(entry: Entry) -> str:
     head = f"{told}  {entry.device}/{entry.line}"
     if entry.kind == "fault":
         return f"{head}  FAULT {entry.code} {entry.new}: {entry.answer}"
+    if entry.kind == "proof":
+        return f"{head}  {entry.why}: {entry.new}  {entry.answer}"
     if entry.kind == "read-back":
         return f"{head}  {entry.code}: {entry.answer}"
     change = f"{entry.old} -> {entry.new}" if entry.old else f"-> {entry.new}"

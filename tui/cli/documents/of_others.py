@@ -133,7 +133,7 @@ class InputsTold(DocumentTold, kw_only=True):
 
 
 class JournalEntryTold(msgspec.Struct, kw_only=True):
-    """One write, or a trip that was seen; `read_back` is what the drive held then or later."""
+    """A write, a trip that was seen, or a proof; `read_back` is what the drive held in the end."""
 
     time: str
     line: str
@@ -148,7 +148,7 @@ class JournalEntryTold(msgspec.Struct, kw_only=True):
     answer: str
     read_back: int | None
     why: str
-    kind: Literal["write", "fault", "read-back"]
+    kind: Literal["write", "fault", "read-back", "proof"]
     of: str
 
 
