@@ -79,6 +79,18 @@ async def test_a_line_that_cannot_be_opened_says_why_on_line() -> None:
         await until(pilot, lambda: "There is no /dev/ttyUSB9." in shown(app, "message"))
 
 
+async def test_a_picture_while_the_panel_ends_draws_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    app = DrivePanelApp(open_line=Held().open)
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.screen is app.connection)
+        await app.connection.lines.remove()
+        with monkeypatch.context() as ending:
+            ending.setattr(DrivePanelApp, "is_running", False)
+            app.connection._redraw()
+
+
 async def test_a_drive_that_does_not_answer_says_so_on_line() -> None:
     held = Held()
     app = DrivePanelApp(open_line=held.open, start="demo", device=77)

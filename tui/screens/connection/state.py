@@ -154,8 +154,11 @@ class LineView(PanelScreen):
         if self.is_current:
             await self.form.put_fields()
 
-    def _redraw(self) -> None:
-        self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
+    def _redraw(self, *, lines: bool = True) -> None:
+        if not self.app.is_running:
+            return  # as in look: the parts of a screen go one by one
+        if lines:
+            self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
         self.show_drives()
         self.show_heads()
 
@@ -163,10 +166,7 @@ class LineView(PanelScreen):
         """The drives as they are now, the state of the line, how far the search is."""
         super().draw(width)
         self._follow_line()
-        if len(self.app.panel_lines) > 1:
-            self.lines.fill(self.app.line_text, self.app.open_texts, self.app.faulty_texts)
-        self.show_drives()
-        self.show_heads()
+        self._redraw(lines=len(self.app.panel_lines) > 1)
         if self.app.fleet is not None and not (self.search and self.search.goes_on):
             self._warn(self.app.fleet.line_watch.looks)
 
