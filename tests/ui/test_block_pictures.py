@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 from textual.pilot import Pilot
 
+from tests.sweeps import kept
 from tui.drive.blocks.assignment import slot_target
 from tui.drive.blocks.user_words import UserWord
 from tui.drive.profile import library
@@ -176,7 +177,10 @@ STATES: dict[str, tuple[Callable[[], BlockEditor], Any, float | None, list[str]]
 
 
 @SIZES
-@pytest.mark.parametrize("state", STATES)
+@pytest.mark.parametrize(
+    "state",
+    kept(STATES, "scanner", "write", "wrong", "exchange", "exchange-sure", "outputs", "indirect"),
+)
 def test_blocks(
     snap_compare: Compare, state: str, size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -8,6 +8,7 @@ from typing import Any, cast
 import pytest
 from textual.pilot import Pilot
 
+from tests.sweeps import kept
 from tui.drive.profile import library
 from tui.screens.monitor.screen import MonitorScreen
 from tui.session.command.stop import Stopper
@@ -163,8 +164,13 @@ OVER = {
 }
 
 
+THAT_ACT = ("run", "run-refused", "reference", "reset", "coast", "hand-back", "control-source-sure",
+            "faults", "leave-running")  # fmt: skip
+"""Those behind which a motor or a drive is acted on."""
+
+
 @SIZES
-@pytest.mark.parametrize("screen", OVER)
+@pytest.mark.parametrize("screen", kept(OVER, *THAT_ACT))
 def test_screens_of_commanding(
     snap_compare: Compare,
     screen: str,
