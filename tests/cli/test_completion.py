@@ -14,6 +14,7 @@ from click.shell_completion import ShellComplete
 
 from tui.bus.transport.ports import PortInfo
 from tui.cli.main import COMMANDS, main
+from tui.cli.shared.shells import BashByLine
 from tui.drive.profile import library
 
 PORTS = [PortInfo("/dev/ttyUSB0", "FTDI"), PortInfo("/dev/ttyUSB1", "CH340")]
@@ -95,6 +96,7 @@ def test_what_is_wrong_completes_to_nothing() -> None:
     [
         ("drivepanel stat", "status"),
         ("drivepanel read sim:atv3", "atv31 atv312"),  # bash's word begins behind the colon
+        ("drivepanel read sim:atv71@2,pow", "@2,powerdrive"),  # and with the @
         ("drivepanel read sim:atv71@2,atv312 -d 1 AC", "ACC AC2"),
         ("drivepanel write sim:atv312 ACC", "ACC="),
     ],
@@ -115,3 +117,9 @@ def test_bash_itself(typed: str, replies: str, tmp_path: Path) -> None:
         ["bash", "-c", script], capture_output=True, text=True, env=environment, check=False
     )
     assert (done.stdout.strip(), done.stderr) == (replies, "")
+
+
+def test_bash_without_a_place_of_the_cursor(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("COMP_LINE", "drivepanel st")
+    monkeypatch.setenv("COMP_POINT", "")
+    assert BashByLine(main, {}, "drivepanel", "_X").get_completion_args() == ([], "st")

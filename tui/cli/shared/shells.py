@@ -14,6 +14,8 @@ from click.shell_completion import (
 
 BREAKS = " \t\n\"'@><=;|&(:"
 """What readline breaks words at where a shell does not tell."""
+KEPT = "@$"
+"""Breaks that readline leaves at the beginning of the word."""
 
 _SOURCE = """\
 %(complete_func)s() {
@@ -45,7 +47,9 @@ class BashByLine(BashComplete):
 
     def get_completion_args(self) -> tuple[list[str], str]:
         """The whole words before the cursor, and the one at it."""
-        typed = os.environ["COMP_LINE"][: int(os.environ["COMP_POINT"])]
+        typed, point = os.environ.get("COMP_LINE", ""), os.environ.get("COMP_POINT", "")
+        # the point is empty where something else than a shell's own line asks
+        typed = typed[: int(point)] if point.isdecimal() else typed
         words = split_arg_string(typed)
         incomplete = words.pop() if words and not typed[-1:].isspace() else ""
         return words[1:], incomplete
@@ -54,7 +58,8 @@ class BashByLine(BashComplete):
         """Kind and value; of the value what bash takes for the word: behind the last break."""
         _, incomplete = self.get_completion_args()
         breaks = os.environ.get("COMP_BREAKS") or BREAKS
-        kept = max((incomplete.rfind(sign) + 1 for sign in breaks), default=0)
+        places = ((incomplete.rfind(sign), sign not in KEPT) for sign in breaks)
+        kept = max((at + behind for at, behind in places if at >= 0), default=0)
         return f"{item.type},{item.value[kept:]}"
 
 
