@@ -155,6 +155,15 @@ def test_4_a_backup_that_is_not_whole(tmp_path: Path) -> None:
     assert "[absent]" in (tmp_path / "set.toml").read_text("utf-8")
 
 
+def test_drives_of_one_line_are_told_apart_by_their_address(tmp_path: Path) -> None:
+    run(0, "backup", "sim:atv71", tmp_path / "set.toml")
+    assert "-d" not in run(0, "compare", tmp_path / "set.toml", tmp_path / "set.toml")
+    with tcp_line("atv31@1", "atv31@2") as line:
+        head, *rows = run(1, "compare", line, line, "-d", "1", "-d", "2").splitlines()
+    assert head.split()[-6:] == [line, "-d", "1", line, "-d", "2"]
+    assert [row.split()[1] for row in rows] == ["Add"]
+
+
 def test_line_settings_are_not_compared_with_the_factory() -> None:
     with tcp_line("atv31@5", "--set", "ACC=99") as line:
         told = run(1, "compare", line, "factory", "-d", "5")

@@ -85,7 +85,8 @@ def compare(
             USAGE,
         )
     profile = library.load(ids.pop())
-    names = (f"{a} -d {places[0]}", f"{b} -d {places[-1]}") if a == b else (a, b)
+    apart = a == b and len(devices) > 1
+    names = (f"{a} -d {devices[0]}", f"{b} -d {devices[1]}") if apart else (a, b)
     drive = next(found for found in sets if found is not None)
     sides = [
         factory_side(profile, drive) if found is None else side_of(text, found)
