@@ -109,13 +109,13 @@ def test_thermal_states_rise_slowly_and_fall_again() -> None:
 
 
 def test_energy_and_hours_add_up() -> None:
-    state = run(MotorState(), GO, 3600)
-    assert state.run_hours == pytest.approx(1, rel=0.01)
-    assert state.on_hours == pytest.approx(1, rel=0.01)
-    assert 0.8 < state.energy < 1.6
-    idle = run(state, MotorDemand(), 3600)
+    state = run(MotorState(), GO, 360)
+    assert state.run_hours == pytest.approx(0.1, rel=0.01)
+    assert state.on_hours == pytest.approx(0.1, rel=0.01)
+    assert 0.08 < state.energy < 0.16
+    idle = run(state, MotorDemand(), 360)
     assert idle.run_hours == state.run_hours
-    assert idle.on_hours == pytest.approx(2, rel=0.01)
+    assert idle.on_hours == pytest.approx(0.2, rel=0.01)
 
 
 def test_a_long_step_equals_many_short_ones() -> None:

@@ -232,6 +232,7 @@ async def test_a_family_without_blocks(family: str) -> None:
         await until(made.pilot, lambda: isinstance(made.app.screen, MonitorScreen))
 
 
+@pytest.mark.sweep
 async def test_every_screen_of_a_drive_is_one_key_away_from_every_other() -> None:
     async with bench("atv71") as made:
         places = {

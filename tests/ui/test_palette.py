@@ -170,7 +170,7 @@ async def test_an_action_of_this_screen_is_done() -> None:
         assert not isinstance(made.app.screen, Ask)
 
 
-@pytest.mark.sweep  # by keys: test_block_flows
+@pytest.mark.sweep
 async def test_every_screen_leads_to_every_other() -> None:
     async with bench("atv71") as made:
         before = ""

@@ -55,6 +55,7 @@ def test_the_tour_has_its_steps() -> None:
     assert sum(len(texts) for _, texts in told) >= QUOTES
 
 
+@pytest.mark.sweep  # what it shows is tested screen by screen
 async def test_the_tour(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
     monkeypatch.chdir(tmp_path)
