@@ -248,6 +248,23 @@ async def test_a_drive_that_is_given_away_is_not_stopped_by_the_end_of_this_prog
 # Asked elsewhere
 
 
+async def test_what_another_program_commands_does_not_run_by_a_command_from_here(
+    bench: Bench,
+) -> None:
+    bench.session.note_command()
+    bench.starts.begin(bench.session, "forward")
+    commanded_there(bench)
+    assert bench.session.commanded  # its motor was started here, and is not known to stand
+    bench.facts.note_commander(1, None)
+    bench.starts.give_away(bench.session)
+    commanded_there(bench)
+    assert not bench.session.commanded
+    bench.session.note_command()
+    bench.facts.hear_question(1, REMOTE)
+    bench.handover.answer(1, yes=True)
+    assert not bench.session.commanded
+
+
 async def test_asking_is_told_there_and_the_answer_here(bench: Bench) -> None:
     commanded_there(bench)
     bench.handover.ask_for(1)

@@ -122,6 +122,10 @@ class DriveSession:
         self.told_by_line = True
         self.commanded_at = self.clock.monotonic()
 
+    def note_given(self) -> None:
+        """Another program commands the drive: what its motor does is no longer from here."""
+        self.commanded_at = None
+
     def stir(self) -> None:
         """Something was done to the drive: whoever watches it looks at all of it again."""
         self.stirs += 1

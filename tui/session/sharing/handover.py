@@ -149,6 +149,7 @@ class Handover:
             session.arming.disarm(f"Given to {program.text}: no longer armed here.")
             if session.starts is not None:
                 session.starts.give_away(session)
+            session.note_given()
         self._line.facts.answer(device, program.id, yes=yes)
         self._say(device, f"{'Given to' if yes else 'Not given to'} {program.text}.")
 
@@ -179,7 +180,13 @@ class Handover:
         for device, id in facts.commanders.items():
             if id in names and self._commanders.get(device) != id:
                 self._say(device, f"{names[id][0].upper()}{names[id][1:]} commands this drive now.")
+                self._is_anothers(self._session_of(device))
         self._names, self._commanders = names, facts.commanders
+
+    def _is_anothers(self, session: DriveSession | None) -> None:
+        """Another program commands a drive; a motor started here stays this program's to stop."""
+        if session is not None and not (session.starts and session.starts.holds(session.device)):
+            session.note_given()
 
     def _say(self, device: int | None, text: str) -> None:
         self._events.add("told", text, device)

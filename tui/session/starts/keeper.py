@@ -128,6 +128,10 @@ class StartKeeper:
             self._begun = {d: one for d, one in self._begun.items() if d != session.device}
             self._starts.note_stop(session.line_text, session.device)
 
+    def holds(self, device: int) -> bool:
+        """Whether a motor that was started here is not yet known to stand."""
+        return device in self._begun
+
     def give_away(self, session: Startable) -> None:
         """Another program looks after the motor from now on."""
         if session.device in self._begun:
