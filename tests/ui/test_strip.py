@@ -44,6 +44,7 @@ def cells_before(text: str, part: str) -> int:
     current=st.sampled_from(["0.0", "120.4", "-----"]),
     name=st.text(max_size=30),
     armed=st.sampled_from([None, 0.2, 59.0]),
+    by=st.sampled_from(["", "Terminals", "panel pts/12", "analogue input AI1 of the drive"]),
     faults=st.integers(0, 31),
     width=st.sampled_from([60, 72, 80, 100, 120, 200]),
 )
@@ -53,11 +54,13 @@ def test_nothing_moves_when_a_value_changes(
     current: str,
     name: str,
     armed: float | None,
+    by: str,
     faults: int,
     width: int,
 ) -> None:
     plain = strip_line(StripView(drive=RUNS), width).plain
     drive = RUNS._replace(words=words, frequency=frequency, current=current, name=name, armed=armed)
+    drive = drive._replace(by=by)
     other = strip_line(StripView(drive=drive, faults=faults), width)
     assert other.cell_len == width
     if width >= 80 and faults < 10:
@@ -82,8 +85,9 @@ def test_a_fault_that_was_looked_at_shouts_no_more() -> None:
 
 
 def test_who_commands_where_it_is_not_this_panel() -> None:
-    drive = RUNS._replace(armed=None, by="Terminals")
-    assert "by Terminals" in strip_line(StripView(drive=drive), 80).plain
+    for by in ("Terminals", "panel pts/12"):
+        drive = RUNS._replace(armed=None, by=by)
+        assert f"by {by}" in strip_line(StripView(drive=drive), 80).plain
 
 
 def test_without_a_drive_the_strip_tells_the_line() -> None:

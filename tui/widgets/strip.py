@@ -164,7 +164,8 @@ def _right(view: StripView, *, narrow: bool) -> Text:
     elif view.read_only:
         text.append("read-only ", FAINT)
     elif drive is not None and drive.by:
-        text.append(f"by {short(drive.by, 10)} ", FAINT)
+        room = (NARROW_RIGHT if narrow else RIGHT_WIDTH) - text.cell_len - len("by  ")
+        text.append(f"by {short(drive.by, max(4, room))} ", FAINT)
     if drive is None:
         load = f"load {view.load * 100:3.0f} %  " if view.load is not None else ""
         text.append(f"{load}{view.clock} ", FAINT)
