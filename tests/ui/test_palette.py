@@ -167,6 +167,9 @@ async def test_an_action_of_this_screen_is_done() -> None:
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, ConnectionScreen))
         await until(made.pilot, lambda: "n on Line" in told(made.app))
+        await typed(made, "report")
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: "^p on Parameters" in told(made.app))
         assert not isinstance(made.app.screen, Ask)
 
 

@@ -25,6 +25,7 @@ def open_palette(app: Panel) -> None:
             app.call_later(app.run_action, found.action.id, app if found.action.app else below)
         else:
             app.action_goto(found.screen)
-            app.tell(f"{found.name}: {found.action.shown} on {found.screen.capitalize()}.")
+            key = found.action.shown or "^p"  # what has no key is chosen there once more
+            app.tell(f"{found.name}: {key} on {found.screen.capitalize()}.")
 
     app.push_screen(Palette(app.place), chosen)
