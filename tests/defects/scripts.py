@@ -54,6 +54,33 @@ DEFECTS = (
         ("tests/cli/test_watch.py::test_nothing_is_good_once_the_server_is_gone",),
     ),
     Defect(
+        "rows-of-two-lines-alike",
+        "tui/cli/shared/watch_outputs.py",
+        "        line = [one.line_name] if self.lines else []",
+        "        line = [one.session.profile.name] if self.lines else []",
+        "The rows of drive 1 on two lines cannot be told from one another.",
+        ("tests/cli/test_watch_lines.py::test_every_output_tells_the_line_of_a_value",),
+    ),
+    Defect(
+        "one-missing-line-ends-all",
+        "tui/cli/shared/found_drives.py",
+        "            if self._alone:",
+        "            if not self._alone:",
+        "A gateway that is off keeps a recorder from all other lines.",
+        (
+            "tests/cli/test_watch_lines.py"
+            "::test_a_line_that_is_not_there_is_told_and_costs_the_others_nothing",
+        ),
+    ),
+    Defect(
+        "profile-of-a-name-for-another-drive",
+        "tui/cli/shared/several_lines.py",
+        "(not own or set(devices) == set(own)):",
+        "(own or not set(devices) == set(own)):",
+        "Another drive beside the named one is watched by its scales.",
+        ("tests/cli/test_watch_lines.py::test_the_drives_that_are_meant",),
+    ),
+    Defect(
         "csv-file-overwritten",
         "tui/cli/shared/csv_files.py",
         "    if path.exists() and not (append or force):",

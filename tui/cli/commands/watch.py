@@ -12,23 +12,25 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..shared.completion import complete_code
+from ..shared.completion import complete_line_or_code
 from ..shared.csv_files import CsvFile, refuse_unasked, rotation
 from ..shared.errors import INTERRUPTED, LINE_TROUBLE, Failure, told
+from ..shared.found_drives import find_drives
 from ..shared.options import (
     Target,
-    connect_drive,
     drives_options,
     force_profile_option,
     json_option,
-    line_argument,
     on_line,
     read_only_option,
 )
+from ..shared.several_lines import LineWish, further_lines, lines_argument, lines_wished, on_lines
 from ..shared.watch_outputs import (
     CsvOutput,
     JsonOutput,
     Output,
+    Several,
+    WatchedDrive,
     csv_titles,
     csv_units,
     text_output,
@@ -59,21 +61,21 @@ class CsvWish:
             raise click.UsageError("Either --append or --force.")
         refuse_unasked(self.path, append=self.append, force=self.force)
 
-    def opened(self, watched: Sequence[tuple[DriveSession, list[str]]]) -> CsvOutput | None:
+    def opened(self, watched: Sequence[WatchedDrive], several: Several) -> CsvOutput | None:
         """The file with the columns of these drives; None where none is wanted."""
         if self.path is None:
             return None
         units = csv_units(watched)
-        titles = csv_titles(watched, units)
+        titles = csv_titles(watched, units, several)
         self.file = CsvFile(
             self.path, titles, append=self.append, force=self.force, rotate=self.rotate
         )
-        return CsvOutput(self.file, units, several=len(watched) > 1)
+        return CsvOutput(self.file, units, several)
 
 
 @click.command()
-@line_argument
-@click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_code)
+@lines_argument
+@click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
 @drives_options
 @click.option(
     "--every",
@@ -118,37 +120,40 @@ def watch(
 ) -> None:
     """Watch parameters of drives, by default their monitoring set. Ctrl-C ends it.
 
+    Drives of several lines are watched where several LINEs stand before the CODEs; LINE@ADDRESS
+    names a drive on its line, as in pump@1,2 or tcp:HOST@5.
+
     A value is good if it was read in that cycle; otherwise it is the last one, with the quality
     stale and the time at which it was read. State and direction are told while the status word
     is watched.
     """
+    more, codes = further_lines(codes)
+    wishes = lines_wished(target, more)
     wish = CsvWish(csv_path, append, force, rotate)
     wish.check()
     seen = CyclesSeen()
 
-    async def work(opened: OpenLine) -> None:
-        from tui.session.monitor.rates import monitoring_codes
-
-        sessions = [await connect_drive(opened, one) for one in target.each()]
-        watched = [
-            (one, [one.profile.find(code).code for code in codes] or monitoring_codes(one.profile))
-            for one in sessions
-        ]
-        several = len(sessions) > 1
+    async def work(lines: Sequence[OpenLine]) -> None:
+        pairs = list(zip(lines, wishes, strict=True))
+        found, seen.missing = await find_drives(pairs, as_json=as_json)
+        watched = [_watched(session, one, codes) for one, session in found]
+        drives = sum(len(one.on(opened)) for opened, one in pairs)
+        several = Several(lines=len(wishes) > 1, drives=drives > 1)
         with ExitStack() as stack:
             outputs: list[Output] = [
-                JsonOutput(target.line_text)
+                JsonOutput(several)
                 if as_json
-                else stack.enter_context(text_output(several=several))
+                else stack.enter_context(text_output(watched, several))
             ]
-            if (csv_output := wish.opened(watched)) is not None:
+            if (csv_output := wish.opened(watched, several)) is not None:
                 outputs.append(csv_output)
-            await asyncio.gather(
-                *(_follow(one, shown, every, count, outputs, seen) for one, shown in watched)
-            )
+            await asyncio.gather(*(_follow(one, every, count, outputs, seen) for one in watched))
 
     try:
-        on_line(target, work, read_only=read_only)
+        if len(wishes) > 1:
+            on_lines(wishes, work, read_only=read_only)
+        else:
+            on_line(wishes[0].drives[0], lambda opened: work([opened]), read_only=read_only)
     except KeyboardInterrupt:
         raise Failure(seen.at_the_end(wish), INTERRUPTED) from None
     finally:
@@ -156,6 +161,8 @@ def watch(
             wish.file.close()
     if seen.silent:
         raise Failure(seen.silent, LINE_TROUBLE)
+    if seen.missing:
+        raise click.exceptions.Exit(seen.missing)
 
 
 @dataclass(slots=True)
@@ -165,6 +172,8 @@ class CyclesSeen:
     cycles: int = 0
     silent: str = ""
     """Why a drive never answered; empty while all did."""
+    missing: int = 0
+    """The highest status of the drives that were not there at the start."""
 
     def at_the_end(self, wish: CsvWish) -> str:
         """What was told and written, in a sentence."""
@@ -173,23 +182,31 @@ class CyclesSeen:
         return f"Ended by Ctrl-C after {self.cycles} cycles{rows}."
 
 
+def _watched(session: DriveSession, line: LineWish, codes: Sequence[str]) -> WatchedDrive:
+    """A drive with the codes that were named, else its monitoring set."""
+    from tui.session.monitor.rates import monitoring_codes
+
+    profile = session.profile
+    shown = [profile.find(code).code for code in codes] or monitoring_codes(profile)
+    return WatchedDrive(session, shown, line.text, line.name)
+
+
 async def _follow(
-    session: DriveSession,
-    shown: list[str],
+    one: WatchedDrive,
     every: float,
     count: int | None,
     outputs: Sequence[Output],
     seen: CyclesSeen,
 ) -> None:
-    """Hand every cycle of a drive to the outputs; `shown` are all codes that they are to hold."""
+    """Hand every cycle of a drive to the outputs."""
     from tui.session.monitor.monitor import Monitor
 
     from ..shared.cycles import Cycles
 
-    cycles = Cycles(session, shown)
-    monitor = Monitor(session)
+    cycles = Cycles(one.session, one.codes)
+    monitor = Monitor(one.session)
     leave = monitor.listen(cycles.take)
-    monitor.start(shown, every)
+    monitor.start(one.codes, every)
     first_error = ""
     answered = False
     try:
@@ -198,7 +215,7 @@ async def _follow(
             answered = answered or any(r.raw is not None for r in snapshot.readings.values())
             first_error = first_error or snapshot.error
             for output in outputs:
-                output.take(session, snapshot)
+                output.take(one, snapshot)
             seen.cycles += 1
     finally:
         leave()

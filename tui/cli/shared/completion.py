@@ -56,6 +56,14 @@ def complete_code(context: click.Context, _: click.Parameter, incomplete: str) -
     return _codes(context, incomplete)
 
 
+def complete_line_or_code(
+    context: click.Context, argument: click.Parameter, incomplete: str
+) -> Items:
+    """Another LINE, or codes."""
+    codes = _codes(context, incomplete)
+    return [*codes, *complete_line(context, argument, incomplete)]
+
+
 def complete_setting(context: click.Context, _: click.Parameter, incomplete: str) -> Items:
     """CODE= for what can be written."""
     if "=" in incomplete:

@@ -41,8 +41,12 @@ async def each_drive(target: Target, work: Work, *, as_json: bool, titled: bool 
     return worst
 
 
-def failed(target: Target, text: str, status: int) -> dict[str, Any]:
-    """Tell what is wrong with one of several drives; the same as an object."""
+def failed(target: Target, text: str, status: int, line_name: str = "") -> dict[str, Any]:
+    """Tell what is wrong with one of several drives; the same as an object.
+
+    `line_name` is what its line is called where there are several.
+    """
+    where = f"{line_name}: " if line_name else ""
     who = "" if text.startswith(f"Device {target.device}") else f"Device {target.device}: "
-    say(f"drivepanel: {who}{text}", err=True)
+    say(f"drivepanel: {where}{who}{text}", err=True)
     return {"line": target.line_text, "device": target.device, "error": text, "status": status}

@@ -52,6 +52,10 @@ class LineArgument(click.Argument):
             return text
         return _resolved(ctx, text)
 
+    def is_line(self, text: str) -> bool:
+        """Whether a word is surely meant for this argument."""
+        return bool(_WRITTEN_OUT.match(text)) or is_known_name(text)
+
     def _others(self, ctx: click.Context) -> list[click.Argument]:
         return [
             one for one in ctx.command.params if isinstance(one, click.Argument) and one is not self
@@ -63,7 +67,7 @@ class LineArgument(click.Argument):
         if not isinstance(text, str) or self.resolve_envvar_value(ctx) is None:
             return False
         others = self._others(ctx)
-        if not others or _WRITTEN_OUT.match(text) or is_known_name(text):
+        if not others or self.is_line(text):
             return False
         if any(one.required and not _given(opts.get(one.name or "")) for one in others):
             return True
@@ -186,12 +190,21 @@ share_group_option = click.option(
 )
 
 
-def takes_line(command: Callable[..., Any]) -> Callable[..., Any]:
+def takes_line_as(
+    kind: type[LineArgument], metavar: str
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """LINE, the option that accepts one that is not as it was, and with whom it is shared."""
-    argument = click.argument(
-        "line_text", metavar="LINE", cls=LineArgument, shell_complete=complete_line
-    )
-    return argument(_accept_option(share_group_option(command)))
+
+    def decorate(command: Callable[..., Any]) -> Callable[..., Any]:
+        argument = click.argument(
+            "line_text", metavar=metavar, cls=kind, shell_complete=complete_line
+        )
+        return argument(_accept_option(share_group_option(command)))
+
+    return decorate
+
+
+takes_line = takes_line_as(LineArgument, "LINE")
 
 
 def mind_the_line(opened: OpenLine) -> None:

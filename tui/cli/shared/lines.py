@@ -12,9 +12,14 @@ _KINDS = re.compile(r"(?:serial|tcp|rtu-tcp|sim):.*|COM\d+(?:,.*)?", re.IGNORECA
 def is_line(text: str) -> bool:
     """Whether a word is meant for a LINE, rightly written or not: a kind, a path, a port."""
     path = text.partition(",")[0]
-    if _KINDS.fullmatch(text) or "/" in text or "\\" in text or os.path.exists(path):
+    if is_written_out(text) or os.path.exists(path):
         return True
     return is_known_name(text, doubtful=True)
+
+
+def is_written_out(text: str) -> bool:
+    """Whether a word is a LINE by its signs alone, as no code of a parameter is."""
+    return bool(_KINDS.fullmatch(text)) or "/" in text or "\\" in text
 
 
 def is_known_name(text: str, *, doubtful: bool = False) -> bool:

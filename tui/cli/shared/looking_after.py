@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import TYPE_CHECKING
 
 from .say import say
@@ -12,8 +13,11 @@ if TYPE_CHECKING:
     from tui.session.sharing.guardian import Guardian
 
 
-def guard_motors(line: ModbusLine) -> None:
-    """From now on stop the motors of a program that is gone, as far as this one owns the line."""
+def guard_motors(line: ModbusLine, name: str = "") -> None:
+    """From now on stop the motors of a program that is gone, as far as this one owns the line.
+
+    `name` is what the line is called where a command has several.
+    """
     guardians: list[Guardian] = []
 
     def gone(program: Program) -> None:
@@ -26,8 +30,8 @@ def guard_motors(line: ModbusLine) -> None:
             guardians[0].gone(program)
 
     line.facts.on_gone(gone)
-    line.facts.on_text(_tell)
+    line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
 
 
-def _tell(device: int, text: str) -> None:
-    say(f"drivepanel: drive {device}: {text}", err=True)
+def _tell(where: str, device: int, text: str) -> None:
+    say(f"drivepanel: {where}drive {device}: {text}", err=True)

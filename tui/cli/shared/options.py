@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import functools
-from collections.abc import Callable, Coroutine
+from collections.abc import Callable, Coroutine, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
@@ -146,7 +146,7 @@ def on_line(
     from tui.session.connect.open_line import open_line
 
     text = where if isinstance(where, str) else where.line_text
-    usual = None if isinstance(where, str) else _usual_settings(where.profile_id)
+    usual = None if isinstance(where, str) else usual_settings(where.profile_id)
     program = click.get_current_context().info_name or "drivepanel"
     opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual, program=program)
     if opened.line.facts.voice is not None and opened.line.facts.others:
@@ -154,16 +154,16 @@ def on_line(
     guard_motors(opened.line)
     try:
         mind_the_line(opened)
-        return asyncio.run(_to_its_end(opened, work))
+        return asyncio.run(to_its_end([opened], lambda: work(opened)))
     except NoAnswer as error:
-        if not (hint := _about_silence(opened, text, usual is not None)):
+        if not (hint := about_silence(opened, text, by_profile=usual is not None)):
             raise
         raise NoAnswer(error.device, error.function, error.address, f"{error} {hint}") from error
     finally:
         opened.close()
 
 
-async def _to_its_end(opened: OpenLine, work: Callable[[OpenLine], Coroutine[Any, Any, T]]) -> T:
+async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any, Any, T]]) -> T:
     """Do the work; whatever becomes of it, say what drives do that are asked no more.
 
     Raises Exit with 128 and the number of a signal that ended it.
@@ -175,16 +175,16 @@ async def _to_its_end(opened: OpenLine, work: Callable[[OpenLine], Coroutine[Any
     assert task is not None
     with cancelled_by_signal(task) as came:
         try:
-            return await work(opened)
+            return await work()
         except asyncio.CancelledError:
             if not came:
                 raise
             raise click.exceptions.Exit(128 + came[0]) from None
         finally:
-            await say_farewells(opened)
+            await asyncio.gather(*(say_farewells(one) for one in lines))
 
 
-def _usual_settings(profile_id: str | None) -> UsualSettings | None:
+def usual_settings(profile_id: str | None) -> UsualSettings | None:
     """The settings that drives of a profile leave the factory with; None where it is not known."""
     from tui.bus.link import UsualSettings
     from tui.drive.errors import DriveError
@@ -199,7 +199,7 @@ def _usual_settings(profile_id: str | None) -> UsualSettings | None:
     return UsualSettings(link.baud, link.format)
 
 
-def _about_silence(opened: OpenLine, text: str, by_profile: bool) -> str:
+def about_silence(opened: OpenLine, text: str, *, by_profile: bool) -> str:
     """What to look at where nothing answers; empty for a line without settings of its own."""
     from tui.bus.link import SerialLink, UsualSettings, parse_link
 

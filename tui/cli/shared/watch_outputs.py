@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Protocol
 
 from .csv_files import CsvFile
@@ -20,26 +21,62 @@ if TYPE_CHECKING:
     from tui.session.reading import Reading
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class WatchedDrive:
+    """A drive that is watched, with its line."""
+
+    session: DriveSession
+    codes: list[str]
+    """All that is told of it."""
+    line_text: str
+    line_name: str
+    """The line as it was typed: the name of the settings file where that has one."""
+
+
+@dataclass(frozen=True, slots=True)
+class Several:
+    """Of what there are several, so that it has to be told which."""
+
+    lines: bool
+    drives: bool
+
+    def who(self, one: WatchedDrive) -> str:
+        """Which drive on which line, as far as that is a question."""
+        line = one.line_name if self.lines else ""
+        drive = f"device {one.session.device}" if self.drives else ""
+        return "  ".join(part for part in (line, drive) if part)
+
+    def cells(self, one: WatchedDrive) -> list[str]:
+        """The same for the columns of titles()."""
+        line = [one.line_name] if self.lines else []
+        return [*line, *([str(one.session.device)] if self.drives else [])]
+
+    def titles(self) -> list[str]:
+        """The columns that tell which."""
+        return [*(["line"] if self.lines else []), *(["device"] if self.drives else [])]
+
+
 class Output(Protocol):
     """Takes one cycle after the other."""
 
-    def take(self, session: DriveSession, snapshot: Snapshot) -> None:
+    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
         """Put one cycle of a drive out, at once."""
 
 
 class JsonOutput:
     """One object a line on standard output; trouble goes to standard error when it begins."""
 
-    def __init__(self, line_text: str) -> None:
-        self._line_text = line_text
-        self._in_trouble: set[int] = set()
+    def __init__(self, several: Several) -> None:
+        self._several = several
+        self._in_trouble: set[WatchedDrive] = set()
 
-    def take(self, session: DriveSession, snapshot: Snapshot) -> None:
+    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
         """Print one cycle as an object."""
-        print_json(cycle_json(self._line_text, session, snapshot), compact=True)
-        if snapshot.error and session.device not in self._in_trouble:
-            say(f"drivepanel: {snapshot.error}", err=True)
-        (self._in_trouble.add if snapshot.error else self._in_trouble.discard)(session.device)
+        print_json(cycle_json(one.line_text, one.session, snapshot), compact=True)
+        if snapshot.error and one not in self._in_trouble:
+            where = f"{one.line_name}: " if self._several.lines else ""
+            say(f"drivepanel: {where}{snapshot.error}", err=True)
+        (self._in_trouble.add if snapshot.error else self._in_trouble.discard)(one)
 
 
 def cycle_json(line_text: str, session: DriveSession, snapshot: Snapshot) -> dict[str, Any]:
@@ -67,13 +104,13 @@ def known_state(state: DriveState) -> str | None:
 class LineOutput:
     """One line of text a cycle, for a file or another program."""
 
-    def __init__(self, *, several: bool) -> None:
+    def __init__(self, several: Several) -> None:
         self._several = several
 
-    def take(self, session: DriveSession, snapshot: Snapshot) -> None:
+    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
         """Print one cycle as a line; a value that is not good is in brackets."""
-        values = "  ".join(_shown(code, one) for code, one in snapshot.readings.items())
-        who = f"device {session.device}" if self._several else ""
+        values = "  ".join(_shown(code, read) for code, read in snapshot.readings.items())
+        who = self._several.who(one)
         parts = (_clock(snapshot), who, snapshot.state.headline, values, snapshot.error)
         say("  ".join(part for part in parts if part))
 
@@ -81,20 +118,23 @@ class LineOutput:
 class TableOutput:
     """A table for each drive that stays in its place on a terminal."""
 
-    def __init__(self, live: Live, *, several: bool) -> None:
+    def __init__(self, live: Live, watched: Sequence[WatchedDrive], several: Several) -> None:
         self._live = live
         self._several = several
-        self._latest: dict[int, tuple[DriveSession, Snapshot]] = {}
+        self._latest: dict[WatchedDrive, Snapshot | None] = dict.fromkeys(watched)
 
-    def take(self, session: DriveSession, snapshot: Snapshot) -> None:
+    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
         """Show one cycle in place of the one before."""
         from rich.console import Group
 
-        self._latest[session.device] = session, snapshot
+        self._latest[one] = snapshot
         tables = []
-        for device, (_, latest) in sorted(self._latest.items()):
-            who = f"device {device}" if self._several else ""
-            parts = (_clock(latest)[:8], who, latest.state.headline, latest.error)
+        for drive, latest in self._latest.items():
+            if latest is None:
+                continue
+            parts = (
+                _clock(latest)[:8], self._several.who(drive), latest.state.headline, latest.error
+            )  # fmt: skip
             title = "  ".join(part for part in parts if part)
             tables.append(readings_table(latest.readings, title, width=self._live.console.width))
         self._live.update(Group(*tables), refresh=True)
@@ -103,18 +143,17 @@ class TableOutput:
 class CsvOutput:
     """Engineering values in a CSV file; a cell without a good value is empty."""
 
-    def __init__(self, file: CsvFile, units: Mapping[str, str], *, several: bool) -> None:
+    def __init__(self, file: CsvFile, units: Mapping[str, str], several: Several) -> None:
         self._file = file
         self._units = units
         self._several = several
 
-    def take(self, session: DriveSession, snapshot: Snapshot) -> None:
+    def take(self, one: WatchedDrive, snapshot: Snapshot) -> None:
         """Write one cycle as a row."""
-        who = [str(session.device)] if self._several else []
         cells = [self._cell(code, snapshot.readings.get(code)) for code in self._units]
         state = snapshot.state
         told = [snapshot.error, known_state(state) or "", state.direction or ""]
-        self._file.write([iso_time(snapshot.wall), *who, *cells, *told])
+        self._file.write([iso_time(snapshot.wall), *self._several.cells(one), *cells, *told])
 
     def _cell(self, code: str, reading: Reading | None) -> str:
         if reading is None or reading.quality != "good":
@@ -124,36 +163,35 @@ class CsvOutput:
         return reading.text if same else f"{reading.text} {reading.unit}"
 
 
-def csv_units(watched: Sequence[tuple[DriveSession, Sequence[str]]]) -> dict[str, str]:
+def csv_units(watched: Sequence[WatchedDrive]) -> dict[str, str]:
     """The unit of each column: that of the first drive which has the code."""
     units: dict[str, str] = {}
-    for session, codes in watched:
-        for code in codes:
-            units.setdefault(code, session.profile[code].unit)
+    for one in watched:
+        for code in one.codes:
+            units.setdefault(code, one.session.profile[code].unit)
     return units
 
 
 def csv_titles(
-    watched: Sequence[tuple[DriveSession, Sequence[str]]], units: Mapping[str, str]
+    watched: Sequence[WatchedDrive], units: Mapping[str, str], several: Several
 ) -> list[str]:
     """The titles of the columns; a taught scale is marked."""
-    taught = {code for session, _ in watched for code in session.profile.taught}
+    taught = {code for one in watched for code in one.session.profile.taught}
     marked = {c: f"{u}, taught" if c in taught and u else u for c, u in units.items()}
     titles = [f"{code} [{unit}]" if unit else code for code, unit in marked.items()]
-    who = ["device"] if len(watched) > 1 else []
-    return ["time", *who, *titles, "error", "state", "direction"]
+    return ["time", *several.titles(), *titles, "error", "state", "direction"]
 
 
 @contextmanager
-def text_output(*, several: bool) -> Iterator[Output]:
+def text_output(watched: Sequence[WatchedDrive], several: Several) -> Iterator[Output]:
     """What suits standard output: a table on a terminal, else lines."""
     if not sys.stdout.isatty():
-        yield LineOutput(several=several)
+        yield LineOutput(several)
         return
     from rich.live import Live
 
     with Live(console=console(), auto_refresh=False) as live:
-        yield TableOutput(live, several=several)
+        yield TableOutput(live, watched, several)
 
 
 def _clock(snapshot: Snapshot) -> str:

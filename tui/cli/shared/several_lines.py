@@ -1,0 +1,197 @@
+"""Several LINEs for one command: which drives of each are meant, and their opening side by side.
+
+The LINEs stand first; each may have its drives behind an `@`, as in `pump@1,2` or `tcp:HOST@5`.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+from collections.abc import Callable, Coroutine, Iterator, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from itertools import takewhile
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+from .line_argument import LineArgument, mind_the_line, named_line_of, takes_line_as
+from .lines import is_known_name, is_written_out
+from .looking_after import guard_motors
+from .options import CONNECT_WITHIN, Target, to_its_end, usual_settings
+from .say import say
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+
+CONNECTION_LOOK = 0.02
+_FIRST_WORD = "drivepanel.first-line"
+_ADDRESSES = re.compile(r"\d[\d,-]*")
+_SIMULATED = "sim:"
+
+
+class FirstOfLines(LineArgument):
+    """The first LINE of a command that takes several; its word is kept as it was typed."""
+
+    def is_line(self, text: str) -> bool:
+        """Whether a word is surely meant for this argument."""
+        return super().is_line(split_addresses(text)[0])
+
+    def process_value(self, ctx: click.Context, value: Any) -> Any:
+        """The LINE that is meant, written out, without the addresses behind it."""
+        ctx.meta[_FIRST_WORD] = value
+        return super().process_value(
+            ctx, split_addresses(value)[0] if isinstance(value, str) else value
+        )
+
+
+lines_argument = takes_line_as(FirstOfLines, "LINE...")
+
+
+@dataclass(frozen=True, slots=True)
+class LineWish:
+    """A LINE with the drives on it that are meant."""
+
+    name: str
+    """As it was typed first, without addresses."""
+    drives: tuple[Target, ...]
+    all_drives: bool = False
+    """Whether a simulated line is meant with all its drives."""
+
+    @property
+    def text(self) -> str:
+        """The line, written out."""
+        return self.drives[0].line_text
+
+    def on(self, opened: OpenLine) -> tuple[Target, ...]:
+        """Each drive that is meant, once the line is open."""
+        if not self.all_drives:
+            return self.drives
+        return tuple(self.drives[0]._replace(device=one) for one in opened.devices)
+
+
+def split_addresses(word: str) -> tuple[str, str]:
+    """A LINE and the addresses behind its `@`; those of a simulated line are its own."""
+    line, sign, addresses = word.rpartition("@")
+    if not sign or not _ADDRESSES.fullmatch(addresses) or word.casefold().startswith(_SIMULATED):
+        return word, ""
+    return (word, "") if os.path.exists(word.partition(",")[0]) else (line, addresses)
+
+
+def further_lines(words: Sequence[str]) -> tuple[tuple[str, ...], tuple[str, ...]]:
+    """The LINEs among the words behind the first LINE, and the rest: LINEs come first.
+
+    Raises UsageError for a LINE behind a word that is none.
+    """
+    lines = tuple(takewhile(_is_line, words))
+    rest = tuple(words[len(lines) :])
+    if late := [one for one in rest if is_written_out(one)]:
+        raise click.UsageError(f"{late[0]}: every LINE stands before the first CODE.")
+    return lines, rest
+
+
+def _is_line(word: str) -> bool:
+    return is_written_out(word) or is_known_name(split_addresses(word)[0])
+
+
+def lines_wished(target: Target, more: Sequence[str]) -> list[LineWish]:
+    """What is meant by the first LINE, which made the target, and those behind it; each line once.
+
+    -d and -p count for every LINE; the addresses behind a LINE go before -d. Raises UsageError,
+    and LinkSyntaxError for what is no LINE or no address.
+    """
+    from tui.session.connect.line_key import line_key
+    from tui.session.connect.open_line import check_line
+
+    ctx = click.get_current_context()
+    first = str(ctx.meta[_FIRST_WORD])
+    wishes: dict[str, LineWish] = {}
+    for word in (first, *more):
+        wish = _wish_of(ctx, word, target, several=bool(more))
+        if more:
+            check_line(wish.text)
+        key = line_key(wish.text)
+        wishes[key] = _joined(wishes[key], wish) if key in wishes else wish
+    return list(wishes.values())
+
+
+def _wish_of(ctx: click.Context, word: str, target: Target, *, several: bool) -> LineWish:
+    from tui.session.connect.addresses import parse_addresses
+
+    name, addresses = split_addresses(word)
+    named = named_line_of(name)
+    text = named.line if named is not None else name
+    typed = _was_typed(ctx, "device")
+    given = tuple(one.device for one in target.each()) if typed else ()
+    own = (named.device,) if named is not None and named.device is not None else ()
+    devices = tuple(parse_addresses(addresses)) if addresses else given or own
+    profile = target.profile_id if _was_typed(ctx, "profile_id") else None
+    if profile is None and named is not None and (not own or set(devices) == set(own)):
+        profile = named.profile  # it is that of the drive which the name means
+    simulated = text.casefold().startswith(_SIMULATED)
+    wanted = target._replace(line_text=text, profile_id=profile, others=())
+    drives = tuple(wanted._replace(device=one) for one in dict.fromkeys(devices or (1,)))
+    return LineWish(name, drives, all_drives=several and simulated and not devices)
+
+
+def _was_typed(ctx: click.Context, option: str) -> bool:
+    return ctx.get_parameter_source(option) is ParameterSource.COMMANDLINE
+
+
+def _joined(one: LineWish, more: LineWish) -> LineWish:
+    """A line that was named twice, with the drives of both."""
+    drives = {drive.device: drive for drive in (*more.drives, *one.drives)}
+    in_order = dict.fromkeys(drive.device for drive in (*one.drives, *more.drives))
+    all_drives = one.all_drives or more.all_drives
+    return LineWish(one.name, tuple(drives[device] for device in in_order), all_drives)
+
+
+def on_lines(
+    wishes: Sequence[LineWish],
+    work: Callable[[Sequence[OpenLine]], Coroutine[Any, Any, None]],
+    *,
+    read_only: bool,
+) -> None:
+    """Open lines, do the work, close them whatever happens.
+
+    None of them is waited for here: see connected().
+    """
+    with ExitStack() as stack:
+        opened = [stack.enter_context(_line_of(one, read_only=read_only)) for one in wishes]
+        asyncio.run(to_its_end(opened, lambda: work(opened)))
+
+
+@contextmanager
+def _line_of(wish: LineWish, *, read_only: bool) -> Iterator[OpenLine]:
+    """A line that connects by itself, closed at the end."""
+    from tui.session.connect.open_line import open_line
+
+    opened = open_line(
+        wish.text,
+        read_only=read_only,
+        usual=usual_settings(wish.drives[0].profile_id),
+        program=click.get_current_context().info_name or "drivepanel",
+    )
+    guard_motors(opened.line, wish.name)
+    try:
+        yield opened
+    finally:
+        opened.close()
+
+
+async def connected(opened: OpenLine, name: str) -> None:
+    """Wait until a line is there. Raises LineLost with why it is not, after a while."""
+    from tui.bus.api import LineStatus
+    from tui.bus.errors import LineLost
+
+    line = opened.line
+    end = asyncio.get_running_loop().time() + CONNECT_WITHIN
+    while line.state.status is not LineStatus.CONNECTED:
+        if asyncio.get_running_loop().time() > end:
+            raise LineLost(line.state.reason or f"not connected within {CONNECT_WITHIN:g} s.")
+        await asyncio.sleep(CONNECTION_LOOK)
+    if line.facts.voice is not None and line.facts.others:
+        say(f"drivepanel: {name}: {line.state.reason}", err=True)
+    mind_the_line(opened)
