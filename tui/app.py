@@ -78,7 +78,7 @@ class DrivePanelApp(LastWords, Hands, Lookout, LineOwner, LineCheck, Places, Lea
         self._start = start
         self._device = device
         self._on_shown = on_shown
-        self.settled = leave_running
+        self.leave_running = self.settled = leave_running
         """Whether it was decided what becomes of motors that run by an order from here."""
 
     def get_theme(self, theme_name: str) -> Theme | None:

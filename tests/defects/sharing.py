@@ -9,6 +9,25 @@ ENDS = "tests/bus/test_share_ends.py"
 
 DEFECTS = (
     Defect(
+        "hangup-choice-lost-in-a-kill",
+        "tui/screens/line_owner.py",
+        "starts.left_running = self.leave_running",
+        "starts.left_running = False",
+        "A fan that is to run on is stopped by a recorder when its panel is killed.",
+        (
+            "tests/line/test_shared_programs.py"
+            "::test_what_a_panel_was_told_of_a_hangup_holds_for_every_loss_of_it",
+        ),
+    ),
+    Defect(
+        "taken-over-as-it-was-started",
+        "tui/session/starts/starts.py",
+        "            left_running=left_running,\n        )  # fmt: skip",
+        "        )  # fmt: skip",
+        "A motor that a panel took over runs on when that panel is killed.",
+        ("tests/session/test_starts.py",),
+    ),
+    Defect(
         "thawed-owner-sends-on",
         "tui/bus/share/lease.py",
         "return self.stood > LEASE",

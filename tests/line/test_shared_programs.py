@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sys
@@ -17,6 +18,7 @@ from tui.simulator import Simulation
 
 from .terminal import Terminal, runs
 from .test_commands import bench, stands, turns
+from .test_ways_to_end import Running
 from .test_ways_to_end import running as panel_running
 
 Start = Callable[[list[str]], Terminal]
@@ -136,6 +138,61 @@ def test_a_drive_that_run_commands_takes_nothing_from_another_command(
         assert f"Drive 1 is commanded by run (pid {runner.process.pid})" in done.stderr
         assert turns(simulation)
         assert drivepanel("read", line, "RFR", "-d", "1", "-p", "atv71").returncode == 0
+
+
+# A panel and a recorder
+
+
+@contextmanager
+def panel_run(
+    programs: ExitStack, terminal_with: Start, *options: str
+) -> Iterator[tuple[Running, Served]]:
+    """A panel whose motor turns, and a recorder attached to it."""
+    with panel_running(terminal_with, *options) as made:
+        recorder = programs.enter_context(served(records(made.line), ready="{"))
+        yield made, recorder
+
+
+def on_record() -> list[bool]:
+    """Of each start on record, whether its motor is meant to be left running."""
+    starts = Path(os.environ["DRIVEPANEL_STATE"], "starts")
+    return [json.loads(one.read_text())["left_running"] for one in starts.glob("*.json")]
+
+
+@pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGKILL])
+def test_what_a_panel_was_told_of_a_hangup_holds_for_every_loss_of_it(
+    programs: ExitStack, terminal_with: Start, number: signal.Signals
+) -> None:
+    """The recorder takes the line over, feeds the drive, and leaves the motor as registered."""
+    with panel_run(programs, terminal_with, "--on-hangup", "leave-running") as (made, recorder):
+        assert on_record() == [True]
+        os.kill(made.pid, number)
+        made.ended()
+        assert recorder.process.stdout is not None
+        before = made.simulation.drive(1).raw("CMD")
+        for _ in range(20):  # 4 s of the recorder's
+            assert '"RFR"' in recorder.process.stdout.readline()
+        assert made.speed > 2
+        assert made.simulation.drive(1).raw("CMD") == before
+        assert on_record() == [True]
+        status, said = recorder.end()
+        assert status == 128 + signal.SIGTERM
+        assert "its motor is stopped" not in said
+        assert sockets() == []
+
+
+def test_unless_it_was_told_otherwise_the_motor_of_a_killed_panel_is_stopped(
+    programs: ExitStack, terminal_with: Start
+) -> None:
+    with panel_run(programs, terminal_with) as (made, recorder):
+        assert on_record() == [False]
+        os.kill(made.pid, signal.SIGKILL)
+        made.stopped()
+        assert made.simulation.drive(1).fault is None
+        wait_until(lambda: on_record() == [], "the record of the start goes")
+        _, said = recorder.end()
+        assert "is gone: its motor is stopped" in said
+        assert sockets() == []
 
 
 # Two panels

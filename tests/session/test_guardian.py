@@ -210,7 +210,7 @@ async def test_a_motor_that_was_taken_over_runs_on(bench: Bench) -> None:
     await come(lambda: bench.says("unless a and T take it over"))
     (found,) = bench.starts.all_found(label(bench.line.link))
     assert isinstance(found, StartRecord)
-    taken = bench.starts.taken_over(found, label(bench.line.link), "panel")
+    taken = bench.starts.taken_over(found, label(bench.line.link), program="panel")
     await asyncio.to_thread(bench.starts.begin, taken)
     await come(lambda: bench.says("was taken over"))
     bench.clock.advance(20)

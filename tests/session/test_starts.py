@@ -16,6 +16,7 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -25,6 +26,7 @@ from hypothesis import strategies as st
 from tests.programs import PATIENCE, wait_until
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.line_key import line_key
+from tui.session.starts.keeper import StartKeeper
 from tui.session.starts.processes import Processes
 from tui.session.starts.record import StartRecord
 from tui.session.starts.starts import StartNotRecorded, StartOvertaken, Starts
@@ -232,13 +234,28 @@ def test_a_motor_that_was_taken_over_is_no_longer_offered(starts: Starts) -> Non
     starts.begin(start())
     found = starts.found(LINE, 2)
     assert found is not None
-    mine = starts.taken_over(found, "TCP:Gateway", "panel")
+    mine = starts.taken_over(found, "TCP:Gateway", program="panel")
     starts.begin(mine)
     assert starts.found(LINE, 2) is None
     assert (mine.wall, mine.pid) == (found.wall, os.getpid())
     starts.note_stop("TCP:Gateway", 2)
     assert starts.close(PATIENCE)
     assert files(starts) == []
+
+
+@pytest.mark.parametrize("before", [True, False])
+@pytest.mark.parametrize("meant", [True, False])
+def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
+    starts: Starts, before: bool, meant: bool
+) -> None:
+    starts.begin(replace(start(), left_running=before))
+    keeper = StartKeeper("panel", starts)
+    keeper.left_running = meant
+    session: Any = SimpleNamespace(line_text=LINE, device=2)
+    keeper.look(session)
+    keeper.take_over(session)
+    (mine,) = [one for one in starts._files.records() if one.pid == os.getpid()]
+    assert mine.left_running is meant
 
 
 def test_a_rest_read_before_the_run_frame_does_not_take_the_record(starts: Starts) -> None:

@@ -31,6 +31,8 @@ class Panel(LeanApp):
     read_only: bool
     low_bandwidth: bool
     """Whether the terminal is to be sent as little as possible."""
+    leave_running: bool
+    """Whether motors started from here are meant to go on when the panel is lost."""
     period: float
     """Wished time of a monitoring cycle in seconds, the same for every drive."""
     opened: OpenLine | None

@@ -83,6 +83,8 @@ class LineOwner(Panel):
 
         # the motors of a simulated line end with it
         starts = StartKeeper("panel", clock=self.clock) if opened.simulation is None else None
+        if starts is not None:
+            starts.left_running = self.leave_running
         events = LineEvents(self.events, opened.label, lambda: self.opened is opened)
         fleet = Fleet(opened.line, self.journal, starts, events, self.clock)
         one = PanelLine(opened, fleet)

@@ -28,7 +28,7 @@ on_hangup_option = click.option(
     type=click.Choice([STOP, LEAVE_RUNNING]),
     default=STOP,
     show_default=True,
-    help="What happens to motors started from here when the terminal is lost.",
+    help="What the loss of the terminal, or of the panel, means for motors started from here.",
 )
 low_bandwidth_option = click.option(
     "--low-bandwidth", is_flag=True, help="Send as little as possible, for a slow link."

@@ -60,7 +60,7 @@ class StartKeeper:
         self.unrecorded = False
         """Whether a start that cannot be put on record is let through; a person's word."""
         self.left_running = False
-        """Whether what is started now is meant to go on when the program ends."""
+        """Whether what is started or taken over now is to go on when the program is gone."""
         self._program = program
         self._starts = starts or Starts(clock=clock)
         self._begun: dict[int, StartRecord] = {}
@@ -158,7 +158,10 @@ class StartKeeper:
         record = self._left.get(session.device)
         if record is None:
             raise NothingToTakeOver("No start of an earlier program is known of this drive.")
-        self._put(session, self._starts.taken_over(record, session.line_text, self._program))
+        mine = self._starts.taken_over(
+            record, session.line_text, program=self._program, left_running=self.left_running
+        )
+        self._put(session, mine)
         self.sent(session)
         self._left = {d: one for d, one in self._left.items() if d != session.device}
 

@@ -128,12 +128,16 @@ class Starts:
             wall=datetime.now().astimezone().isoformat(timespec="milliseconds"),
         )
 
-    def taken_over(self, found: StartRecord, line: str, program: str) -> StartRecord:
+    def taken_over(
+        self, found: StartRecord, line: str, *, program: str, left_running: bool = False
+    ) -> StartRecord:
         """The start of a program that ended, as this program's; begin() puts it on the disk."""
-        pid = os.getpid()
+        boot_id, pid = self._processes.boot_id(), os.getpid()
         started = self._processes.started(pid) or ""
-        boot_id = self._processes.boot_id()
-        return replace(found, line=line, boot_id=boot_id, pid=pid, started=started, program=program)
+        return replace(
+            found, line=line, boot_id=boot_id, pid=pid, started=started, program=program,
+            left_running=left_running,
+        )  # fmt: skip
 
     def begin(self, record: StartRecord, patience: float = START_PATIENCE) -> None:
         """Put a start on the disk, flushed, before its run frame goes out.
