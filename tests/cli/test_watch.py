@@ -53,6 +53,17 @@ def test_nothing_is_good_once_the_server_is_gone() -> None:
             watching.process.kill()
 
 
+def test_3_a_drive_that_is_gone_at_the_end() -> None:
+    with simulated("atv71@2", "--tcp", "127.0.0.1:0") as simulation:
+        line = f"tcp:127.0.0.1:{port_of(simulation.ready)},timeout=0.2"
+        watch = ("watch", line, "-d", "2", "RFR", "--every", "0.1", "--count", "20", "--json")
+        with served([*DRIVEPANEL, *watch], ready="{") as watching:
+            simulation.end()
+            _, said = watching.process.communicate(timeout=PATIENCE)
+            assert watching.process.returncode == 3
+            assert "the other end closed" in said or "cannot be reached" in said
+
+
 def test_every_value_has_its_own_time_and_is_read_in_its_cycle() -> None:
     told = cycles(*LINE, *SHORT, "3")
     assert len(told) == 3

@@ -171,7 +171,7 @@ class CyclesSeen:
 
     cycles: int = 0
     silent: str = ""
-    """Why a drive never answered; empty while all did."""
+    """Why the last cycle of a drive brought nothing; empty where each brought its values."""
     missing: int = 0
     """The highest status of the drives that were not there at the start."""
 
@@ -207,18 +207,17 @@ async def _follow(
     monitor = Monitor(one.session)
     leave = monitor.listen(cycles.take)
     monitor.start(one.codes, every)
-    first_error = ""
-    answered = False
+    error = since = ""
     try:
         for _ in itertools.repeat(None) if count is None else range(count):
             snapshot = await cycles.next()
-            answered = answered or any(r.raw is not None for r in snapshot.readings.values())
-            first_error = first_error or snapshot.error
+            error = snapshot.error
+            since = (since or error) if error else ""  # the first of a row of errors says most
             for output in outputs:
                 output.take(one, snapshot)
             seen.cycles += 1
     finally:
         leave()
         monitor.stop()
-    if not answered and first_error:
-        seen.silent = first_error
+    if error:
+        seen.silent = since
