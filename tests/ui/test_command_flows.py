@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import ast
 import time
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import pytest
@@ -151,13 +152,18 @@ def knows_the_state(app: DrivePanelApp) -> bool:
 
 
 @asynccontextmanager
-async def bench(*families: str, read_only: bool = False) -> AsyncIterator[Bench]:
+async def bench(
+    *families: str, read_only: bool = False, sets: Mapping[str, int] = MappingProxyType({})
+) -> AsyncIterator[Bench]:
     """The panel on simulated drives of these families, at the addresses 1, 2, ...
 
-    Of several all are found first, then the first one is watched.
+    Of several all are found first, then the first one is watched. `sets` are raw values by code,
+    the same for each drive.
     """
     specs = [
-        DriveSpec(family, device, sets={} if family.startswith("atv") else {"6.43": 1})
+        DriveSpec(
+            family, device, sets={**({} if family.startswith("atv") else {"6.43": 1}), **sets}
+        )
         for device, family in enumerate(families, start=1)
     ]
     simulation = Simulation(specs)

@@ -15,6 +15,7 @@ from tui.drive.chart import ENABLED_KINDS
 from tui.drive.control_source import source_changes, source_codes, source_in_force
 from tui.drive.profile.schema import ControlSource
 from tui.session.console import DriveConsole
+from tui.session.proof.prover import hidden_at_rest
 from tui.session.timeout_told import TimeoutWatch
 from tui.widgets.drawing import rule
 from tui.widgets.lines import Lines
@@ -139,8 +140,11 @@ class ControlSourceScreen(OrderKeys):
         latest = self.console.latest
         if not self._armed_or_told() or latest is None:
             return
-        turning = latest.state.motion in ENABLED_KINDS
-        ask_to_prove(self._ask, self.session, self._watch(), turning=turning, work=self._prove)
+        turning, watch = latest.state.motion in ENABLED_KINDS, self._watch()
+        if not turning and watch is not None and (why := hidden_at_rest(watch.reaction)):
+            self._refuse(why)
+            return
+        ask_to_prove(self._ask, self.session, watch, turning=turning, work=self._prove)
 
     def _prove(self, stamp: int, *, turning: bool) -> None:
         """Prove it behind the work before; on record, and told when it has ended."""

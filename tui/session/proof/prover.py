@@ -38,6 +38,16 @@ class NothingToProve(DriveError):
     """The drive has no communication time-out in force."""
 
 
+def hidden_at_rest(reaction: Reaction | None) -> str:
+    """Why a reaction does not show on a motor at rest; empty where it does, or is not known."""
+    if reaction is None or reaction.trips:
+        return ""
+    return (
+        f"{reaction.name}: no fault follows, so that nothing shows at rest. Prove it with the motor"
+        " turning."
+    )
+
+
 @dataclass(slots=True)
 class Prover:
     """One proof of one drive; `tell` is told how far it is."""
@@ -118,11 +128,8 @@ class Prover:
             )
         if self.turning and not turns:
             raise OrderRefused("The motor is at rest: run it first, or prove it without turning.")
-        if reaction is not None and not reaction.trips and not self.turning:
-            raise OrderRefused(
-                f"{reaction.name}: no fault follows, so that nothing shows at rest. Prove it with"
-                " the motor turning."
-            )
+        if not self.turning and (why := hidden_at_rest(reaction)):
+            raise OrderRefused(why)
 
     async def _begin_watch(self, rules: CommunicationFault) -> None:
         """Where the watch begins with the first command, give one that moves nothing."""

@@ -1,0 +1,32 @@
+"""The proof of communication loss from Control: its question, its work, what it came to."""
+
+from __future__ import annotations
+
+from tui.screens.dialogs.confirm import Confirm
+
+from .test_command_flows import bench
+from .test_flows import shown, until
+
+
+async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
+    async with bench("atv312", sets={"ttO": 10}) as made:
+        await made.pilot.press("6", "P")
+        await until(made.pilot, lambda: "Not armed" in shown(made.app, "said"))
+        await made.pilot.press("a", "P")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        assert "It takes about 5 s" in str(made.app.screen.query("#follows").first().render())
+        await made.pilot.press("escape")
+        await until(made.pilot, lambda: "not proved" in shown(made.app, "now"))
+        await made.pilot.press("P")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        await made.pilot.press("y")
+        await until(made.pilot, lambda: "· proved " in shown(made.app, "now"))
+        assert any(one.text.startswith("Proof: Trips ") for one in made.app.events.events)
+        await until(made.pilot, lambda: "FAULT SLF" in shown(made.app, "strip"))
+
+
+async def test_where_nothing_would_show_it_says_so_and_asks_nothing() -> None:
+    async with bench("atv312", sets={"SLL": 0}) as made:
+        await made.pilot.press("6", "a", "P")
+        await until(made.pilot, lambda: "no fault follows" in shown(made.app, "said"))
+        assert not isinstance(made.app.screen, Confirm)
