@@ -16,6 +16,8 @@ from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR, CommandedElsewhere
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog
+from tui.session.fleet import Fleet
+from tui.session.journal import Journal
 from tui.session.sharing.handover import ANSWER_WITHIN, Handover
 from tui.session.starts.keeper import StartKeeper
 from tui.session.starts.starts import Starts
@@ -306,3 +308,21 @@ async def test_who_comes_and_goes_and_who_commands_is_told_once(bench: Bench) ->
         "Panel on pts/9 (pid 77) commands this drive now.",
         "Watch (pid 78) has left the line.",
     ]
+
+
+async def test_who_was_there_before_this_panel_is_missed_as_well(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """The motor that it leaves is looked for, whoever came to the line first."""
+    line = FakeLine({1: {}})
+    line.facts.set_programs((line.facts.me, REMOTE))
+    starts, looked = StartKeeper("panel"), asyncio.Event()
+    loop = asyncio.get_running_loop()
+    monkeypatch.setattr(starts, "look", lambda _: loop.call_soon_threadsafe(looked.set))
+    fleet = Fleet(line, Journal(), starts)
+    fleet.take(DriveSession(line, 1, library.load("atv71")))
+    await asyncio.wait_for(looked.wait(), 20)
+    looked.clear()
+    line.facts.set_programs((line.facts.me,))
+    await asyncio.wait_for(looked.wait(), 20)
+    fleet.forget()

@@ -78,10 +78,10 @@ class Fleet:
         """The faults of all of them."""
         self.handover = Handover(line, self.events, self._session_of, clock)
         """Who commands a drive when two programs want to."""
+        self._departed = line.facts.departed
         line.facts.on_change(self._look_for_left)
         self.search: Search | None = None
         """The search for drives that goes on, or the last one."""
-        self._others = 0
         self._lock = threading.Lock()
         self._found: Mapping[int, FoundDrive] = MappingProxyType({})
 
@@ -146,8 +146,8 @@ class Fleet:
 
     def _look_for_left(self) -> None:
         """Somebody may have left the line: perhaps a motor that runs; reads files."""
-        before, self._others = self._others, len(self.line.facts.others)
-        if self.starts is None or before <= self._others:
+        before, self._departed = self._departed, self.line.facts.departed
+        if self.starts is None or set(self._departed) <= set(before):
             return
         with suppress(LineClosed):
             self.line.spawn(partial(self._find_left, self.starts), "motors left running")
