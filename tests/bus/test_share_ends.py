@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 import socket
 import threading
 import time
@@ -184,8 +185,9 @@ async def test_one_that_comes_after_an_owner_that_ended_keeps_it_too(share: Shar
             await write
 
 
+@pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGSTOP])
 async def test_programs_that_went_with_the_owner_are_missed_by_the_next(
-    share: Share, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    share: Share, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: signal.Signals
 ) -> None:
     monkeypatch.setattr("tui.bus.share.server.BACK_WITHIN", 0.5)
     with (
@@ -200,7 +202,7 @@ async def test_programs_that_went_with_the_owner_are_missed_by_the_next(
         gone: list[str] = []
         for one in (line, third):
             one.facts.on_gone(lambda program: gone.append(program.name))
-        os.kill(run.process.pid, 9)
+        os.kill(run.process.pid, number)
         os.kill(owner.process.pid, 9)
         eventually(lambda: sorted(gone) == ["panel", "run"])
         assert line.facts.commander(4) is None

@@ -5,9 +5,50 @@ from __future__ import annotations
 from .defect import Defect
 
 STOPS = "tests/bus/test_share_stops.py"
+FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
 
 DEFECTS = (
+    Defect(
+        "frozen-client-kept",
+        "tui/bus/share/signs.py",
+        "if client.is_silent(now, LOOKS_IN_VAIN):",
+        "if False:",
+        "A frozen program commands its drive for ever, and a recorder feeds its motor.",
+        (f"{FROZEN}::test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more",),
+    ),
+    Defect(
+        "thawed-client-commands-again",
+        "tui/bus/share/server.py",
+        "gone = client.program.id in self._gone_before",
+        "gone = False",
+        "A program that stood still for a minute takes its drive back, armed as it was.",
+        (f"{FROZEN}::test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more",),
+    ),
+    Defect(
+        "clients-of-a-thawed-owner-let-go",
+        "tui/bus/share/attached.py",
+        "return now - self.heard > SILENT_CLIENT and self.looks > looks",
+        "return now - self.heard > SILENT_CLIENT",
+        "An owner that stood still itself stops the motors of all others.",
+        (FROZEN,),
+    ),
+    Defect(
+        "first-departure-missed",
+        "tui/session/fleet.py",
+        "set(self._departed) <= set(before)",
+        "len(self._departed) <= len(before) + 1",
+        "A panel that has just come offers nobody the motor of a program that was killed.",
+        ("tests/session/test_handover.py::test_who_was_there_before_this_panel_is_missed_as_well",),
+    ),
+    Defect(
+        "motor-of-a-living-program-left",
+        "tui/session/sharing/guardian.py",
+        "absent = pids_absent(self._line.facts) | {program.pid}",
+        "absent = pids_absent(self._line.facts) - {program.pid}",
+        "A recorder feeds the motor of a frozen program for ever.",
+        ("tests/session/test_guardian.py",),
+    ),
     Defect(
         "hangup-choice-lost-in-a-kill",
         "tui/screens/line_owner.py",

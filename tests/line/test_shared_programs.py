@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, Served, drivepanel, served, wait_until
-from tui.simulator import Simulation
+from tui.simulator import DriveSpec, Simulation
 
 from .terminal import Terminal, runs
 from .test_commands import bench, stands, turns
@@ -54,10 +54,13 @@ def stopped_by_commands(simulation: Simulation, device: int = 1) -> bool:
 
 @contextmanager
 def motor_run(
-    programs: ExitStack, first: str, *extra: str
+    programs: ExitStack, first: str, *extra: str, time_out: int = 100
 ) -> Iterator[tuple[Simulation, str, Served, Served]]:
-    """`run` and a recorder on one line, whichever is the `first` and owns it."""
-    with bench() as (simulation, line):
+    """`run` and a recorder on one line, whichever is the `first` and owns it.
+
+    `time_out` is that of the drive, in 0.1 s.
+    """
+    with bench(DriveSpec("atv71", 1, sets={"TTO": time_out})) as (simulation, line):
         recorder = None
         if first == "watch":
             recorder = programs.enter_context(served(records(line), ready="{"))
@@ -109,6 +112,64 @@ def test_a_stop_goes_past_a_frozen_owner_and_lasts(
         assert runner.process.returncode == 5
         assert stopped_by_commands(simulation)
         assert simulation.drive(1).raw("CMD") == before
+
+
+def test_a_recorder_does_not_feed_the_motor_of_a_frozen_program_for_ever(
+    programs: ExitStack,
+) -> None:
+    """Its socket stays open, its process lives: nothing but its silence tells."""
+    with motor_run(programs, "watch", time_out=50) as (simulation, _, runner, recorder):
+        runner.process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops on its ramp")
+        before = simulation.drive(1).raw("CMD")
+        runner.process.send_signal(signal.SIGCONT)
+        said, _ = runner.process.communicate(timeout=PATIENCE)
+        assert runner.process.returncode == 5
+        assert "It was stopped by a stop while this program stood still, watch (pid" in said
+        assert simulation.drive(1).raw("CMD") == before
+        assert recorder.process.stdout is not None
+        for _ in range(3):
+            assert '"RFR"' in recorder.process.stdout.readline()
+        _, told = recorder.end()
+        gone = f"run (pid {runner.process.pid}) is not on the line any more"
+        assert f"{gone}: its motor is stopped in " in told
+        assert sockets() == []
+
+
+def test_the_motor_of_a_frozen_program_is_taken_over_by_a_key(
+    programs: ExitStack, terminal_with: Start
+) -> None:
+    with motor_run(programs, "watch", time_out=300) as (simulation, line, runner, _):
+        panel = terminal_with([sys.executable, "-m", "tui", line, "-d", "1"])
+        panel.wait_for("FORWARD")
+        runner.process.send_signal(signal.SIGSTOP)
+        panel.wait_for("T takes over")
+        panel.press("a")
+        wait_until(lambda: "ARMED" in panel.text().replace("NOT ARMED", ""), "it is armed")
+        panel.press("T")
+        panel.wait_for("Taken over")
+        before = simulation.drive(1).raw("CMD")
+        # it comes back to a drive that is another's, and its motor turns on
+        runner.process.send_signal(signal.SIGCONT)
+        panel.wait_for("The line is shared with run")
+        time.sleep(3)
+        assert simulation.drive(1).raw("CMD") == before
+        assert turns(simulation)
+        panel.press("Space")
+        wait_until(lambda: stopped_by_commands(simulation), "the motor stops")
+
+
+def test_nobody_feeds_the_motor_of_an_owner_that_is_frozen(programs: ExitStack) -> None:
+    """The drive's own time-out stops it, as it would if nobody shared the line."""
+    with motor_run(programs, "run", time_out=20) as (simulation, _, runner, recorder):
+        runner.process.send_signal(signal.SIGSTOP)
+        wait_until(lambda: simulation.drive(1).fault is not None, "the drive's own time-out")
+        wait_until(lambda: stands(simulation), "the motor stops")
+        runner.process.send_signal(signal.SIGCONT)
+        runner.process.communicate(timeout=PATIENCE)
+        assert runner.process.returncode == 4
+        recorder.end()
+        assert sockets() == []
 
 
 def test_a_stop_beside_run_ends_it_and_says_by_whom(programs: ExitStack) -> None:

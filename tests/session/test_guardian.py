@@ -21,7 +21,12 @@ from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
 from tui.session.events import EventLog
 from tui.session.journal import Journal
-from tui.session.sharing.guardian import LONGEST_GRACE, TAKEN_OVER_WITHIN, Guardian
+from tui.session.sharing.guardian import (
+    ENDS_WITHIN,
+    LONGEST_GRACE,
+    TAKEN_OVER_WITHIN,
+    Guardian,
+)
 from tui.session.starts.processes import Processes
 from tui.session.starts.record import StartRecord
 from tui.session.starts.starts import Starts
@@ -229,6 +234,85 @@ async def test_a_recorder_waits_for_the_person_of_an_attached_panel_only(
     bench.gone()
     await come(lambda: bench.says("is gone"))
     assert bench.says("unless a and T") is waits
+
+
+# A program that lives: frozen, or gone from the line by itself
+
+FROZEN = Program("frozen", "run", LIVING)
+
+
+async def frozen(bench: Bench, **started: bool) -> None:
+    """A program that runs a motor gives no sign of life, and was let go."""
+    bench.started(1, pid=LIVING, **started)
+    await come(lambda: bench.turns(1))
+    bench.guardian(timeout=10.0)
+    bench.gone(FROZEN)
+    await asyncio.sleep(0.2)
+    assert bench.told == []  # it may be just ending
+    bench.clock.advance(ENDS_WITHIN + 0.1)
+
+
+async def test_the_motor_of_a_frozen_program_is_stopped_after_the_drives_own_time_out(
+    bench: Bench,
+) -> None:
+    await frozen(bench)
+    await come(lambda: bench.says("is not on the line any more: its motor is stopped in "))
+    assert bench.says("unless it comes back.")
+    bench.clock.advance(3.0)
+    await asyncio.sleep(0.2)
+    assert bench.line.facts.stops.stamp(1) == 0
+    bench.clock.advance(10.0)
+    drive = bench.simulation.drive(1)
+    await come(lambda: drive.motor.frequency == 0)
+    assert drive.fault is None
+    assert "run (pid 900001) is not on the line any more" in bench.line.facts.stops.by[1]
+
+
+async def test_the_motor_of_a_program_that_comes_back_in_time_runs_on(bench: Bench) -> None:
+    await frozen(bench)
+    await come(lambda: bench.says("unless it comes back"))
+    bench.line.facts.set_programs((bench.line.facts.me, FROZEN))
+    await come(lambda: bench.says("run (pid 900001) is back: its motor runs on."))
+    bench.clock.advance(20)
+    await asyncio.sleep(0.2)
+    assert bench.line.facts.stops.stamp(1) == 0
+
+
+async def test_one_that_was_let_go_for_a_moment_only_is_not_told_of(bench: Bench) -> None:
+    bench.started(1, pid=LIVING)
+    bench.guardian()
+    bench.gone(FROZEN)
+    await asyncio.sleep(0.1)
+    bench.line.facts.set_programs((bench.line.facts.me, FROZEN))
+    bench.clock.advance(20)
+    await asyncio.sleep(0.3)
+    assert bench.told == []
+    assert bench.line.facts.stops.stamp(1) == 0
+
+
+async def test_the_motor_of_a_frozen_program_may_be_taken_over(bench: Bench) -> None:
+    await frozen(bench)
+    await come(lambda: bench.says("unless it comes back"))
+    # as an attached panel finds it
+    (found,) = bench.starts.all_found(label(bench.line.link), {LIVING})
+    assert bench.starts.all_found(label(bench.line.link)) == []
+    taken = bench.starts.taken_over(found, label(bench.line.link), program="panel")
+    await asyncio.to_thread(bench.starts.begin, taken)
+    await come(lambda: bench.says("was taken over"))
+    bench.clock.advance(20)
+    await asyncio.sleep(0.2)
+    assert bench.line.facts.stops.stamp(1) == 0
+
+
+async def test_a_motor_that_a_frozen_program_means_to_leave_running_runs_on(bench: Bench) -> None:
+    await frozen(bench, left_running=True)
+    bench.clock.advance(20)
+    await asyncio.sleep(0.3)
+    assert bench.told == []
+    assert bench.line.facts.stops.stamp(1) == 0
+
+
+# Trouble
 
 
 async def test_a_drive_whose_profile_is_not_here_is_told_of(bench: Bench) -> None:

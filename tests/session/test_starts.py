@@ -24,12 +24,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tests.programs import PATIENCE, wait_until
+from tui.bus.fake import FakeLine
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.line_key import line_key
+from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 from tui.session.starts.keeper import StartKeeper
 from tui.session.starts.processes import Processes
 from tui.session.starts.record import StartRecord
-from tui.session.starts.starts import StartNotRecorded, StartOvertaken, Starts
+from tui.session.starts.starts import Starts
 
 LINE = "tcp:gateway"
 IDENTITY = DriveIdentity(2, "V", "R", "0201", "MACHINE 4", "atv71", ("atv71",))
@@ -251,7 +253,7 @@ def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
     starts.begin(replace(start(), left_running=before))
     keeper = StartKeeper("panel", starts)
     keeper.left_running = meant
-    session: Any = SimpleNamespace(line_text=LINE, device=2)
+    session: Any = SimpleNamespace(line_text=LINE, line=FakeLine({}), device=2)
     keeper.look(session)
     keeper.take_over(session)
     (mine,) = [one for one in starts._files.records() if one.pid == os.getpid()]

@@ -101,7 +101,7 @@ class Leaving(Panel):
 
     async def _leave_running(self) -> None:
         """Leave motors running, on record for whoever comes next."""
-        from tui.session.starts.starts import StartNotRecorded
+        from tui.session.starts.errors import StartNotRecorded
 
         self.settled = True
         for session in self._motors():

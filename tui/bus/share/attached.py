@@ -15,7 +15,7 @@ from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
 from .failures import failure_told
-from .lease import TOO_LATE, stood_still
+from .lease import SILENT_CLIENT, TOO_LATE, stood_still
 from .messages import (
     Answer,
     AnyMessage,
@@ -52,6 +52,10 @@ class Client:
     known: dict[int, DeviceState] = field(default_factory=dict)
     present: int = 0
     """The last roll call that it has answered."""
+    heard: float = 0.0
+    """When it last said anything."""
+    looks: int = 0
+    """How often the owner has looked in vain for a sign of life since."""
 
     def say(self, message: AnyMessage) -> None:
         """Tell it something; never waits."""
@@ -63,6 +67,25 @@ class Client:
             transport.abort()
             return
         self.writer.write(packed(message))
+
+    def hears_life(self, now: float) -> None:
+        """It said something."""
+        self.heard, self.looks = now, 0
+
+    def is_silent(self, now: float, looks: int) -> bool:
+        """Whether it gave no sign of life for too long, however often one was looked for.
+
+        By looks, too: where this program got no time to look, the client may be well.
+        """
+        self.looks += 1
+        return now - self.heard > SILENT_CLIENT and self.looks > looks
+
+    def drop(self) -> None:
+        """Have nothing to do with it any more; it may come back."""
+        asked, self.asked = self.asked, {}
+        for job in asked.values():
+            job.answer.cancel()
+        self.writer.transport.abort()
 
     def ask(self, inside: LineInside, message: Asking) -> None:
         """It asks for something on the line. Raises NoMessage."""

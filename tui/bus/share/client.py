@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import asyncio
+import itertools
 import logging
 from collections.abc import Callable, Coroutine
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import LineError, NotShared
+from ..errors import NotShared
 from ..link import label
 from ..model import LineState, LineStatus
-from ..program import Program
 from ..schedule.inside import LineInside
 from ..trace import Frame
 from .asked import RequestsAsked
 from .lease import SILENT_OWNER
 from .messages import (
     VERSION,
+    Alive,
     Answer,
     AnyMessage,
     AskedFor,
@@ -48,8 +49,13 @@ from .voices import ProgramVoice
 log = logging.getLogger(__name__)
 
 WATCH_INTERVAL = 0.1
+LOOKS_A_SIGN = 4
+"""Looks at the owner for each own sign of life."""
 WAITED_ENOUGH = 5.0
 """Seconds that a request waits for a frozen owner before it is told so."""
+
+STOP_UNHEARD = ("a stop while nobody owned the line", "a stop while this program stood still")
+STOOD_STILL = "This program stood still and was taken for gone: it commands nothing any more."
 
 Say = Callable[[LineStatus, str], None]
 
@@ -72,6 +78,7 @@ class ShareClient:
         self._note = ""
         self._wish: tuple[dict[int, float], bool] = ({}, False)
         self._past = past
+        self._gone = False
         self.again = False
         """Whether this program was attached to the line before."""
         self.heard = inside.clock()
@@ -142,10 +149,22 @@ class ShareClient:
         self._note = f"Shared with {message.owner.text}."
         if not message.asked:
             self._note += f" It is open as {message.label}."
+        self._gone = message.gone
+        self._claim()
+
+    def _claim(self) -> None:
+        """Tell the owner what this program commands, or give it up where it was taken for gone."""
         facts = self._inside.facts
         for device, holder in facts.commanders.items():
-            if holder == facts.me.id:
+            if holder != facts.me.id:
+                continue
+            if self._gone:
+                facts.release(device)
+                facts.hear_denied(device, STOOD_STILL)
+            else:
                 self._tell(Claim(device, True))
+        if self._gone:
+            self._inside.dispatcher.void_older(self._inside.clock(), STOOD_STILL)
 
     async def _listen(self, reader: asyncio.StreamReader) -> None:
         while True:
@@ -182,11 +201,12 @@ class ShareClient:
 
     async def _watch(self) -> None:
         """Notice an owner that does not answer any more, and one that does again."""
-        looks = 0
-        heard = self.heard
-        while True:
+        looks, heard = 0, self.heard
+        for turn in itertools.count():
             await asyncio.sleep(WATCH_INTERVAL)
             inside = self._inside
+            if turn % LOOKS_A_SIGN == 0:
+                self._tell(Alive())
             wish = inside.pace.own, inside.around.trace.looked_at
             if wish != self._wish:
                 self._wish = wish
@@ -259,7 +279,7 @@ class ShareClient:
         unheard = facts.learn(told.programs, told.commanders, told.stops, told.hushed)
         if unheard and self.again:
             # given while this program was with no owner
-            facts.hear_stop(unheard, "while nobody owned the line", self._owner.program)
+            facts.hear_stop(unheard, STOP_UNHEARD[self._gone], self._owner.program)
             self._inside.dispatcher.void()
 
     def _hear_news(self, news: News) -> None:
@@ -288,12 +308,3 @@ class ShareClient:
     def _tell(self, message: AnyMessage) -> None:
         if self._writer is not None and not self._writer.transport.is_closing():
             self._writer.write(packed(message))
-
-
-def owner_text(owner: Owner | None) -> str:
-    """Who owns a line, for a person."""
-    program: Program | None = owner.program if owner else None
-    return program.text if program else "another program"
-
-
-__all__ = ["LineError", "OwnerAway", "ShareClient", "owner_text"]

@@ -14,6 +14,9 @@ SILENT_OWNER = 1.0
 LEASE = 0.7
 """Seconds from its last sign of life in which an owner may send; the rest is for one exchange."""
 
+SILENT_CLIENT = 2.0
+"""Seconds without a sign of life after which a client is let go: nobody is to wait for it."""
+
 TOO_LATE = 2.0
 """Seconds after which a command is not sent any more: nobody expects it now."""
 

@@ -17,7 +17,7 @@ from ..program import Program
 from ..requests import Diagnose, Identify, Read, ReadInput, ReadWrite, Request, WriteMany, WriteOne
 from .failures import ErrorForm
 
-VERSION = 1
+VERSION = 2
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 18
 """Bytes of one message; more is no message of ours."""
@@ -47,6 +47,8 @@ class Welcome(Message, frozen=True):
     """The line as it is open."""
     asked: bool = True
     """Whether it is open with the settings that were meant."""
+    gone: bool = False
+    """Whether it was taken for gone meanwhile: it commands nothing any more."""
 
 
 class TurnedAway(Message, frozen=True):
@@ -121,6 +123,10 @@ class Here(Message, frozen=True):
     """The answer to a RollCall; nothing goes out past the owner any more."""
 
     number: int
+
+
+class Alive(Message, frozen=True):
+    """A program's sign of life: one that gives none for long is let go."""
 
 
 class Claim(Message, frozen=True):
@@ -209,8 +215,8 @@ class Goodbye(Message, frozen=True):
 
 AnyMessage = (
     Hello | Welcome | TurnedAway | Describe | Asking | Withdraw | Answer | Failed | StopGiven
-    | Claim | RollCall | Here | Denied | AskedFor | Granting | Told | Hush | PollWish | Facts | News
-    | Goodbye
+    | Alive | Claim | RollCall | Here | Denied | AskedFor | Granting | Told | Hush | PollWish
+    | Facts | News | Goodbye
 )  # fmt: skip
 
 _ENCODER = msgspec.msgpack.Encoder()

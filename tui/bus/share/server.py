@@ -17,6 +17,7 @@ from .commanding import Commanding
 from .listening import Listening
 from .messages import (
     VERSION,
+    Alive,
     AnyMessage,
     AskedFor,
     Asking,
@@ -142,21 +143,22 @@ class ShareServer:
             )
             writer.write(packed(TurnedAway(why)))
             return None
-        client = Client(message.program, writer)
+        client = Client(message.program, writer, heard=inside.clock())
         own = label(inside.link)
-        client.say(Welcome(facts.me, own, own == message.label))
+        gone = client.program.id in self._gone_before
+        client.say(Welcome(facts.me, own, own == message.label, gone))
         self._gone_before.discard(client.program.id)
         before = self._clients.get(client.program.id)
         self._clients[client.program.id] = client
         if before is not None:
-            self._drop(before)
+            before.drop()
         others = [one for one in facts.programs if one.id != client.program.id]
         facts.set_programs((*others, client.program))
         client.frames = inside.around.trace.count
         log.info("%s shares the line", client.program.text)
         if unheard := facts.stops.learn(message.stops):
             # given while nobody owned the line
-            self._hear_stops(unheard, "while nobody owned the line", client.program)
+            self._hear_stops(unheard, "a stop while nobody owned the line", client.program)
         self._tell_facts()
         self._tell_line(client)
         return client
@@ -168,7 +170,7 @@ class ShareServer:
 
     def _gone(self, client: Client) -> None:
         """A program went: what it asked is dropped, what it commanded is free."""
-        self._drop(client)
+        client.drop()
         if self._clients.get(client.program.id) is not client:
             return
         del self._clients[client.program.id]
@@ -179,13 +181,6 @@ class ShareServer:
             if has_ended(one):
                 facts.stops.fold(one.id)
         self._tell_facts()
-
-    @staticmethod
-    def _drop(client: Client) -> None:
-        asked, client.asked = client.asked, {}
-        for job in asked.values():
-            job.answer.cancel()
-        client.writer.transport.abort()
 
     def _miss_departed(self) -> None:
         """Programs that were on the line of an owner before are not back: they are gone."""
@@ -214,7 +209,10 @@ class ShareServer:
     # What clients say
 
     def _hear(self, client: Client, message: AnyMessage) -> None:
+        client.hears_life(self._inside.clock())
         match message:
+            case Alive():
+                pass
             case Asking():
                 client.ask(self._inside, message)
             case Withdraw(number=number):

@@ -10,10 +10,10 @@ from pathlib import Path
 
 from ..errors import NotShared
 from ..schedule.inside import LineInside
-from .client import OwnerAway, Say, ShareClient, owner_text
+from .client import OwnerAway, Say, ShareClient
 from .messages import VERSION
 from .past_owner import PastOwner
-from .place import Owner, OwnerLock, SharePlace, owner_of
+from .place import Owner, OwnerLock, SharePlace, owner_of, owner_text
 from .server import ShareServer
 from .stops_past import StopsPast
 from .turn import Turn

@@ -8,7 +8,7 @@ from collections.abc import Awaitable, Callable, Collection
 
 from ..schedule.inside import LineInside
 from .attached import Client
-from .lease import TOO_LATE, Lease, stood_still
+from .lease import SILENT_CLIENT, TOO_LATE, Lease, stood_still
 from .messages import RollCall, StopGiven
 from .stops_past import StopsPast
 
@@ -16,6 +16,8 @@ log = logging.getLogger(__name__)
 
 NEWS_INTERVAL = 0.2
 """Seconds between the owner's signs of life."""
+LOOKS_IN_VAIN = int(SILENT_CLIENT / NEWS_INTERVAL)
+"""Looks at a client before it counts as frozen."""
 ROLL_TAKES_IN, ROLL_TURNS = 0.05, 20
 """Seconds, and turns of the loop, for programs that wait to be taken in."""
 ROLL_WITHIN, ROLL_LOOK = 0.5, 0.005
@@ -63,6 +65,7 @@ class SignsOfLife:
             await asyncio.sleep(NEWS_INTERVAL)
             said = self._inside.clock()
             try:
+                self._let_silent_go()
                 if self._lease.lapsed:
                     await self._call_roll()
                     said = self._inside.clock()
@@ -71,6 +74,14 @@ class SignsOfLife:
                 # without signs of life the line would be held back for good
                 log.exception("telling the news of the line failed")
             self._lease.renew(said)
+
+    def _let_silent_go(self) -> None:
+        """A client that is frozen counts as gone: its motor must not be fed by the others."""
+        now = self._inside.clock()
+        for client in self._clients():
+            if client.is_silent(now, LOOKS_IN_VAIN):
+                log.warning("%s gives no sign of life and is let go", client.program.text)
+                client.drop()
 
     async def _call_roll(self) -> None:
         """This program stood still: hear what was stopped meanwhile before anything goes out.

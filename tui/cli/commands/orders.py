@@ -155,7 +155,7 @@ async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome
 
 def _way_on(error: Exception | None) -> str:
     """What lets a command through that was refused, where something does."""
-    from tui.session.starts.starts import StartNotRecorded, StartOvertaken
+    from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 
     refused = isinstance(error, StartNotRecorded) and not isinstance(error, StartOvertaken)
     return " --unrecorded runs it all the same." if refused else ""

@@ -8,16 +8,17 @@ from typing import TYPE_CHECKING
 from .say import say
 
 if TYPE_CHECKING:
-    from tui.bus.api import ModbusLine
     from tui.bus.program import Program
+    from tui.session.connect.open_line import OpenLine
     from tui.session.sharing.guardian import Guardian
 
 
-def guard_motors(line: ModbusLine, name: str = "") -> None:
+def guard_motors(opened: OpenLine, name: str = "") -> None:
     """From now on stop the motors of a program that is gone, as far as this one owns the line.
 
     `name` is what the line is called where a command has several.
     """
+    line = opened.line
     guardians: list[Guardian] = []
 
     def gone(program: Program) -> None:
@@ -26,11 +27,20 @@ def guard_motors(line: ModbusLine, name: str = "") -> None:
         from tui.session.sharing.guardian import Guardian
 
         if not guardians:
-            guardians.append(Guardian(line, Journal()))
+            guardians.append(Guardian(line, Journal(), timeout_of=partial(_timeout_of, opened)))
             guardians[0].gone(program)
 
     line.facts.on_gone(gone)
     line.facts.on_text(partial(_tell, f"{name}: " if name else ""))
+
+
+def _timeout_of(opened: OpenLine, device: int) -> float | None:
+    """Seconds to a drive's own communication time-out, as far as it has told it here."""
+    from .left_alone import LeftAlone
+
+    farewell = opened.farewells.get(device)
+    told = farewell.session.timeout if isinstance(farewell, LeftAlone) else None
+    return told.watch.timeout if told is not None and told.watch is not None else None
 
 
 def _tell(where: str, device: int, text: str) -> None:

@@ -151,7 +151,7 @@ def on_line(
     opened = open_line(text, read_only=read_only, wait=CONNECT_WITHIN, usual=usual, program=program)
     if opened.line.facts.voice is not None and opened.line.facts.others:
         say(f"drivepanel: {opened.line.state.reason}", err=True)
-    guard_motors(opened.line)
+    guard_motors(opened)
     try:
         mind_the_line(opened)
         return asyncio.run(to_its_end([opened], lambda: work(opened)))

@@ -174,7 +174,7 @@ def _line_of(wish: LineWish, *, read_only: bool) -> Iterator[OpenLine]:
         usual=usual_settings(wish.drives[0].profile_id),
         program=click.get_current_context().info_name or "drivepanel",
     )
-    guard_motors(opened.line, wish.name)
+    guard_motors(opened, wish.name)
     try:
         yield opened
     finally:

@@ -69,7 +69,7 @@ class OrderKeys(TeachKeys):
 
     def ask_unrecorded(self) -> None:
         """Where a start could not be put on record, ask once whether to run all the same."""
-        from tui.session.starts.starts import StartNotRecorded, StartOvertaken
+        from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 
         outcome, starts = self.commander.outcome, self.session.starts
         if outcome is None or outcome is self._asked or starts is None:

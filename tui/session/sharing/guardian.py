@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
 from tui.bus.link import label
+from tui.bus.share.lease import SILENT_CLIENT
 from tui.drive.errors import DriveError
 from tui.drive.profile import library
 
@@ -23,6 +24,7 @@ from ..command.stop import Stopper
 from ..command.stop_report import Phase
 from ..drive import DriveSession
 from ..journal import Journal
+from ..starts.keeper import pids_absent
 from ..starts.record import StartRecord
 from ..starts.starts import Starts
 
@@ -36,6 +38,9 @@ log = logging.getLogger(__name__)
 TAKEN_OVER_WITHIN = 2.0
 """Seconds in which a person may take a motor over, where the drive's own time-out is not known."""
 LONGEST_GRACE = 10.0
+GONE, ABSENT = "is gone", "is not on the line any more"
+"""What is told of a program that has ended, and of one that lives: frozen, or gone by itself."""
+BY_KEYS = "a and T take it over here"
 ENDS_WITHIN = 1.0
 """Seconds that a program takes to be gone from the list of processes."""
 LOOK_INTERVAL = 0.05
@@ -78,46 +83,78 @@ class Guardian:
 
     async def _look_after(self, program: Program) -> None:
         """Stop each motor that it has started and that nobody takes over in time."""
+        left = self._clock.monotonic()
         records = await self._left_by(program)
         if not records:
             return
         takers = self._person or any(one.name == "panel" for one in self._line.facts.others)
-        await asyncio.gather(*(self._stop_unless_taken(one, program, takers) for one in records))
+        await asyncio.gather(
+            *(self._stop_unless_taken(one, program, takers=takers, left=left) for one in records)
+        )
 
-    async def _stop_unless_taken(self, record: StartRecord, program: Program, takers: bool) -> None:
-        """Stop a motor, unless an attached person takes it over within the drive's time-out."""
-        device = record.device
-        grace = min(self._timeout_of(device) or TAKEN_OVER_WITHIN, LONGEST_GRACE) if takers else 0.0
-        unless = f" in {grace:g} s, unless a and T take it over here" if takers else ""
-        self._tell(device, f"{program.text} is gone: its motor is stopped{unless}.")
-        end = self._clock.monotonic() + grace
+    async def _stop_unless_taken(
+        self, record: StartRecord, program: Program, *, takers: bool, left: float
+    ) -> None:
+        """Stop a motor, unless an attached person takes it over within the drive's time-out.
+
+        A program that lives has as long to look after it again, as if nobody asked its drive on.
+        """
+        device, frozen = record.device, self._starts.is_alive(record)
+        grace = min(self._timeout_of(device) or TAKEN_OVER_WITHIN, LONGEST_GRACE)
+        # one that is frozen had been silent before it was let go
+        begun = left - SILENT_CLIENT if frozen else self._clock.monotonic()
+        end = begun + grace if frozen or takers else begun
+        self._announce(device, program, end, frozen=frozen, takers=takers)
         while self._clock.monotonic() < end:
-            if not await self._is_left(device):
+            if frozen and self._is_back(program):
+                self._tell(device, f"{program.text} is back: its motor runs on.")
+                return
+            if not await self._is_left(device, program):
                 self._tell(device, f"The motor that {program.text} started was taken over.")
                 return
             await self._clock.sleep(LOOK_INTERVAL)
         session = self._session(record)
-        if session is not None and await self._is_left(device):
-            self._stopper.stop([session], by=f"{program.text} is gone")
+        if session is not None and await self._is_left(device, program):
+            why = ABSENT if frozen else GONE
+            self._stopper.stop([session], by=f"{program.text} {why}")
             await self._until_stopped(session)
 
-    async def _is_left(self, device: int) -> bool:
-        """Whether no living program has the motor's start on record."""
-        found = await asyncio.to_thread(self._found)
+    def _announce(
+        self, device: int, program: Program, end: float, *, frozen: bool, takers: bool
+    ) -> None:
+        seconds = max(0.0, end - self._clock.monotonic())
+        ways = [*(["it comes back"] if frozen else []), *([BY_KEYS] if takers else [])]
+        unless = f" in {seconds:.2g} s, unless {' or '.join(ways)}" if ways and seconds else ""
+        what = ABSENT if frozen else GONE
+        self._tell(device, f"{program.text} {what}: its motor is stopped{unless}.")
+
+    def _is_back(self, program: Program) -> bool:
+        return any(one.pid == program.pid for one in self._line.facts.programs)
+
+    async def _is_left(self, device: int, program: Program) -> bool:
+        """Whether no living program but that one has the motor's start on record."""
+        found = await asyncio.to_thread(self._found, program)
         return any(one.device == device for one in found)
 
     async def _left_by(self, program: Program) -> list[StartRecord]:
-        """The motors that it has started and not meant to leave running."""
+        """The motors that it has started and not meant to leave running.
+
+        A program that has not ended after a while is frozen, or has left the line to itself.
+        """
         end = self._clock.monotonic() + ENDS_WITHIN
         while True:
-            found = await asyncio.to_thread(self._found)
+            found = await asyncio.to_thread(self._found, program)
             mine = [one for one in found if one.pid == program.pid and not one.left_running]
-            if mine or self._clock.monotonic() > end:
+            late = self._clock.monotonic() > end
+            if late and self._is_back(program):
+                return []
+            if late or (mine and not any(self._starts.is_alive(one) for one in mine)):
                 return mine
             await self._clock.sleep(LOOK_INTERVAL)
 
-    def _found(self) -> list[StartRecord]:
-        return self._starts.all_found(label(self._line.link))
+    def _found(self, program: Program) -> list[StartRecord]:
+        absent = pids_absent(self._line.facts) | {program.pid}
+        return self._starts.all_found(label(self._line.link), absent)
 
     async def _until_stopped(self, session: DriveSession) -> None:
         """Take the record away once the motor stands; one that does not stop keeps it."""

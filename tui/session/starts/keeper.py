@@ -11,10 +11,13 @@ from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 
 from ..clock import REAL_CLOCK, Clock
+from .errors import StartNotRecorded, StartOvertaken
 from .record import StartRecord, offer
-from .starts import StartNotRecorded, StartOvertaken, Starts
+from .starts import Starts
 
 if TYPE_CHECKING:
+    from tui.bus.api import ModbusLine
+    from tui.bus.shared_facts import SharedFacts
     from tui.drive.profile.profile import Profile
 
     from ..connect.identify import DriveIdentity
@@ -30,6 +33,7 @@ class Startable(Protocol):
     profile: Profile
     identity: DriveIdentity | None
     starts: StartKeeper | None
+    line: ModbusLine
 
     @property
     def line_text(self) -> str:
@@ -142,7 +146,8 @@ class StartKeeper:
 
     def look(self, session: Startable) -> None:
         """Find what an earlier program has started of this drive; reads files."""
-        found = self._starts.found(session.line_text, session.device)
+        absent = pids_absent(session.line.facts)
+        found = self._starts.found(session.line_text, session.device, absent)
         if found is not None:
             self._left = {**self._left, session.device: found}
 
@@ -175,6 +180,12 @@ class StartKeeper:
     def close(self) -> None:
         """Wait a moment for what is still to be written."""
         self._starts.close()
+
+
+def pids_absent(facts: SharedFacts) -> frozenset[int]:
+    """The numbers of programs that have left the line, frozen ones among them."""
+    here = {one.pid for one in facts.programs}
+    return frozenset({one.pid for one in facts.departed} - here)
 
 
 class NothingToTakeOver(DriveError):

@@ -11,17 +11,17 @@ import math
 import os
 import threading
 from collections import deque
+from collections.abc import Collection
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
-from tui.drive.errors import DriveError
-
 from ..clock import REAL_CLOCK, Clock
 from ..connect.known_lines import remembered_text
 from ..connect.line_key import line_key
 from ..paths import state_folder
+from .errors import OVERTAKEN, StartNotRecorded, StartOvertaken
 from .files import StartFiles
 from .processes import Processes
 from .record import StartRecord
@@ -33,30 +33,9 @@ log = logging.getLogger(__name__)
 
 START_PATIENCE = 5.0
 """Seconds that begin() waits for the disk; a slow memory card flushes in two."""
-OVERTAKEN = "a stop came first"
 
 DriveKey = tuple[str, int]
 """A line's text and a device: one program calls one line by one text."""
-
-
-class StartNotRecorded(DriveError):
-    """A start could not be put on record, so the motor is not to be started."""
-
-    def __init__(self, device: int, folder: Path, reason: str) -> None:
-        self.device, self.folder, self.reason = device, folder, reason
-        super().__init__(
-            f"The start of drive {device} was not recorded in {folder}: {reason}. Without a record "
-            "nobody knows after a crash that the motor was started from here. Make the folder "
-            "writable, or name another one in DRIVEPANEL_STATE."
-        )
-
-
-class StartOvertaken(StartNotRecorded):
-    """A stop came while the start was being recorded: the motor is not to be started at all."""
-
-    def __init__(self, device: int, folder: Path) -> None:
-        super().__init__(device, folder, OVERTAKEN)
-        self.args = (f"A stop of drive {device} came before its start, which is not sent.",)
 
 
 @dataclass(eq=False, slots=True)
@@ -196,15 +175,18 @@ class Starts:
                     task.done.set()
             self._take_away(drive)
 
-    def found(self, line: str, device: int) -> StartRecord | None:
+    def found(self, line: str, device: int, absent: Collection[int] = ()) -> StartRecord | None:
         """The last start of a drive if its program ended, however the line was typed.
 
         None where a living program, this one too, has a start of this drive on record.
         """
-        return next((one for one in self.all_found(line) if one.device == device), None)
+        return next((one for one in self.all_found(line, absent) if one.device == device), None)
 
-    def all_found(self, line: str) -> list[StartRecord]:
-        """The drives of a line that programs which ended have started, by device. Reads files."""
+    def all_found(self, line: str, absent: Collection[int] = ()) -> list[StartRecord]:
+        """The drives of a line that programs which ended have started, by device. Reads files.
+
+        `absent` are numbers of programs that count as ended: they left the line, or are frozen.
+        """
         key = line_key(line)
         with self._changed:
             tasks = [*self._waiting, *([self._current] if self._current else [])]
@@ -214,7 +196,7 @@ class Starts:
             if task.record is None and line_key(task.drive[0]) == key
         }
         here = [one for one in self._files.records() if line_key(one.line) == key]
-        alive = {one.device for one in here if self._lives(one)}
+        alive = {one.device for one in here if one.pid not in absent and self.is_alive(one)}
         here.sort(key=lambda one: one.begun.timestamp() if one.begun else 0.0)
         newest = {one.device: one for one in here if one.device not in alive | going}
         return [newest[device] for device in sorted(newest)]
@@ -299,12 +281,13 @@ class Starts:
             lambda one: (
                 one.device == device
                 and line_key(one.line) == key
-                and (self._own(one) or not self._lives(one))
+                and (self._own(one) or not self.is_alive(one))
             )
         )
 
     def _own(self, record: StartRecord) -> bool:
-        return record.pid == os.getpid() and self._lives(record)
+        return record.pid == os.getpid() and self.is_alive(record)
 
-    def _lives(self, record: StartRecord) -> bool:
+    def is_alive(self, record: StartRecord) -> bool:
+        """Whether the program of a start lives; in doubt it does."""
         return self._processes.lives(record.boot_id, record.pid, record.started)

@@ -1,0 +1,84 @@
+"""Programs on a line that are frozen, not gone: what they held is free, what they meant is void."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+
+import pytest
+
+from tui.bus.errors import LineError
+from tui.bus.share.client import STOOD_STILL
+
+from .conftest import Share
+from .peer import PtyPeer, eventually, honest
+from .sharing import frozen, knows
+
+RUN, OTHER = 15, 4
+
+
+def written(peer: PtyPeer) -> list[tuple[int, int]]:
+    """Device and value of every single write on the wire."""
+    return [(one[0], one[5]) for one in peer.requests if one[1] == 6]
+
+
+async def come(condition: Callable[[], bool]) -> None:
+    """Wait for something while the test's own tasks go on."""
+    await asyncio.to_thread(eventually, condition)
+
+
+async def test_a_client_that_is_frozen_counts_as_gone_and_commands_nothing_any_more(
+    share: Share,
+) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other, third = (lines.open(name) for name in ("watch", "run", "panel"))
+        gone: list[str] = []
+        denied: list[str] = []
+        owner.facts.on_gone(lambda program: gone.append(program.name))
+        other.facts.on_denied(lambda device, why: denied.append(f"{device}: {why}"))
+        assert other.facts.claim(1) == ""
+        eventually(lambda: owner.facts.commander(1) is not None)
+        with frozen(other):
+            run = asyncio.create_task(other.write(1, 1, [RUN]))
+            await come(lambda: gone == ["run"])
+            # whoever wants the drive gets it, and is not disturbed
+            await come(lambda: third.facts.commander(1) is None)
+            assert third.facts.claim(1) == ""
+            await third.write(1, 1, [OTHER])
+        with pytest.raises(LineError):
+            await run
+        await come(lambda: denied == [f"1: {STOOD_STILL}"])
+        await come(lambda: knows(owner, "run"))
+        assert written(peer) == [(1, OTHER)]
+        await come(lambda: other.facts.commander(1) == third.facts.me)
+        assert (await other.read(1, 5)).words == (5,)
+
+
+async def test_clients_of_an_owner_that_stood_still_itself_are_kept(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, other = lines.open("watch"), lines.open("run")
+        gone: list[str] = []
+        owner.facts.on_gone(lambda program: gone.append(program.name))
+        other.facts.claim(1)
+        eventually(lambda: owner.facts.commander(1) is not None)
+        with frozen(other):
+            with frozen(owner):
+                await asyncio.sleep(2.6)
+            # it has looked for a sign of life twice by now
+            await asyncio.sleep(0.5)
+        await other.read(1, 5)
+        await asyncio.sleep(0.5)
+        assert gone == []
+        assert owner.facts.commander(1) is not None
+
+
+async def test_a_client_that_has_nothing_to_say_is_kept(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        owner, _ = lines.open("watch"), lines.open("panel")
+        gone: list[str] = []
+        owner.facts.on_gone(lambda program: gone.append(program.name))
+        await asyncio.sleep(2.8)
+        assert gone == []

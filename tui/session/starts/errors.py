@@ -1,0 +1,29 @@
+"""What keeps a start from being put on record, and so the motor from being started."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from tui.drive.errors import DriveError
+
+OVERTAKEN = "a stop came first"
+
+
+class StartNotRecorded(DriveError):
+    """A start could not be put on record, so the motor is not to be started."""
+
+    def __init__(self, device: int, folder: Path, reason: str) -> None:
+        self.device, self.folder, self.reason = device, folder, reason
+        super().__init__(
+            f"The start of drive {device} was not recorded in {folder}: {reason}. Without a record "
+            "nobody knows after a crash that the motor was started from here. Make the folder "
+            "writable, or name another one in DRIVEPANEL_STATE."
+        )
+
+
+class StartOvertaken(StartNotRecorded):
+    """A stop came while the start was being recorded: the motor is not to be started at all."""
+
+    def __init__(self, device: int, folder: Path) -> None:
+        super().__init__(device, folder, OVERTAKEN)
+        self.args = (f"A stop of drive {device} came before its start, which is not sent.",)
