@@ -1,0 +1,152 @@
+"""Files of frames as tshark reads them, which the project did not write."""
+
+from __future__ import annotations
+
+import shlex
+import struct
+import subprocess
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.programs import PATIENCE
+from tui.wire.capture.forms import READ_RAW, ModbusTcpForm, PacketForm, RtuForm
+from tui.wire.capture.pcapng import interface_block, packet_block, section_block
+
+LINE = "serial:/dev/ttyUSB0,19200,8E1"
+WALL = 1_767_225_600.25
+EXCHANGES = [
+    (2, "030C810002", "030406 37 01A9"),
+    (3, "0621350006", "0621350006"),
+    (3, "1021350002040006 0007", "9002"),
+    (2, "2B0E0100", "2B0E010100000100 03 41 5456"),
+    (2, "17 0C81 0002 2135 0001 02 0006", "17 04 0637 01A9"),
+]
+BROADCAST = "0621350000"
+
+Peer = Callable[[str, str], str]
+
+
+def file_of(form: PacketForm, path: Path) -> Path:
+    """A file with exchanges of several functions, noise and a broadcast."""
+    blocks = [section_block("drivepanel"), interface_block(form.link_type, LINE)]
+    wall = WALL
+
+    def add(device: int, pdu: str, *, request: bool) -> None:
+        nonlocal wall
+        packet = form.of_frame(device, bytes.fromhex(pdu), request=request)
+        blocks.append(packet_block(packet.data, wall, packet.comment))
+        wall += 0.125
+
+    for device, request, reply in EXCHANGES:
+        add(device, request, request=True)
+        add(device, reply, request=False)
+    if noise := form.of_noise(b"\x00\xff"):
+        blocks.append(packet_block(noise.data, wall, noise.comment))
+    add(0, BROADCAST, request=True)
+    path.write_bytes(b"".join(blocks))
+    return path
+
+
+def told(program: str, path: Path, *options: str) -> str:
+    """What tshark says of a file."""
+    done = subprocess.run(
+        [program, *options, "-r", str(path)],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout
+
+
+def fields(program: str, path: Path, *names: str, options: tuple[str, ...] = ()) -> list[list[str]]:
+    """Fields of each packet, as tshark takes them out."""
+    wanted = [part for name in names for part in ("-e", name)]
+    text = told(program, path, *options, "-T", "fields", "-E", "separator=;", *wanted)
+    return [line.split(";") for line in text.splitlines()]
+
+
+def test_tshark_decodes_modbus_tcp_at_once(peer: Peer, tmp_path: Path) -> None:
+    path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
+    found = fields(
+        peer("tshark", "tshark"), path,
+        "_ws.col.Protocol", "mbtcp.unit_id", "mbtcp.trans_id", "modbus.func_code", "ip.dst",
+    )  # fmt: skip
+    assert {one[0] for one in found} == {"Modbus/TCP"}
+    sent = [one for one in found if one[4].startswith("192.0.2.")]
+    asked = [(d, int(request[:2], 16)) for d, request, _ in EXCHANGES]
+    assert [(int(one[1]), int(one[3])) for one in sent] == [*asked, (0, 6)]
+    assert [one[4] for one in sent] == [f"192.0.2.{one[1]}" for one in sent]
+    # a reply has the number of its request
+    assert [one[1:4] for one in found[0:-1:2]] == [one[1:4] for one in found[1::2]]
+
+
+def test_tshark_finds_the_values_and_no_fault_in_modbus_tcp(peer: Peer, tmp_path: Path) -> None:
+    path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
+    program = peer("tshark", "tshark")
+    checked = ("-o", "ip.check_checksum:TRUE", "-o", "tcp.check_checksum:TRUE")
+    assert told(program, path, *checked, "-Y", "_ws.malformed or tcp.analysis.flags") == ""
+    sums = fields(program, path, "ip.checksum.status", "tcp.checksum.status", options=checked)
+    assert {tuple(one) for one in sums} == {("1", "1")}
+    (values,) = [
+        one
+        for one in fields(program, path, "modbus.regnum16", "modbus.regval_uint16")
+        if one[0] == "3201,3202"
+    ]
+    assert values[1] == "1591,425"
+    (refused,) = [one for one in fields(program, path, "modbus.exception_code") if one[0]]
+    assert refused == ["2"]
+
+
+def test_times_line_and_noise_are_in_the_file(peer: Peer, tmp_path: Path) -> None:
+    path = file_of(ModbusTcpForm(), tmp_path / "frames.pcapng")
+    found = fields(
+        peer("tshark", "tshark"), path, "frame.time_epoch", "frame.interface_name", "frame.comment"
+    )
+    assert found[0] == ["1767225600.250000000", LINE, ""]
+    assert float(found[1][0]) == WALL + 0.125
+    assert found[-1][2] == "before it, no frame: 00 FF"
+
+
+def test_tshark_reads_raw_frames_as_it_is_told(peer: Peer, tmp_path: Path) -> None:
+    """By the very option that the command names, on a file with a checksum fault."""
+    program = peer("tshark", "tshark")
+    path = file_of(RtuForm(), tmp_path / "raw.pcapng")
+    _, *options, last, file = shlex.split(READ_RAW)
+    assert (last, file) == ("-r", "FILE")
+    names = ("_ws.col.Protocol", "mbrtu.unit_id", "mbrtu.crc16.status")
+    whole = fields(program, path, *names, options=tuple(options))[: 2 * len(EXCHANGES)]
+    asked = [[str(device)] * 2 for device, _, _ in EXCHANGES]
+    assert whole == [["Modbus RTU", device, "1"] for pair in asked for device in pair]
+    damaged = tmp_path / "damaged.pcapng"
+    damaged.write_bytes(path.read_bytes().replace(bytes.fromhex("0637"), b"\x06\x38", 1))
+    checked = fields(program, damaged, *names, options=tuple(options))
+    assert [one[2] for one in checked[:3]] == ["1", "0", "1"]
+
+
+def test_raw_packets_are_the_bytes_of_the_line() -> None:
+    form = RtuForm()
+    assert form.of_frame(1, bytes.fromhex("0318750005"), request=True).data.hex() == (
+        "010318750005" + "92b3"
+    )
+    noise = form.of_noise(b"\x01")
+    assert noise is not None
+    assert noise.data == b"\x01"
+
+
+@pytest.mark.parametrize("length", range(9))
+def test_every_block_is_whole_words_long_and_says_so_twice(length: int) -> None:
+    block = packet_block(bytes(length), WALL, "x" * length)
+    first, last = struct.unpack("<I", block[4:8])[0], struct.unpack("<I", block[-4:])[0]
+    assert first == last == len(block)
+    assert len(block) % 4 == 0
+
+
+def test_sequence_numbers_begin_anew_past_their_end() -> None:
+    form = ModbusTcpForm()
+    for _ in range(0x10001):
+        packet = form.of_frame(1, bytes.fromhex("0318750005"), request=True)
+    assert struct.unpack(">H", packet.data[40:42])[0] == 1

@@ -1,0 +1,126 @@
+"""Frames as packets: as Modbus/TCP, which every reader decodes, or as they went over the line.
+
+As Modbus/TCP each drive is a server of its own, at 192.0.2.N for the device N; that network, and
+that of the master, are those of documents and belong to nobody.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from typing import Protocol
+
+from ..frames import hex_text, sealed
+from .pcapng import LINK_IPV4, LINK_USER_0
+
+MASTER = bytes([198, 51, 100, 1])
+DRIVES = bytes([192, 0, 2])
+SERVER_PORT, FIRST_CLIENT_PORT = 502, 49152
+READ_RAW = (
+    'tshark -o \'uat:user_dlts:"User 0 (DLT=147)","mbrtu","0","","0",""\''
+    " -o mbrtu.crc_verification:TRUE -r FILE"
+)
+"""What decodes a file of raw frames; Wireshark has the same under DLT_USER."""
+_TCP, _PUSH_AND_ACK, _WINDOW, _TIME_TO_LIVE = 6, 0x18, 0xFFFF, 64
+_NO_FRAGMENTS = 0x4000
+
+
+@dataclass(frozen=True, slots=True)
+class Packet:
+    """One packet of a file, and what is said of it."""
+
+    data: bytes
+    comment: str = ""
+
+
+class PacketForm(Protocol):
+    """Makes packets of the frames of one line, in their order."""
+
+    link_type: int
+
+    def of_frame(self, device: int, pdu: bytes, *, request: bool) -> Packet:
+        """The packet of a whole frame: function and data, without the checksum."""
+        ...
+
+    def of_noise(self, data: bytes) -> Packet | None:
+        """The packet of bytes that form no frame; None where there is none for them."""
+        ...
+
+
+class RtuForm:
+    """Frames with their checksums, and what forms none, as bytes."""
+
+    link_type = LINK_USER_0
+
+    def of_frame(self, device: int, pdu: bytes, *, request: bool) -> Packet:
+        """The frame as it was on the line."""
+        return Packet(sealed(bytes([device]) + pdu))
+
+    def of_noise(self, data: bytes) -> Packet | None:
+        """The bytes as they were."""
+        return Packet(data, "forms no frame")
+
+
+@dataclass(slots=True)
+class _Connection:
+    """One master's connection to one drive: what each side has sent so far."""
+
+    device: int
+    transaction: int = 0
+    sent: dict[bool, int] = field(default_factory=lambda: {True: 1, False: 1})
+    """Bytes by whether they were of requests; they count from 1, as behind a first packet."""
+
+
+class ModbusTcpForm:
+    """Frames as Modbus/TCP: device id, transactions, one connection a drive."""
+
+    link_type = LINK_IPV4
+
+    def __init__(self) -> None:
+        self._connections: dict[int, _Connection] = {}
+        self._noise = b""
+
+    def of_frame(self, device: int, pdu: bytes, *, request: bool) -> Packet:
+        """The packet, with what lay before it and forms no frame in its comment."""
+        connection = self._connections.setdefault(device, _Connection(device))
+        if request:
+            connection.transaction = (connection.transaction + 1) & 0xFFFF
+        head = struct.pack(">HHHB", connection.transaction, 0, len(pdu) + 1, device)
+        noise, self._noise = self._noise, b""
+        comment = f"before it, no frame: {hex_text(noise)}" if noise else ""
+        return Packet(_ip(connection, head + pdu, request=request), comment)
+
+    def of_noise(self, data: bytes) -> Packet | None:
+        """None: the next packet tells of it."""
+        self._noise += data
+        return None
+
+
+def _ip(connection: _Connection, data: bytes, *, request: bool) -> bytes:
+    """The data with the headers of TCP and IPv4 before it."""
+    drive = DRIVES + bytes([connection.device])
+    ports = FIRST_CLIENT_PORT + connection.device, SERVER_PORT
+    if request:
+        places, (source, target) = MASTER + drive, ports
+    else:
+        places, (target, source) = drive + MASTER, ports
+    sent, received = connection.sent[request], connection.sent[not request]
+    connection.sent[request] = sent + len(data) & 0xFFFF_FFFF
+    fields = struct.pack(
+        ">HHIIBBHHH", source, target, sent, received, 5 << 4, _PUSH_AND_ACK, _WINDOW, 0, 0
+    )
+    pseudo = places + struct.pack(">BBH", 0, _TCP, len(fields) + len(data))
+    tcp = _with_sum(fields, 16, pseudo, data) + data
+    ip = struct.pack(">BBHHHBBH", 0x45, 0, 20 + len(tcp), 0, _NO_FRAGMENTS, _TIME_TO_LIVE, _TCP, 0)
+    return _with_sum(ip + places, 10) + tcp
+
+
+def _with_sum(head: bytes, at: int, before: bytes = b"", behind: bytes = b"") -> bytes:
+    """A header with its checksum at a place; the sum goes over what is around it, too."""
+    data = before + head + behind
+    data += bytes(len(data) % 2)
+    words: tuple[int, ...] = struct.unpack(f">{len(data) // 2}H", data)
+    total = sum(words)
+    while total > 0xFFFF:
+        total = (total & 0xFFFF) + (total >> 16)
+    return head[:at] + (~total & 0xFFFF).to_bytes(2, "big") + head[at + 2 :]
