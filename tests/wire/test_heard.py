@@ -1,0 +1,197 @@
+"""What others say on a line: bytes apart into frames, frames into exchanges."""
+
+from __future__ import annotations
+
+import random
+
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from tests.simulator.manual import FRAMES, Frame
+from tui.wire.frames import frame, is_whole, read_frame, read_write_frame, write_frame
+from tui.wire.heard.lengths import whole_length
+from tui.wire.heard.pairing import HeardExchange, Pairing
+from tui.wire.heard.splitting import FrameSplitter, HeardFrame
+
+CHARACTER = 11 / 19200
+WORD = st.integers(0, 0xFFFF)
+DEVICE = st.integers(1, 247)
+
+
+def reply_words(device: int, *words: int, function: int = 3) -> bytes:
+    """The reply of a read."""
+    return frame(
+        device,
+        bytes([function, 2 * len(words)]) + b"".join(word.to_bytes(2, "big") for word in words),
+    )
+
+
+def write_one(device: int, address: int, word: int) -> bytes:
+    return frame(device, b"\x06" + address.to_bytes(2, "big") + word.to_bytes(2, "big"))
+
+
+def split(*readings: bytes, every: float = 0.01, pause: bool = True) -> list[HeardFrame]:
+    """Frames of readings that come at an even pace."""
+    splitter = FrameSplitter(CHARACTER)
+    found = []
+    for number, data in enumerate(readings):
+        found += splitter.take(data, number * every)
+    return found + (splitter.pause() if pause else [])
+
+
+def heard(*readings: bytes, every: float = 0.01, until: float = 10.0) -> list[HeardExchange]:
+    """Exchanges of readings that come at an even pace, and then nothing."""
+    pairing = Pairing()
+    found = []
+    for one in split(*readings, every=every):
+        found += pairing.take(one)[0]
+    return found + pairing.wait(until)
+
+
+READ, WORDS = read_frame(2, 3201, 2), reply_words(2, 0x0637, 425)
+COMMAND = write_one(2, 8501, 6)
+REFUSED = frame(2, b"\x83\x02")
+BOTH = read_write_frame(2, 3201, 2, 8501, [6])
+BOTH_REPLY = reply_words(2, 0x0637, 425, function=23)
+IDENTIFY = frame(2, bytes.fromhex("2b0e0100"))
+IDENTITY = frame(2, bytes.fromhex("2b0e01010000010003") + b"ATV")
+UNKNOWN = frame(2, bytes([90, 1, 2, 3]))
+
+
+@given(
+    st.lists(
+        st.tuples(DEVICE, WORD, st.lists(WORD, min_size=1, max_size=60)), min_size=1, max_size=6
+    ),
+    st.randoms(use_true_random=False),
+)
+def test_reads_are_found_however_they_were_read(
+    reads: list[tuple[int, int, list[int]]], chance: random.Random
+) -> None:
+    frames = [
+        one
+        for device, address, words in reads
+        for one in (read_frame(device, address, len(words)), reply_words(device, *words))
+    ]
+    assume(not any(whole_length(one[:8]) for one in frames if len(one) > 8))
+    data = b"".join(frames)
+    cuts = sorted(chance.randrange(len(data) + 1) for _ in range(chance.randrange(8)))
+    readings = [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
+    found = split(*readings)
+    assert [one.data for one in found if one.whole] == frames
+    assert all(one.whole for one in found)
+
+
+def test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it() -> None:
+    reply = reply_words(160, 1040, 1040)
+    assert is_whole(reply[:-1])
+    assert [one.data for one in split(reply + READ)] == [reply, READ]
+
+
+@pytest.mark.parametrize("example", FRAMES, ids=lambda f: f"{f.family}-{f.number}")
+def test_every_frame_of_the_manuals_is_found(example: Frame) -> None:
+    (found,) = split(example.data)
+    assert (found.data, found.whole) == (example.data, True)
+
+
+@pytest.mark.parametrize(
+    "data", [READ, WORDS, COMMAND, REFUSED, BOTH, BOTH_REPLY, IDENTIFY, IDENTITY,
+             write_frame(2, 8501, [6, 7]), frame(2, bytes.fromhex("1000ff0002"))]
+)  # fmt: skip
+def test_each_kind_of_frame_is_found_byte_by_byte(data: bytes) -> None:
+    readings = [bytes([byte]) for byte in data + READ]
+    assert [one.data for one in split(*readings, every=CHARACTER)] == [data, READ]
+
+
+def test_a_function_that_is_not_known_ends_with_a_pause() -> None:
+    assert split(UNKNOWN, pause=False) == []
+    (found,) = split(UNKNOWN)
+    assert (found.data, found.whole) == (UNKNOWN, True)
+
+
+@given(st.binary(min_size=1, max_size=20))
+def test_noise_before_a_request_hides_it_no_longer_than_a_pause(noise: bytes) -> None:
+    found = split(noise, READ, WORDS)
+    assert b"".join(one.data for one in found) == noise + READ + WORDS
+    assert [one.data for one in found if one.whole][-2:] == [READ, WORDS]
+
+
+def test_a_cut_reply_does_not_take_the_next_request_with_it() -> None:
+    found = split(READ, WORDS[:5], READ, pause=False)
+    assert [(one.data, one.whole) for one in found] == [
+        (READ, True),
+        (WORDS[:5], False),
+        (READ, True),
+    ]
+
+
+def test_what_never_becomes_a_frame_is_given_up() -> None:
+    splitter = FrameSplitter()
+    noise = bytes([0x55, 0x55]) * 3000
+    given = b"".join(one.data for one in splitter.take(noise, 0.0))
+    assert len(given) > 4000
+    assert given + b"".join(one.data for one in splitter.pause()) == noise
+    assert not splitter.waiting
+
+
+def test_pauses_are_measured_where_readings_tell_them() -> None:
+    splitter = FrameSplitter(CHARACTER)
+    (request,) = splitter.take(READ, 1.0)
+    assert request.begun == pytest.approx(1.0 - 8 * CHARACTER)
+    reply = [*splitter.take(WORDS[:4], 1.010), *splitter.take(WORDS[4:], 1.020)]
+    assert reply[0].pause == pytest.approx(0.010 - 4 * CHARACTER)
+    assert reply[0].gap == pytest.approx(0.010 - 5 * CHARACTER)
+    together = splitter.take(READ + WORDS, 2.0)
+    assert [one.pause is None for one in together] == [False, True]
+
+
+def test_one_reading_of_several_frames_tells_no_gap() -> None:
+    assert [one.gap for one in split(READ + WORDS + READ)] == [0.0, 0.0, 0.0]
+
+
+def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]:
+    return [(one.device, one.function, one.answer) for one in heard(*readings, every=every)]
+
+
+@pytest.mark.parametrize(
+    ("readings", "told"),
+    [
+        ((READ, WORDS), [(2, 3, "ok")]),
+        ((READ + WORDS,), [(2, 3, "ok")]),
+        ((READ, REFUSED), [(2, 3, "exception")]),
+        ((READ,), [(2, 3, "none")]),
+        ((READ, READ, WORDS), [(2, 3, "none"), (2, 3, "ok")]),
+        ((READ, b"\x00\x01", READ, WORDS), [(2, 3, "damaged"), (2, 3, "ok")]),
+        ((COMMAND, COMMAND), [(2, 6, "ok")]),
+        ((COMMAND, COMMAND, COMMAND, COMMAND), [(2, 6, "ok"), (2, 6, "ok")]),
+        ((write_one(0, 8501, 6), READ, WORDS), [(0, 6, "broadcast"), (2, 3, "ok")]),
+        ((BOTH, BOTH_REPLY), [(2, 23, "ok")]),
+        ((IDENTIFY, IDENTITY), [(2, 43, "ok")]),
+        ((READ, WORDS, WORDS), [(2, 3, "ok"), (2, 3, "again")]),
+        ((COMMAND, COMMAND, COMMAND, READ, WORDS), [(2, 6, "ok"), (2, 6, "again"), (2, 3, "ok")]),
+        ((WORDS, READ, WORDS), [(2, 3, "unasked"), (2, 3, "ok")]),
+        # a late reply of one drive takes nothing from the one that is asked now
+        (
+            (READ, read_frame(3, 3201, 1), WORDS, reply_words(3, 7)),
+            [(2, 3, "none"), (2, 3, "unasked"), (3, 3, "ok")],
+        ),
+        # a reply of another length belongs to another request
+        ((READ, reply_words(2, 1)), [(2, 3, "unasked"), (2, 3, "none")]),
+    ],
+)
+def test_what_becomes_of_requests(
+    readings: tuple[bytes, ...], told: list[tuple[int, int, str]]
+) -> None:
+    assert answers(*readings) == told
+
+
+def test_a_write_that_is_sent_again_is_no_reply() -> None:
+    assert answers(COMMAND, COMMAND, every=0.5) == [(2, 6, "none"), (2, 6, "none")]
+
+
+def test_an_exchange_tells_its_times_and_its_words() -> None:
+    (one,) = heard(READ, WORDS, every=0.02)
+    assert one.turnaround == pytest.approx(0.02 - len(WORDS) * CHARACTER)
+    assert (one.request, one.reply) == (READ[1:-2], WORDS[1:-2])
+    (refused,) = heard(READ, REFUSED)
+    assert refused.exception == 2

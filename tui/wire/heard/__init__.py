@@ -1,0 +1,1 @@
+"""What others say on a serial line: bytes apart into frames, frames into exchanges."""

@@ -1,0 +1,104 @@
+"""How long a frame is by its first bytes, once as a request and once as a reply. Pure functions.
+
+Whoever listens does not know which of both it is, and a pause between frames is no measure: an
+adapter hands over what it has collected.
+"""
+
+from __future__ import annotations
+
+from ..frames import MAX_FRAME, MIN_FRAME, is_whole
+
+REFUSAL = 0x80
+"""Bit of the function in a reply that refuses."""
+IDENTIFICATION, IDENTIFICATION_KIND = 43, 14
+_CHECKSUM = 2
+_REQUESTS = {1: 8, 2: 8, 3: 8, 4: 8, 5: 8, 6: 8, 7: 4, 8: 8, 11: 4, 12: 4, 17: 4, 22: 10, 43: 7}
+_COUNTED_REQUESTS = {15: 6, 16: 6, 23: 10}
+"""By function, the place of the byte that counts what stands behind it."""
+_REPLIES = {5: 8, 6: 8, 7: 5, 8: 8, 11: 8, 15: 8, 16: 8, 22: 10}
+_COUNTED_REPLIES = {1: 2, 2: 2, 3: 2, 4: 2, 12: 2, 17: 2, 23: 2}
+_OBJECTS_FROM = 8
+"""Where the objects of an identification begin; the byte before counts them."""
+SAME_BOTH_WAYS = frozenset({5, 6, 8, 22})
+"""Functions whose reply is, or may be, the request once more."""
+
+Lengths = tuple[int, ...] | None
+"""What a frame may be long, or None where more of it has to come."""
+
+
+def request_lengths(head: bytes | bytearray) -> Lengths:
+    """Bytes of the request that begins so; none where no request does."""
+    if len(head) < 2:
+        return None
+    function = head[1]
+    if (place := _COUNTED_REQUESTS.get(function)) is not None:
+        return _counted(head, place)
+    return (_REQUESTS[function],) if function in _REQUESTS else ()
+
+
+def reply_lengths(head: bytes | bytearray) -> Lengths:
+    """Bytes of the reply that begins so; none where no reply does."""
+    if len(head) < 2:
+        return None
+    function = head[1]
+    if function & REFUSAL:
+        # a refused identification has its kind, or has it not
+        return (5, 6) if function & ~REFUSAL == IDENTIFICATION else (5,)
+    if function == IDENTIFICATION:
+        return _identification(head)
+    if (place := _COUNTED_REPLIES.get(function)) is not None:
+        return _counted(head, place)
+    return (_REPLIES[function],) if function in _REPLIES else ()
+
+
+def _counted(head: bytes | bytearray, place: int) -> Lengths:
+    return (place + 1 + head[place] + _CHECKSUM,) if len(head) > place else None
+
+
+def _identification(head: bytes | bytearray) -> Lengths:
+    """By the lengths of its objects."""
+    if len(head) < _OBJECTS_FROM:
+        return () if len(head) > 2 and head[2] != IDENTIFICATION_KIND else None
+    at = _OBJECTS_FROM
+    for _ in range(head[at - 1]):
+        if len(head) < at + 2:
+            return None
+        at += 2 + head[at + 1]
+        if at + _CHECKSUM > MAX_FRAME:
+            return ()
+    return (at + _CHECKSUM,)
+
+
+def whole_length(data: bytes | bytearray) -> int:
+    """Bytes of the whole frame that the data begins with, as its function has it; else 0."""
+    found = {*(request_lengths(data) or ()), *(reply_lengths(data) or ())}
+    # a frame whose checksum ends with a zero may be whole without that, too
+    for length in sorted(found, reverse=True):
+        if MIN_FRAME <= length <= min(len(data), MAX_FRAME) and is_whole(data[:length]):
+            return length
+    return 0
+
+
+def may_grow(data: bytes | bytearray) -> bool:
+    """Whether a frame that begins so may still be whole once more of it has come."""
+    if len(data) >= MAX_FRAME:
+        return False
+    both = request_lengths(data), reply_lengths(data)
+    if None in both or both == ((), ()):
+        return True  # a function that is not known here ends with a pause only
+    return any(length > len(data) for lengths in both for length in lengths or ())
+
+
+def fits_request(frame: bytes) -> bool:
+    """Whether a whole frame is as long as a request of its function."""
+    return _fits(request_lengths(frame), frame)
+
+
+def fits_reply(frame: bytes) -> bool:
+    """Whether a whole frame is as long as a reply of its function."""
+    return _fits(reply_lengths(frame), frame)
+
+
+def _fits(lengths: Lengths, frame: bytes) -> bool:
+    # of a function that is not known here either may be
+    return (lengths == () and not frame[1] & REFUSAL) or len(frame) in (lengths or ())

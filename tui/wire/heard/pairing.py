@@ -1,0 +1,164 @@
+"""Frames that were heard, matched: which reply belongs to which request. No clock, no port.
+
+On a serial line a request and its reply may be the same bytes, and nobody says who has sent them:
+what stands here goes by who was asked last, and how long ago.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from .lengths import REFUSAL, SAME_BOTH_WAYS, fits_reply, fits_request
+from .splitting import HeardFrame
+
+HeardAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
+"""What became of a request: `again` is a second reply, `unasked` one to no request."""
+BROADCAST_DEVICE = 0
+GIVEN_UP_AFTER = 3.0
+"""Seconds after which a request counts as not answered, though no other follows it."""
+REPLY_WITHIN = 0.25
+"""Seconds in which a reply that may as well be its request once more counts as a reply."""
+AGAIN_WITHIN = 0.05
+"""Seconds in which a write like the one before, which nobody answers, is a second reply."""
+_ECHOED = {15: 5, 16: 5}
+"""Bytes that the reply of a function has from its request, function included."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeardExchange:
+    """A request with what became of it; requests and replies without device and checksum."""
+
+    time: float
+    """When the request began, of the listener's clock; of an unasked reply when that began."""
+    device: int
+    function: int
+    answer: HeardAnswer
+    request: bytes = b""
+    reply: bytes = b""
+    turnaround: float | None = None
+    """Seconds from the end of the request to the beginning of the reply."""
+    noise: bytes = b""
+    """Bytes behind the request that form no frame."""
+
+    @property
+    def exception(self) -> int | None:
+        """The code with which the device refuses."""
+        return self.reply[-1] if self.answer == "exception" else None
+
+
+@dataclass(slots=True)
+class _Asked:
+    frame: HeardFrame
+    noise: bytes = b""
+
+
+class Pairing:
+    """Takes frames in their order, gives exchanges as soon as it is known what became of each."""
+
+    def __init__(self) -> None:
+        self._asked: _Asked | None = None
+        self._last: HeardExchange | None = None
+        self._replied = float("-inf")
+        """When the last reply ended."""
+        self._reply = b""
+        """The last reply as it was on the line."""
+
+    def take(self, frame: HeardFrame) -> tuple[list[HeardExchange], bool | None]:
+        """A frame; what is known by it, and whether it is a request (None of noise)."""
+        if not frame.whole:
+            if self._asked is not None:
+                self._asked.noise += frame.data
+            return [], None
+        asked = self._asked
+        if asked is not None and _answers(asked.frame, frame):
+            return [self._answered(asked, frame)], False
+        if not fits_request(frame.data):
+            return [self._stray(frame)], False  # the reply that is due may still come
+        found = self._given_up()
+        if frame.device == BROADCAST_DEVICE:
+            return [*found, self._kept(_exchange(frame, "broadcast"))], True
+        self._asked = _Asked(frame)
+        return found, True
+
+    def wait(self, now: float) -> list[HeardExchange]:
+        """The time is `now`, and nothing has come: what no answer will come to any more."""
+        if self._asked is None or now - self._asked.frame.ended < GIVEN_UP_AFTER:
+            return []
+        return self._given_up()
+
+    def _answered(self, asked: _Asked, frame: HeardFrame) -> HeardExchange:
+        self._asked = None
+        self._replied, self._reply = frame.ended, frame.data
+        refused = bool(frame.function & REFUSAL)
+        return self._kept(
+            HeardExchange(
+                asked.frame.begun,
+                frame.device,
+                asked.frame.function,
+                "exception" if refused else "ok",
+                asked.frame.pdu,
+                frame.pdu,
+                max(0.0, frame.begun - asked.frame.ended),
+                asked.noise,
+            )
+        )
+
+    def _given_up(self) -> list[HeardExchange]:
+        """The request that is open, without an answer."""
+        asked, self._asked = self._asked, None
+        if asked is None:
+            return []
+        frame = asked.frame
+        # a second drive at the same address says the same a moment later
+        if frame.data == self._reply and frame.begun - self._replied < AGAIN_WITHIN:
+            return [self._again(frame)]
+        answer: HeardAnswer = "damaged" if asked.noise else "none"
+        return [self._kept(_exchange(frame, answer, asked.noise))]
+
+    def _stray(self, frame: HeardFrame) -> HeardExchange:
+        """A reply that nobody waits for."""
+        last = self._last
+        same = last is not None and last.answer in ("ok", "exception", "again")
+        function = frame.function & ~REFUSAL
+        if same and last is not None and (last.device, last.function) == (frame.device, function):
+            return self._again(frame)
+        return HeardExchange(frame.begun, frame.device, function, "unasked", b"", frame.pdu)
+
+    def _again(self, frame: HeardFrame) -> HeardExchange:
+        last = self._last
+        assert last is not None
+        return HeardExchange(
+            frame.begun, frame.device, last.function, "again", last.request, frame.pdu
+        )
+
+    def _kept(self, exchange: HeardExchange) -> HeardExchange:
+        self._last = exchange
+        return exchange
+
+
+def _exchange(frame: HeardFrame, answer: HeardAnswer, noise: bytes = b"") -> HeardExchange:
+    return HeardExchange(frame.begun, frame.device, frame.function, answer, frame.pdu, noise=noise)
+
+
+def _answers(asked: HeardFrame, frame: HeardFrame) -> bool:
+    """Whether a frame is the reply to a request, refusals too."""
+    if frame.device != asked.device or frame.function & ~REFUSAL != asked.function:
+        return False
+    if frame.function & REFUSAL:
+        return True
+    if not fits_reply(frame.data):
+        return False
+    function = frame.function
+    if function in SAME_BOTH_WAYS:
+        return frame.pdu[:3] == asked.pdu[:3] and not _repeated(asked, frame)
+    if function in (3, 4, 23):
+        return len(frame.pdu) == 2 + 2 * int.from_bytes(asked.pdu[3:5], "big")
+    if (count := _ECHOED.get(function)) is not None:
+        return frame.pdu[:count] == asked.pdu[:count]
+    return not _repeated(asked, frame)
+
+
+def _repeated(asked: HeardFrame, frame: HeardFrame) -> bool:
+    """Whether a master that got no answer has sent the same once more."""
+    return frame.data == asked.data and frame.begun - asked.ended > REPLY_WITHIN

@@ -1,0 +1,161 @@
+"""Bytes that were heard on a line, taken apart into frames of whatever master. No clock, no port.
+
+Frames are found by the length that their function has, and their checksum. Where that leads
+nowhere (noise, a cut frame, a function that is not known here), the next frame is looked for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from ..frames import MAX_FRAME, MIN_FRAME, is_whole
+from .lengths import may_grow, whole_length
+
+LONGEST_HEAP = 4 * MAX_FRAME
+"""Bytes without a frame that are kept at most, waiting for a pause."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeardFrame:
+    """A frame, or bytes that form none; times are those of the listener's clock, in seconds."""
+
+    begun: float
+    ended: float
+    data: bytes
+    whole: bool
+    pause: float | None = None
+    """Silence before it; None where it came in one reading with what was before."""
+    gap: float = 0.0
+    """The longest silence between two of its bytes, as far as readings tell."""
+
+    @property
+    def device(self) -> int:
+        """The first byte of a whole frame."""
+        return self.data[0]
+
+    @property
+    def function(self) -> int:
+        """The second byte of a whole frame."""
+        return self.data[1]
+
+    @property
+    def pdu(self) -> bytes:
+        """Function and data of a whole frame."""
+        return self.data[1:-2]
+
+
+@dataclass(slots=True)
+class _Chunk:
+    """Bytes of one reading that are left; when the first began and the last ended."""
+
+    length: int
+    begun: float
+    ended: float
+    fresh: bool = True
+    """Whether none of it was given yet."""
+
+    def give(self, count: int) -> float:
+        """Take bytes from its beginning; when the last of them ended."""
+        each = (self.ended - self.begun) / self.length
+        self.length -= count
+        self.begun = self.ended if not self.length else self.begun + count * each
+        self.fresh = False
+        return self.begun
+
+
+class FrameSplitter:
+    """Takes readings of a line, gives frames; `character` is what a byte takes, in seconds.
+
+    With a `character` of 0 all bytes of a reading count as of one moment.
+    """
+
+    def __init__(self, character: float = 0.0) -> None:
+        self._character = character
+        self._data = bytearray()
+        self._chunks: list[_Chunk] = []
+        self._ended = float("-inf")
+        """When the last byte that was read had ended."""
+        self._given: float | None = None
+        """When the last frame that was given had ended."""
+
+    @property
+    def waiting(self) -> bool:
+        """Whether there are bytes that form no frame yet."""
+        return bool(self._data)
+
+    def take(self, data: bytes, time: float) -> list[HeardFrame]:
+        """Bytes that were read at a time; the frames that are whole by now."""
+        if data:
+            self._data += data
+            begun = max(self._ended, time - len(data) * self._character)
+            self._chunks.append(_Chunk(len(data), min(begun, time), time))
+            self._ended = time
+        return self._frames(final=False)
+
+    def pause(self) -> list[HeardFrame]:
+        """The line has been silent for long: no frame goes on, so all that is left is given."""
+        return self._frames(final=True)
+
+    def _frames(self, *, final: bool) -> list[HeardFrame]:
+        found = []
+        while self._data:
+            whole, length = self._last() if final else self._next()
+            if not length:
+                break
+            found.append(self._cut(length, whole=whole))
+        return found
+
+    def _next(self) -> tuple[bool, int]:
+        """Whether a frame or noise is at the beginning, and how much; 0 where it is not known."""
+        if length := whole_length(self._data):
+            return True, length
+        start = self._frame_of_its_own() if may_grow(self._data) else self._frame_behind()
+        if not start and len(self._data) > LONGEST_HEAP:
+            start = len(self._data) - MAX_FRAME
+        return False, start
+
+    def _last(self) -> tuple[bool, int]:
+        """The same where nothing more comes."""
+        if length := whole_length(self._data):
+            return True, length
+        if start := self._frame_behind():
+            return False, start
+        # a function that is not known here: between two pauses, with a right checksum
+        whole = MIN_FRAME <= len(self._data) <= MAX_FRAME and is_whole(self._data)
+        return whole and self._chunks[0].fresh, len(self._data)
+
+    def _frame_behind(self) -> int:
+        """Where the next whole frame begins; 0 where there is none."""
+        starts = range(1, len(self._data) - MIN_FRAME + 1)
+        return next((at for at in starts if whole_length(self._data[at:])), 0)
+
+    def _frame_of_its_own(self) -> int:
+        """Where a frame begins that readings begin and end with, so that it is no part of another.
+
+        Returns 0 where there is none.
+        """
+        at = 0
+        for chunk in self._chunks[:-1]:
+            at += chunk.length
+            if whole_length(self._data[at:]) == len(self._data) - at:
+                return at
+        return 0
+
+    def _cut(self, length: int, *, whole: bool) -> HeardFrame:
+        """Give so many bytes from the beginning."""
+        data = bytes(self._data[:length])
+        del self._data[:length]
+        first = self._chunks[0]
+        begun, ended, gap = first.begun, first.begun, 0.0
+        pause = begun - self._given if first.fresh and self._given is not None else None
+        while length:
+            chunk = self._chunks[0]
+            if chunk is not first:
+                gap = max(gap, chunk.begun - ended)
+            taken = min(length, chunk.length)
+            ended = chunk.give(taken)
+            length -= taken
+            if not chunk.length:
+                self._chunks.pop(0)
+        self._given = ended
+        return HeardFrame(begun, ended, data, whole, pause, gap)
