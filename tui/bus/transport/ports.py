@@ -164,21 +164,22 @@ def _open(path: str, baud: int, format_: str, *, alone: bool) -> serial.Serial:
             exclusive=alone or None,
         )
     except (OSError, ValueError) as error:
-        raise _port_error(path, baud, format_, error) from error
+        raise port_error(path, baud, format_, error) from error
     except Exception as error:
         # termios.error is neither an OSError nor there on every system
         if type(error).__name__ != "error":
             raise
-        raise _port_error(path, baud, format_, error) from error
+        raise port_error(path, baud, format_, error) from error
     # USB adapters collect bytes for 16 ms unless told not to; not every driver knows that
     with suppress(OSError, ValueError, NotImplementedError, AttributeError):
         port.set_low_latency_mode(True)
     return port
 
 
-def _port_error(
+def port_error(
     path: str, baud: int, format_: str, error: Exception
 ) -> PortBusy | PortMissing | PortRefused:
+    """What a person is told where a port could not be opened so."""
     number = getattr(error, "errno", None)
     text = str(error)
     if number in BUSY:

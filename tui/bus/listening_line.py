@@ -1,0 +1,87 @@
+"""A serial line that is listened to while others talk on it; nothing is ever sent."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from types import TracebackType
+from typing import Self
+
+from .errors import NotShared, PortBusy
+from .link import SerialLink, character_time, silence
+from .program import Program
+from .share.messages import VERSION
+from .share.place import Owner, OwnerLock, SharePlace, owner_of
+from .transport.ports import is_pseudo_terminal
+from .transport.serial_listening import ListeningPort, open_listening, others_at
+
+
+class ListeningLine:
+    """The port of a line, for this program alone, and open for reading only.
+
+    Opened by `with`. Raises NotShared where another drivepanel has the line, PortBusy, PortMissing,
+    PortRefused.
+    """
+
+    def __init__(self, link: SerialLink, place: SharePlace | None, program: Program) -> None:
+        self.link = link
+        self.has_times = not is_pseudo_terminal(link.path)
+        """Whether pauses can be told from what the port hands over."""
+        self._lock = OwnerLock(place) if place is not None else None
+        self._place = place
+        self._program = program
+        self._port: ListeningPort | None = None
+
+    @property
+    def character(self) -> float:
+        """Seconds that a byte takes; 0 where bytes take none."""
+        return character_time(self.link) if self.has_times else 0.0
+
+    @property
+    def silence(self) -> float:
+        """Seconds of silence that have to lie between two frames."""
+        return silence(self.link)
+
+    def __enter__(self) -> Self:
+        self._own()
+        try:
+            if others := others_at(self.link.path):
+                raise PortBusy(self.link.path, others)
+            self._port = open_listening(self.link.path, self.link.baud, self.link.format)
+        except BaseException:
+            self._give_back()
+            raise
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        if self._port is not None:
+            self._port.close()
+            self._port = None
+        self._give_back()
+
+    def read(self, wait: float) -> bytes:
+        """Bytes that have come; empty where none do within `wait` seconds. Raises LineLost."""
+        return self._port.read(wait) if self._port is not None else b""
+
+    def _own(self) -> None:
+        """Keep every other drivepanel from the line, as an owner does that takes nobody in."""
+        if self._lock is None or self._place is None:
+            return
+        with suppress(OSError):  # without a lock the port itself is locked
+            if self._lock.take():
+                self._lock.tell(Owner(VERSION, self._program, ""))
+                return
+            owner = owner_of(self._place)
+            who = f"drivepanel {owner.program.text}" if owner is not None else "another drivepanel"
+            raise NotShared(
+                f"{who} has {self.link.path}, and a port that is listened to can have no other"
+                " user. Its Frames screen shows what goes over the line."
+            )
+
+    def _give_back(self) -> None:
+        if self._lock is not None:
+            self._lock.give_back()
