@@ -40,6 +40,8 @@ class HeardExchange:
     """Seconds from the end of the request to the beginning of the reply."""
     noise: bytes = b""
     """Bytes behind the request that form no frame."""
+    waited: float | None = None
+    """Seconds from the end of a request that was not answered to the next request."""
 
     @property
     def exception(self) -> int | None:
@@ -75,7 +77,7 @@ class Pairing:
             return [self._answered(asked, frame)], False
         if not fits_request(frame.data):
             return [self._stray(frame)], False  # the reply that is due may still come
-        found = self._given_up()
+        found = self._given_up(frame)
         if frame.device == BROADCAST_DEVICE:
             return [*found, self._kept(_exchange(frame, "broadcast"))], True
         self._asked = _Asked(frame)
@@ -104,8 +106,8 @@ class Pairing:
             )
         )
 
-    def _given_up(self) -> list[HeardExchange]:
-        """The request that is open, without an answer."""
+    def _given_up(self, following: HeardFrame | None = None) -> list[HeardExchange]:
+        """The request that is open, without an answer; `following` is the next request."""
         asked, self._asked = self._asked, None
         if asked is None:
             return []
@@ -114,7 +116,8 @@ class Pairing:
         if frame.data == self._reply and frame.begun - self._replied < AGAIN_WITHIN:
             return [self._again(frame)]
         answer: HeardAnswer = "damaged" if asked.noise else "none"
-        return [self._kept(_exchange(frame, answer, asked.noise))]
+        waited = max(0.0, following.begun - frame.ended) if following is not None else None
+        return [self._kept(_exchange(frame, answer, asked.noise, waited))]
 
     def _stray(self, frame: HeardFrame) -> HeardExchange:
         """A reply that nobody waits for."""
@@ -137,8 +140,13 @@ class Pairing:
         return exchange
 
 
-def _exchange(frame: HeardFrame, answer: HeardAnswer, noise: bytes = b"") -> HeardExchange:
-    return HeardExchange(frame.begun, frame.device, frame.function, answer, frame.pdu, noise=noise)
+def _exchange(
+    frame: HeardFrame, answer: HeardAnswer, noise: bytes = b"", waited: float | None = None
+) -> HeardExchange:
+    """An exchange that came to no reply."""
+    return HeardExchange(
+        frame.begun, frame.device, frame.function, answer, frame.pdu, noise=noise, waited=waited
+    )
 
 
 def _answers(asked: HeardFrame, frame: HeardFrame) -> bool:

@@ -1,0 +1,355 @@
+"""What others say on a line, told by drives, codes and values, and summed up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import pytest
+
+from tests.wire.test_heard import (
+    COMMAND,
+    IDENTIFY,
+    READ,
+    REFUSED,
+    WORDS,
+    reply_words,
+    write_one,
+)
+from tui.bus.link import SerialLink
+from tui.drive.profile import library
+from tui.drive.read_plan import WireTiming
+from tui.session.connect.known_lines import DriveMark, LineMark, LinesMemory, keep_memory
+from tui.session.listening.families import Families, known_profiles, remembered_families
+from tui.session.listening.listener import LineListener, ToldExchange
+from tui.session.listening.summary import ListeningSummary, summary_lines, summary_of
+from tui.session.listening.telling import exchange_text, names_asked
+from tui.wire.frames import frame, read_frame, read_write_frame, write_frame
+
+CHARACTER = 11 / 19200
+SILENCE = 3.5 * CHARACTER
+TIMING = WireTiming()
+PROFILES = known_profiles()
+
+
+class Heard:
+    """A listener, and readings that come one after the other."""
+
+    def __init__(self, families: Families | None = None, *, times: bool = True) -> None:
+        self.families = families or Families(PROFILES)
+        character = CHARACTER if times else 0.0
+        self.listener = LineListener(self.families, 0.0, character=character, silence=SILENCE)
+        self.now = 0.0
+        self.told: list[ToldExchange] = []
+
+    def say(self, *readings: bytes, every: float = 0.02) -> Heard:
+        """Readings at an even pace."""
+        for data in readings:
+            self.now += every
+            self.told += self.listener.take(data, self.now)
+        return self
+
+    def rest(self, seconds: float = 5.0) -> Heard:
+        """Nothing comes for so long."""
+        self.now += seconds
+        self.told += self.listener.idle(self.now)
+        return self
+
+    @property
+    def texts(self) -> list[str]:
+        return [exchange_text(one, self.families) for one in self.told]
+
+    @property
+    def summary(self) -> ListeningSummary:
+        return summary_of(self.listener, self.now, TIMING)
+
+    @property
+    def lines(self) -> str:
+        return "\n".join(summary_lines(self.summary))
+
+
+def named(*profile_ids: str) -> Families:
+    """Families of the devices 1, 2 ..., as a person names them."""
+    return Families(PROFILES, {n: library.load(id) for n, id in enumerate(profile_ids, start=1)})
+
+
+def values(told: ToldExchange) -> dict[str, str]:
+    return {one.code: one.value.display for one in told.values}
+
+
+BOTH = read_write_frame(2, 3201, 2, 8501, [6])
+BOTH_REPLY = reply_words(2, 0x0637, 425, function=23)
+
+
+@pytest.mark.parametrize(
+    ("readings", "text"),
+    [
+        ((READ, WORDS), "  2 read   ETA 16#0637 · RFR 42.5 Hz"),
+        ((COMMAND, COMMAND), "  2 write  CMD ← 16#0006"),
+        ((write_frame(2, 8501, [6, 425]), frame(2, bytes.fromhex("1021350002"))),
+         "  2 write  CMD ← 16#0006 · LFR ← 42.5 Hz"),
+        ((BOTH, BOTH_REPLY), "  2 read and write CMD ← 16#0006 · ETA 16#0637 · RFR 42.5 Hz"),
+        ((READ, REFUSED), "  2 read   ETA RFR: exception 2,"),
+        ((READ,), "  2 read   ETA RFR: no answer"),
+        ((READ, b"\x07\x07"), "  2 read   ETA RFR: damaged answer"),
+        ((read_frame(2, 1, 1), reply_words(2, 7)), "  2 read   1 16#0007"),
+        ((READ, WORDS, WORDS), "  2 read   a second answer to the same request"),
+        ((frame(0, bytes.fromhex("0621350000")),), "all write  8501 ← 16#0000"),
+        ((frame(2, bytes.fromhex("0800001234")), frame(2, bytes.fromhex("0800001234"))),
+         "  2 diagnostics"),
+    ],
+)  # fmt: skip
+def test_an_exchange_in_words(readings: tuple[bytes, ...], text: str) -> None:
+    found = Heard(named("atv31", "atv71")).say(*readings).rest().texts
+    assert any(one.startswith(text) for one in found), found
+
+
+def test_what_a_drive_says_of_itself_commands_no_terminal() -> None:
+    identity = frame(2, bytes.fromhex("2b0e0102000001010a") + b"\x1b[2JATV71H")
+    (text,) = Heard().say(IDENTIFY, identity).texts
+    assert "\x1b" not in text
+    assert "␛[2JATV71H" in text
+
+
+def test_values_that_were_refused_or_not_confirmed_are_none() -> None:
+    heard = Heard(named("atv31", "atv71")).say(COMMAND, frame(2, b"\x86\x03"), COMMAND).rest()
+    assert [one.values for one in heard.told] == [(), ()]
+    assert [names_asked(one) for one in heard.told] == [["CMD"], ["CMD"]]
+
+
+def test_a_family_is_that_of_the_option_then_of_the_drive_then_the_remembered() -> None:
+    identity = frame(2, bytes.fromhex("2b0e01010000010105") + b"ATV71")
+    asked = (IDENTIFY, identity, READ, WORDS)
+    taken = {
+        how: Heard(families).say(*asked).told[-1].family
+        for how, families in {
+            "named": Families(PROFILES, {None: library.load("atv31")}, {2: "atv312"}),
+            "identified": Families(PROFILES, {1: library.load("atv31")}, {2: "atv312"}),
+        }.items()
+    }
+    assert {how: one.how for how, one in taken.items() if one} == {k: k for k in taken}
+    assert [one.profile.id for one in taken.values() if one] == ["atv31", "atv71"]
+    remembered = Heard(Families(PROFILES, None, {2: "atv312"})).say(READ, WORDS).told[-1].family
+    assert remembered is not None
+    assert (remembered.how, remembered.profile.id) == ("remembered", "atv312")
+
+
+def test_what_is_remembered_of_a_line_names_its_drives(tmp_path: object) -> None:
+    link = SerialLink("/dev/ttyS9")
+    drives = {1: DriveMark(profile="atv312"), 2: DriveMark(reference="ATV71HU15M3")}
+    keep_memory(LinesMemory({"serial:/dev/ttyS9": LineMark(drives={**drives, 3: DriveMark()})}))
+    assert remembered_families(link) == {1: "atv312", 2: "atv71"}
+    assert remembered_families(SerialLink("/dev/ttyS8")) == {}
+
+
+def reads_of(profile_id: str, codes: Iterable[str]) -> list[bytes]:
+    """Single reads of parameters with their replies."""
+    profile = library.load(profile_id)
+    found = []
+    for code in codes:
+        one = profile[code]
+        found += [
+            frame(2, bytes([one.function, *one.address.to_bytes(2, "big"), 0, 1])),
+            reply_words(2, 1, function=one.function),
+        ]
+    return found
+
+
+@pytest.mark.parametrize(
+    ("profile_id", "codes", "others"),
+    [
+        ("atv21", ("FD01", "FD00", "FA01"), ()),
+        ("atv71", ("ETA", "RFR", "UOP", "THR1"), ()),
+        ("powerdrive", ("10.40", "1.21"), None),
+    ],
+)
+def test_a_family_is_likely_by_what_the_drive_answers(
+    profile_id: str, codes: tuple[str, ...], others: tuple[str, ...] | None
+) -> None:
+    family = Heard().say(*reads_of(profile_id, codes)).told[-1].family
+    assert family is not None
+    assert family.how == "likely"
+    if others is not None:
+        assert (family.profile.id, family.others) == (profile_id, others)
+    else:
+        assert profile_id in (family.profile.id, *family.others)
+
+
+def test_families_that_fit_as_well_are_named() -> None:
+    heard = Heard().say(READ, WORDS)
+    family = heard.told[-1].family
+    assert family is not None
+    assert {family.profile.id, *family.others} == {"atv31", "atv312", "atv71"}
+    assert f"(likely, or {', '.join(family.others)})" in heard.lines
+
+
+def test_a_read_longer_than_a_family_answers_is_of_another() -> None:
+    words = [0] * 40
+    heard = Heard().say(read_frame(2, 3201, 40), reply_words(2, *words))
+    family = heard.told[-1].family
+    assert family is None or family.profile.id == "atv71"
+
+
+def test_nothing_is_likely_where_nothing_fits() -> None:
+    heard = Heard().say(read_frame(2, 60000, 1), reply_words(2, 7))
+    assert heard.told[-1].family is None
+    assert "Device 2: family not known; -p names it" in heard.lines
+
+
+def cycle(heard: Heard, times: int, *readings: bytes, every: float = 0.02) -> Heard:
+    for _ in range(times):
+        heard.say(*readings, every=every)
+    return heard
+
+
+def test_who_commands_and_who_only_reads() -> None:
+    heard = Heard(named("atv71", "atv71"))
+    run = [write_one(1, 8501, 0x000F)] * 2 + [write_one(1, 8502, 425)] * 2
+    cycle(heard, 3, *run, READ, WORDS)
+    first, second = heard.summary.drives
+    assert (first.tally.commanded, second.tally.commanded) == (True, False)
+    assert "commanded by the master: CMD 16#000F every 0.12 s, LFR 42.5 Hz every" in heard.lines
+    assert "read only: the master on this line does not command it" in heard.lines
+
+
+def test_a_setting_is_written_and_commands_nothing() -> None:
+    heard = Heard(named("atv71", "atv71")).say(*[write_one(2, 9001, 30)] * 2)
+    (drive,) = heard.summary.drives
+    assert not drive.tally.commanded
+    assert "  written: ACC 30 raw once" in heard.lines
+
+
+def test_how_often_a_drive_is_asked() -> None:
+    heard = cycle(Heard(named("atv71", "atv71")), 11, READ, WORDS, every=0.05)
+    (drive,) = heard.summary.drives
+    assert drive.pace == pytest.approx(10.0)
+    assert drive.tally.longest_pause == pytest.approx(0.1)
+    assert "asked 10.0 times a second, longest pause 0.10 s" in heard.lines
+
+
+@pytest.mark.parametrize(
+    ("pause", "told"),
+    [(2.0, "TTO 3 s (as heard): fed, 0.9"), (4.0, "TTO 3 s (as heard): NOT FED")],
+)
+def test_whether_the_time_out_is_fed(pause: float, told: str) -> None:
+    heard = Heard(named("atv71", "atv71")).say(COMMAND, COMMAND)
+    place = library.load("atv71")["TTO"].address
+    heard.say(read_frame(2, place, 1), reply_words(2, 30), READ, WORDS)
+    heard.now += pause
+    assert told in heard.say(READ, WORDS).lines
+    (drive,) = heard.summary.drives
+    assert drive.feeding is not None
+    assert drive.feeding.fed is (pause < 3)
+
+
+def test_a_pause_that_goes_on_counts_too() -> None:
+    heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
+    assert "factory setting; its own was not heard): fed" in heard.lines
+    assert "NOT FED" in heard.rest(11.0).lines
+
+
+def test_a_time_out_that_begins_with_a_command_is_none_before() -> None:
+    heard = Heard(named("atv71", "atv71")).say(READ, WORDS)
+    assert "begins with a first command, and none was heard" in heard.lines
+
+
+def test_a_request_that_is_not_answered_feeds_nobody() -> None:
+    heard = Heard(named("atv312", "atv312")).say(READ, WORDS)
+    cycle(heard, 6, READ, every=2.0)
+    assert "NOT FED" in heard.lines
+
+
+def test_two_drives_at_one_address_are_told() -> None:
+    heard = cycle(Heard(named("atv71", "atv71")), 3, READ, WORDS, WORDS)
+    assert "ANSWERED TWICE 3 times: do two devices have the address 2?" in heard.lines
+
+
+def test_exceptions_and_silence_are_told() -> None:
+    heard = Heard(named("atv71", "atv71")).say(READ, WORDS, READ, REFUSED, READ, REFUSED)
+    heard.say(read_frame(9, 3201, 1)).rest()
+    assert "refused 2 times: exception 2, " in heard.lines
+    assert "Device 9: family not known; -p names it\n  no answer to 1 request" in heard.lines
+
+
+def test_a_second_master_is_suspected_where_requests_cross() -> None:
+    heard = cycle(Heard(), 3, READ + read_frame(3, 3201, 1), reply_words(3, 7))
+    assert "A SECOND MASTER? 3 requests began while another waited" in heard.lines
+    patient = cycle(Heard(), 3, READ, read_frame(3, 3201, 1), reply_words(3, 7), every=0.1)
+    assert "SECOND MASTER" not in patient.lines
+
+
+def test_broken_frames_and_silences_are_told() -> None:
+    heard = Heard()
+    heard.say(READ, WORDS[:4], WORDS[4:], every=0.02)
+    assert "Broken frames: 1 frame with a pause inside of up to 17.1 ms" in heard.lines
+    hasty = Heard().say(READ)
+    hasty.say(WORDS, every=len(WORDS) * CHARACTER + SILENCE / 4)
+    assert "Broken silences: 1 frame began too soon after another" in hasty.lines
+    kept = Heard().say(READ, WORDS)
+    assert "Silences between frames are kept." in kept.lines
+
+
+def test_silences_are_not_judged_where_readings_tell_none() -> None:
+    heard = Heard(times=False).say(READ, WORDS[:4], WORDS[4:])
+    assert "Silences are not judged" in heard.lines
+    assert heard.summary.tally.cut == 0
+    together = Heard().say(READ + WORDS, READ + WORDS)
+    assert "several frames at once: silences between them are not known" in together.lines
+
+
+def test_a_shorter_plan_for_the_master() -> None:
+    heard = Heard(named("atv71", "atv71"))
+    singles = [
+        one
+        for address in (3201, 3202, 3204)
+        for one in (read_frame(2, address, 1), reply_words(2, 1))
+    ]
+    cycle(heard, 3, *singles)
+    (drive,) = heard.summary.drives
+    assert drive.shorter is not None
+    assert len(drive.shorter.now) == 3
+    assert [(one.address, one.count) for one in drive.shorter.plan.requests] == [(3201, 4)]
+    assert drive.shorter.plan.seconds < drive.shorter.now_seconds
+    assert "its cycle reads ETA, RFR, LCR in 3 requests" in heard.lines
+
+
+def test_no_plan_is_told_where_the_master_reads_well() -> None:
+    heard = cycle(
+        Heard(named("atv71", "atv71")), 3, read_frame(2, 3201, 4), reply_words(2, *[1] * 4)
+    )
+    (drive,) = heard.summary.drives
+    assert drive.shorter is None
+
+
+def test_reads_that_are_seldom_are_no_part_of_the_cycle() -> None:
+    heard = Heard(named("atv71", "atv71"))
+    heard.say(read_frame(2, 3204, 1), reply_words(2, 1))
+    cycle(heard, 5, read_frame(2, 3201, 2), reply_words(2, 1, 1))
+    (drive,) = heard.summary.drives
+    assert drive.shorter is None
+
+
+def test_nothing_and_noise_are_told() -> None:
+    assert "Nothing was heard" in Heard().rest().lines
+    noise = Heard().say(b"\xff\x00\xff").rest()
+    assert "3 bytes and no frame: are baud and format those of the line?" in noise.lines
+    both = Heard().say(READ, WORDS, b"\xff\x00\xff").rest()
+    assert "No frame: 3 bytes in 1 place" in both.lines
+
+
+def test_a_scale_follows_what_was_heard_of_the_same_drive() -> None:
+    """A value whose scale follows another word is raw until that was heard."""
+    profile = next(p for p in PROFILES if any(one.scale_by for one in p.parameters))
+    one = next(p for p in profile.parameters if p.scale_by and "r" in p.access)
+    assert one.scale_by is not None
+    source = profile[one.scale_by.parameter]
+    heard = Heard(Families(PROFILES, {None: profile}))
+
+    def read(parameter: object, word: int) -> None:
+        address = parameter.address  # type: ignore[attr-defined]
+        heard.say(read_frame(2, address, 1), reply_words(2, word))
+
+    read(one, 100)
+    assert heard.told[-1].values[0].value.unit == "raw"
+    read(source, int(next(iter(one.scale_by.scales))))
+    read(one, 100)
+    assert heard.told[-1].values[0].value.unit != "raw"

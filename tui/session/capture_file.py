@@ -1,0 +1,55 @@
+"""A file of frames for other programs, whole at every moment: each packet is one write."""
+
+from __future__ import annotations
+
+import errno
+import os
+from pathlib import Path
+
+import tui
+from tui.wire.capture.forms import ModbusTcpForm, Packet, PacketForm, RtuForm
+from tui.wire.capture.pcapng import interface_block, packet_block, section_block
+
+
+class CaptureFile:
+    """Frames in a pcapng file: as Modbus/TCP, or `raw` as bytes with their checksums.
+
+    A file that is there is replaced with `force` only. Raises OSError, FileExistsError.
+    """
+
+    def __init__(self, path: Path, line: str, *, raw: bool = False, force: bool = False) -> None:
+        self.path = path
+        self.packets = 0
+        self._form: PacketForm = RtuForm() if raw else ModbusTcpForm()
+        self._file = path.open("wb" if force else "xb", buffering=0)
+        self._size = 0
+        self._write(section_block(f"drivepanel {tui.__version__}"))
+        self._write(interface_block(self._form.link_type, line))
+
+    def add_frame(self, device: int, pdu: bytes, wall: float, *, request: bool) -> None:
+        """Add a whole frame; `wall` is its time in seconds since 1970."""
+        self._add(self._form.of_frame(device, pdu, request=request), wall)
+
+    def add_noise(self, data: bytes, wall: float) -> None:
+        """Add bytes that form no frame."""
+        if (packet := self._form.of_noise(data)) is not None:
+            self._add(packet, wall)
+
+    def close(self) -> None:
+        """Close the file; nothing waits to be written."""
+        self._file.close()
+
+    def _add(self, packet: Packet, wall: float) -> None:
+        self._write(packet_block(packet.data, wall, packet.comment))
+        self.packets += 1
+
+    def _write(self, block: bytes) -> None:
+        """Write a block whole, or not at all."""
+        try:
+            written = self._file.write(block)
+            if written != len(block):
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        except OSError:
+            self._file.truncate(self._size)
+            raise
+        self._size += len(block)

@@ -1,0 +1,174 @@
+"""Which family a drive is of that others talk to: named, as it says itself, remembered, or likely.
+
+What is inferred goes by what the drive answers: addresses that a family knows, functions, the
+longest read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from typing import Literal
+
+from tui.bus.link import Link
+from tui.drive.errors import DriveError
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+from tui.wire.heard.pairing import HeardExchange
+
+from ..connect.identify import DriveIdentity, identity_from
+from ..connect.known_lines import line_name, load_memory
+from .words import objects_told, spans_of
+
+How = Literal["named", "identified", "remembered", "likely"]
+NO_SUCH_FUNCTION, NO_SUCH_ADDRESS = 1, 2
+"""Codes of exceptions."""
+
+
+@dataclass(frozen=True, slots=True)
+class TakenFamily:
+    """The profile that a drive is taken by, and why."""
+
+    profile: Profile
+    how: How
+    others: tuple[str, ...] = ()
+    """Ids of profiles that fit as well."""
+
+
+@dataclass(slots=True)
+class _Evidence:
+    """What a drive has answered so far."""
+
+    answered: set[tuple[int, int]] = field(default_factory=set)
+    """Function and address of each word."""
+    lacking: set[tuple[int, int]] = field(default_factory=set)
+    functions: set[int] = field(default_factory=set)
+    unknown_functions: set[int] = field(default_factory=set)
+    longest: int = 0
+    """Words of the longest read."""
+
+    @property
+    def size(self) -> int:
+        """Grows whenever something is added."""
+        words, functions = len(self.answered) + len(self.lacking), len(self.functions)
+        return words + functions + len(self.unknown_functions) + self.longest
+
+
+def remembered_families(link: Link) -> dict[int, str]:
+    """By device, ids of the profiles of drives that answered on a line when it was used last."""
+    key = line_name(link).key
+    mark = load_memory().lines.get(key) if key else None
+    found = {}
+    for device, drive in (mark.drives if mark is not None else {}).items():
+        fits = library.matching_profiles(drive.reference) if drive.reference else []
+        if profile := drive.profile or next(iter(fits), ""):
+            found[device] = profile
+    return found
+
+
+def known_profiles() -> list[Profile]:
+    """Every profile that can be used; one that cannot is told where it is chosen."""
+    found = []
+    for listing in library.listings():
+        with suppress(DriveError):
+            found.append(library.load(listing.id))
+    return found
+
+
+class Families:
+    """The families of the drives of one line; learns from what is heard."""
+
+    def __init__(
+        self,
+        known: Sequence[Profile],
+        named: Mapping[int | None, Profile] | None = None,
+        remembered: Mapping[int, str] | None = None,
+    ) -> None:
+        self._known = {profile.id: profile for profile in known}
+        self._named = named or {}
+        self._remembered = remembered or {}
+        self._evidence: dict[int, _Evidence] = {}
+        self._likely: dict[int, tuple[int, TakenFamily | None]] = {}
+        """By device, how much was known, and what it came to."""
+        self.identities: dict[int, DriveIdentity] = {}
+        """Drives that have said who they are, to whoever asked."""
+
+    def family(self, device: int) -> TakenFamily | None:
+        """What a drive is taken for now; None where nothing tells."""
+        named = self._named.get(device) or self._named.get(None)
+        if named is not None:
+            return TakenFamily(named, "named")
+        identity = self.identities.get(device)
+        if identity is not None and identity.profile in self._known:
+            return TakenFamily(self._known[identity.profile], "identified")
+        remembered = self._remembered.get(device)
+        if remembered in self._known:
+            return TakenFamily(self._known[remembered], "remembered")
+        return self._inferred(device)
+
+    def note(self, exchange: HeardExchange) -> None:
+        """Learn from an exchange."""
+        if (objects := objects_told(exchange)) is not None:
+            told = identity_from(exchange.device, objects)
+            if told.reference or exchange.device not in self.identities:
+                self.identities[exchange.device] = told
+        if exchange.answer not in ("ok", "exception"):
+            return
+        evidence = self._evidence.setdefault(exchange.device, _Evidence())
+        spans = spans_of(exchange.request)
+        words = {(s.function, s.address + n) for s in spans for n in range(s.count)}
+        if exchange.answer == "ok":
+            evidence.functions.add(exchange.function)
+            evidence.answered |= words
+            reads = [span.count for span in spans if not span.written]
+            evidence.longest = max([evidence.longest, *reads])
+        elif exchange.exception == NO_SUCH_FUNCTION:
+            evidence.unknown_functions.add(exchange.function)
+        elif exchange.exception == NO_SUCH_ADDRESS and len(words) == 1:
+            evidence.lacking |= words
+
+    def _inferred(self, device: int) -> TakenFamily | None:
+        evidence = self._evidence.get(device)
+        if evidence is None or not evidence.answered:
+            return None
+        size, found = self._likely.get(device, (-1, None))
+        if size != evidence.size:
+            found = _likeliest(evidence, tuple(self._known.values()))
+            self._likely[device] = evidence.size, found
+        return found
+
+
+def _likeliest(evidence: _Evidence, known: Sequence[Profile]) -> TakenFamily | None:
+    scores = {profile.id: _score(evidence, profile) for profile in known}
+    best = max(scores.values(), default=0.0)
+    if best <= 0:
+        return None
+    first, *others = [profile for profile in known if scores[profile.id] == best]
+    return TakenFamily(first, "likely", tuple(profile.id for profile in others))
+
+
+def _score(evidence: _Evidence, profile: Profile) -> float:
+    """How well a family fits what a drive has answered; 0 and less where it does not."""
+    functions = {one.code for one in profile.data.functions}
+    if evidence.functions - functions:
+        return 0.0
+    longest = max((one.max_read or 1 for one in profile.data.functions), default=1)
+    if evidence.longest > longest:
+        return 0.0
+    told = _words(profile)
+    hits = len(evidence.answered & told)
+    misses = len(evidence.answered) - hits
+    # an address that is refused may be one that this model, or this moment, does not have
+    doubts = len(evidence.lacking & told) + len(evidence.unknown_functions & functions)
+    weight = 0.5 if profile.data.reading.gaps_readable else 1.0
+    return hits - weight * misses - 0.5 * doubts
+
+
+def _words(profile: Profile) -> set[tuple[int, int]]:
+    """Function and address of every word that a family knows, blocks included."""
+    found: set[tuple[int, int]] = {(one.function, one.address) for one in profile.parameters}
+    found |= {(p.function, p.address + 1) for p in profile.parameters if p.type.endswith("32")}
+    for block in profile.data.blocks:
+        found |= {(3, block.address + n) for n in range(block.max_words)}
+    return found

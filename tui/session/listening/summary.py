@@ -1,0 +1,264 @@
+"""What listening came to: who commands which drive, how well each is asked, what goes wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+from tui.bus.limits import STANDARD_EXCEPTIONS
+from tui.drive.profile.profile import Profile
+from tui.drive.read_plan import ReadRequest, WireTiming
+
+from .advice import Feeding, ShorterPlan, feeding, shorter_plan
+from .families import Families, TakenFamily
+from .listener import LineListener
+from .tally import DriveTally, LineTally, WriteTally
+
+CODES_SHOWN = 6
+"""Parameters of a list that are named; the others are counted."""
+HOW_SURE = {
+    "named": "as -p says",
+    "identified": "as it says itself",
+    "remembered": "as remembered",
+    "likely": "likely",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSummary:
+    """One drive: what was counted, and what follows from it."""
+
+    tally: DriveTally
+    family: TakenFamily | None
+    pace: float | None
+    """Requests a second."""
+    feeding: Feeding | None
+    shorter: ShorterPlan | None
+
+    @property
+    def silent(self) -> bool:
+        """Whether it has answered nothing at all."""
+        return not self.tally.answered
+
+
+@dataclass(frozen=True, slots=True)
+class ListeningSummary:
+    """The whole line, over so many seconds."""
+
+    seconds: float
+    tally: LineTally
+    load: float | None
+    """Part of the time in which there were bytes on the line; None where that is not known."""
+    drives: tuple[DriveSummary, ...]
+    silences_told: bool
+    """Whether pauses between bytes could be told."""
+
+
+def summary_of(listener: LineListener, now: float, timing: WireTiming) -> ListeningSummary:
+    """What listening came to by now; `timing` is that of the line."""
+    tally = listener.tally
+    seconds = max(0.0, now - tally.begun)
+    busy = tally.bytes * listener.character
+    drives = tuple(
+        _drive(one, listener.families, now, timing)
+        for _, one in sorted(tally.drives.items())
+        if one.requests or one.answers
+    )
+    load = min(1.0, busy / seconds) if listener.character and seconds else None
+    return ListeningSummary(seconds, tally, load, drives, bool(listener.character))
+
+
+def _drive(tally: DriveTally, families: Families, now: float, timing: WireTiming) -> DriveSummary:
+    family = families.family(tally.device)
+    profile = family.profile if family is not None else None
+    lasted = tally.last - tally.first
+    pace = (tally.requests - 1) / lasted if tally.requests > 1 and lasted > 0 else None
+    own = WireTiming(timing.character, timing.silence, tally.turnaround or timing.turnaround)
+    return DriveSummary(
+        tally,
+        family,
+        pace,
+        feeding(profile, tally, now) if profile is not None else None,
+        shorter_plan(profile, tally, own) if profile is not None else None,
+    )
+
+
+def summary_lines(summary: ListeningSummary) -> list[str]:
+    """The summary for a person; lines of a drive begin with two spaces."""
+    tally, lines = summary.tally, []
+    pace = tally.exchanges / summary.seconds if summary.seconds else 0.0
+    load = "" if summary.load is None else f", line {summary.load * 100:.0f} % busy"
+    lines.append(
+        f"Listened {summary.seconds:.1f} s: {_many(tally.exchanges, 'exchange')},"
+        f" {pace:.1f} a second{load}."
+    )
+    if not tally.bytes:
+        lines.append("Nothing was heard: is anybody talking, and are A and B connected?")
+    elif not tally.frames:
+        lines.append(
+            f"{_many(tally.noise_bytes, 'byte')} and no frame: are baud and format those of the"
+            " line?"
+        )
+    for drive in summary.drives:
+        lines += _drive_lines(drive)
+    return [*lines, *_line_troubles(summary)]
+
+
+def _drive_lines(drive: DriveSummary) -> Iterator[str]:
+    tally, profile = drive.tally, drive.family.profile if drive.family is not None else None
+    if not tally.device:
+        yield "All devices at once (broadcast)"
+    else:
+        yield f"Device {tally.device}: {family_text(drive.family)}"
+    if drive.silent and tally.device:
+        yield f"  no answer to {_many(tally.requests, 'request')}"
+    elif tally.device:
+        yield f"  {_asked_text(drive)}"
+    yield f"  {_commanded_text(drive)}"
+    if drive.feeding is not None:
+        yield f"  {feeding_text(drive.feeding)}"
+    for text in _trouble_texts(drive, profile):
+        yield f"  {text}"
+    if drive.shorter is not None:
+        yield f"  {shorter_text(drive.shorter)}"
+
+
+def family_text(family: TakenFamily | None) -> str:
+    """A family, and how sure that is."""
+    if family is None:
+        return "family not known; -p names it"
+    or_ = f", or {', '.join(family.others)}" if family.others else ""
+    return f"{family.profile.name} ({HOW_SURE[family.how]}{or_})"
+
+
+def _asked_text(drive: DriveSummary) -> str:
+    tally = drive.tally
+    text = "asked once"
+    if drive.pace is not None:
+        text = f"asked {_pace_text(drive.pace)}, longest pause {tally.longest_pause:.2f} s"
+    if tally.turnaround is not None:
+        text += f"; answers in {tally.turnaround * 1000:.1f} ms"
+        text += f" ({tally.turnaround_least * 1000:.1f} to {tally.turnaround_most * 1000:.1f})"
+    return text
+
+
+def _pace_text(pace: float) -> str:
+    return f"{pace:.1f} times a second" if pace >= 1 else f"every {1 / pace:.1f} s"
+
+
+def _commanded_text(drive: DriveSummary) -> str:
+    writes = drive.tally.writes
+    commands = {code: one for code, one in writes.items() if one.commands}
+    others = {code: one for code, one in writes.items() if not one.commands}
+    parts = []
+    if commands:
+        parts.append(f"commanded by the master: {_writes_text(commands)}")
+    if others:
+        parts.append(f"written: {_writes_text(others)}")
+    return "; ".join(parts) or "read only: the master on this line does not command it"
+
+
+def _writes_text(writes: dict[str, WriteTally]) -> str:
+    shown = [
+        f"{code} {one.text} {'once' if one.every is None else f'every {one.every:.2f} s'}"
+        for code, one in list(writes.items())[:CODES_SHOWN]
+    ]
+    return _listed(shown, len(writes))
+
+
+def feeding_text(feeding: Feeding) -> str:
+    """Whether a drive's time-out is fed, and by what margin."""
+    heard = feeding.known == "heard"
+    known = "as heard" if heard else "factory setting; its own was not heard"
+    if feeding.seconds is None or feeding.margin is None:
+        follows = ": it does not notice a lost master" if heard else ""
+        return f"time-out {feeding.code} off ({known}){follows}"
+    head = f"time-out {feeding.code} {feeding.seconds:g} s ({known})"
+    if not feeding.begun:
+        return f"{head}: begins with a first command, and none was heard"
+    if feeding.fed:
+        return f"{head}: fed, {feeding.margin:.2f} s to spare"
+    return f"{head}: NOT FED, nobody asked it for {feeding.longest_pause:.2f} s"
+
+
+def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str]:
+    tally = drive.tally
+    for code, times in sorted(tally.exceptions.items()):
+        yield f"refused {_times(times)}: exception {code}, {exception_meaning(code, profile)}"
+    if tally.answers["none"] and not drive.silent:
+        yield f"no answer {_times(tally.answers['none'])}"
+    if tally.answers["damaged"]:
+        yield f"damaged answer {_times(tally.answers['damaged'])}"
+    if tally.answers["again"]:
+        yield (
+            f"ANSWERED TWICE {_times(tally.answers['again'])}: do two devices have the address"
+            f" {tally.device}?"
+        )
+
+
+def exception_meaning(code: int, profile: Profile | None) -> str:
+    """What a code means on this family, else by the standard."""
+    for one in profile.data.exceptions if profile is not None else ():
+        if one.code == code:
+            return one.meaning
+    return STANDARD_EXCEPTIONS.get(code, "its meaning is not known")
+
+
+def shorter_text(shorter: ShorterPlan) -> str:
+    """What a master could read instead."""
+    requests = shorter.plan.requests
+    reads = "; ".join(_request_text(one) for one in requests[:CODES_SHOWN])
+    more = len(requests) - CODES_SHOWN
+    return (
+        f"its cycle reads {_listed(shorter.codes[:CODES_SHOWN], len(shorter.codes))} in"
+        f" {_many(len(shorter.now), 'request')}, {shorter.now_seconds * 1000:.1f} ms;"
+        f" {len(requests)} would do in {shorter.plan.seconds * 1000:.1f} ms: {reads}"
+        f"{f' and {more} more' if more > 0 else ''}"
+    )
+
+
+def _request_text(request: ReadRequest) -> str:
+    return f"{_many(request.count, 'word')} from {request.address}"
+
+
+def _line_troubles(summary: ListeningSummary) -> Iterator[str]:
+    tally = summary.tally
+    if tally.noises and tally.frames:
+        yield (
+            f"No frame: {_many(tally.noise_bytes, 'byte')} in {_many(tally.noises, 'place')}"
+            " (noise, collisions, cut frames)."
+        )
+    if tally.crossed:
+        yield (
+            f"A SECOND MASTER? {_many(tally.crossed, 'request')} began while another waited for"
+            " its answer."
+        )
+    if not tally.frames:
+        return
+    if not summary.silences_told:
+        yield "Silences are not judged: this port has no baud rate of its own."
+        return
+    if tally.cut:
+        yield (
+            f"Broken frames: {_many(tally.cut, 'frame')} with a pause inside of up to"
+            f" {tally.longest_cut * 1000:.1f} ms; strict drives do not take them."
+        )
+    if tally.hasty:
+        yield f"Broken silences: {_many(tally.hasty, 'frame')} began too soon after another."
+    if tally.together * 3 > tally.frames:
+        yield "The adapter hands over several frames at once: silences between them are not known."
+    elif not tally.cut and not tally.hasty:
+        yield "Silences between frames are kept."
+
+
+def _listed(shown: Sequence[str], count: int) -> str:
+    more = count - len(shown)
+    return ", ".join(shown) + (f" and {more} more" if more > 0 else "")
+
+
+def _many(count: int, what: str) -> str:
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def _times(count: int) -> str:
+    return "once" if count == 1 else f"{count} times"

@@ -1,0 +1,213 @@
+"""What was heard so far, counted: of the line, and of each drive on it."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from tui.drive.profile.profile import Profile, group_holds
+from tui.drive.profile.schema import Parameter
+from tui.wire.heard.pairing import HeardExchange
+from tui.wire.heard.splitting import HeardFrame
+
+from .words import HeardValue, WordSpan, spans_of
+
+CUT_BY = 0.002
+"""Seconds past the silence that a pause inside a frame has to have to count: readings are late."""
+TOO_SOON = 0.5
+"""Part of the silence that a pause between two frames has to have, for the same reason."""
+DECIDING = frozenset(
+    {
+        "command_word",
+        "command_word_2",
+        "extended_command_word",
+        "frequency_reference",
+        "speed_reference",
+        "command_frequency",
+        "command_speed",
+    }
+)
+"""Quantities that decide what the motor does."""
+NOBODY_WAITS_SO_SHORT = 0.01
+"""Seconds in which no master gives up an answer and asks on: another one did."""
+READS_KEPT = 500
+"""Different reads of one drive that are counted one by one."""
+
+
+@dataclass(slots=True)
+class WriteTally:
+    """One parameter that was written, as often as it was."""
+
+    parameter: Parameter | None
+    commands: bool
+    times: int = 0
+    first: float = 0.0
+    last: float = 0.0
+    text: str = ""
+    """The last value, with its unit."""
+    raw: int = 0
+
+    @property
+    def every(self) -> float | None:
+        """Seconds from one to the next, on average; None of a single one."""
+        return (self.last - self.first) / (self.times - 1) if self.times > 1 else None
+
+
+@dataclass(slots=True)
+class ReadTally:
+    """One read, as often as it was asked."""
+
+    span: WordSpan
+    times: int = 0
+    first: float = 0.0
+    last: float = 0.0
+
+    @property
+    def every(self) -> float | None:
+        """Seconds from one to the next, on average; None of a single one."""
+        return (self.last - self.first) / (self.times - 1) if self.times > 1 else None
+
+
+@dataclass(slots=True)
+class DriveTally:
+    """What was heard of one drive; times are those of the listener's clock."""
+
+    device: int
+    first: float
+    last: float = 0.0
+    requests: int = 0
+    answers: Counter[str] = field(default_factory=Counter)
+    exceptions: Counter[int] = field(default_factory=Counter)
+    reads: dict[WordSpan, ReadTally] = field(default_factory=dict)
+    writes: dict[str, WriteTally] = field(default_factory=dict)
+    raws: dict[str, int] = field(default_factory=dict)
+    """The last raw value of each parameter."""
+    turnaround_sum: float = 0.0
+    turnaround_least: float = float("inf")
+    turnaround_most: float = 0.0
+    fed: float | None = None
+    """When it was last asked and answered, which is what starts its time-out anew."""
+    longest_pause: float = 0.0
+
+    @property
+    def commanded(self) -> bool:
+        """Whether commands or references were written to it."""
+        return any(one.commands for one in self.writes.values())
+
+    @property
+    def answered(self) -> int:
+        """Requests that it answered, or refused."""
+        return self.answers["ok"] + self.answers["exception"]
+
+    @property
+    def turnaround(self) -> float | None:
+        """Seconds on average; None where it has answered nothing."""
+        return self.turnaround_sum / self.answered if self.answered else None
+
+    def pause_until(self, now: float) -> float:
+        """The longest time for which nobody fed it, that of now included."""
+        return max(self.longest_pause, now - self.fed if self.fed is not None else 0.0)
+
+    def take(
+        self, exchange: HeardExchange, values: Sequence[HeardValue], profile: Profile | None
+    ) -> None:
+        """Count an exchange of this drive."""
+        self.answers[exchange.answer] += 1
+        if exchange.answer in ("again", "unasked"):
+            return
+        self.requests += 1
+        self.last = exchange.time
+        if exchange.exception is not None:
+            self.exceptions[exchange.exception] += 1
+        if exchange.turnaround is not None:
+            self.turnaround_sum += exchange.turnaround
+            self.turnaround_least = min(self.turnaround_least, exchange.turnaround)
+            self.turnaround_most = max(self.turnaround_most, exchange.turnaround)
+            if self.fed is not None:
+                self.longest_pause = max(self.longest_pause, exchange.time - self.fed)
+            self.fed = exchange.time
+        self._take_reads(exchange)
+        for value in values:
+            self._take_value(value, exchange.time, profile)
+
+    def _take_reads(self, exchange: HeardExchange) -> None:
+        for span in spans_of(exchange.request):
+            if span.written or (span not in self.reads and len(self.reads) >= READS_KEPT):
+                continue
+            read = self.reads.setdefault(span, ReadTally(span, first=exchange.time))
+            read.times += 1
+            read.last = exchange.time
+
+    def _take_value(self, value: HeardValue, time: float, profile: Profile | None) -> None:
+        if value.parameter is not None:
+            self.raws[value.code] = value.raw
+        if not value.written:
+            return
+        if value.code not in self.writes:
+            commands = decides(profile, value.parameter)
+            self.writes[value.code] = WriteTally(value.parameter, commands, first=time)
+        write = self.writes[value.code]
+        write.times += 1
+        write.last, write.text, write.raw = time, value.value.display, value.raw
+
+
+def decides(profile: Profile | None, parameter: Parameter | None) -> bool:
+    """Whether a parameter decides what the motor does."""
+    if profile is None or parameter is None:
+        return False
+    commands = {chart.command for chart in profile.data.charts if chart.command}
+    return (
+        parameter.code in commands
+        or parameter.quantity in DECIDING
+        or group_holds(profile, parameter) == "commands"
+    )
+
+
+@dataclass(slots=True)
+class LineTally:
+    """What was heard of the whole line."""
+
+    begun: float
+    frames: int = 0
+    bytes: int = 0
+    noises: int = 0
+    noise_bytes: int = 0
+    together: int = 0
+    """Frames that came in one reading with the one before, so that their pause is not known."""
+    cut: int = 0
+    """Frames with a pause inside that is longer than the silence which ends one."""
+    longest_cut: float = 0.0
+    """That pause in seconds."""
+    hasty: int = 0
+    """Frames that began before the silence after another was over."""
+    exchanges: int = 0
+    crossed: int = 0
+    """Requests that began while another waited for its answer."""
+    drives: dict[int, DriveTally] = field(default_factory=dict)
+
+    def take_frame(self, frame: HeardFrame, silence: float) -> None:
+        """Count a frame, or noise; `silence` is what has to lie between two, in seconds, or 0."""
+        self.bytes += len(frame.data)
+        if not frame.whole:
+            self.noises += 1
+            self.noise_bytes += len(frame.data)
+            return
+        self.frames += 1
+        if silence and frame.gap > silence + CUT_BY:
+            self.cut += 1
+            self.longest_cut = max(self.longest_cut, frame.gap)
+        if frame.pause is None:
+            self.together += self.frames > 1
+        elif frame.pause < silence * TOO_SOON:
+            self.hasty += 1
+
+    def take_exchange(self, exchange: HeardExchange) -> None:
+        """Count an exchange."""
+        self.exchanges += 1
+        if exchange.waited is not None and exchange.waited < NOBODY_WAITS_SO_SHORT:
+            self.crossed += 1
+
+    def drive(self, device: int, time: float) -> DriveTally:
+        """What was heard of a drive, from this time on where it is new."""
+        return self.drives.setdefault(device, DriveTally(device, time))

@@ -1,0 +1,156 @@
+"""Parameters and values in requests and replies that were heard. Pure functions."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from tui.bus.api import IdentificationObjects
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import Parameter
+from tui.drive.shown import shown
+from tui.drive.values import Value, from_words, word_count
+from tui.wire.heard.pairing import HeardExchange
+
+HOLDING, INPUT = 3, 4
+WRITE_WORD, WRITE_WORDS, READ_AND_WRITE, WHO = 6, 16, 23, 43
+FUNCTION_NAMES: Mapping[int, str] = {
+    1: "read coils",
+    2: "read inputs",
+    HOLDING: "read",
+    INPUT: "read input",
+    5: "write coil",
+    WRITE_WORD: "write",
+    7: "exception status",
+    8: "diagnostics",
+    15: "write coils",
+    WRITE_WORDS: "write",
+    17: "report id",
+    READ_AND_WRITE: "read and write",
+    WHO: "identify",
+}
+_OBJECTS_FROM = 7
+"""Where the objects of a reply to function 43 begin, function included."""
+
+
+@dataclass(frozen=True, slots=True)
+class WordSpan:
+    """Neighbouring words of a request: those that are read, or those that are written."""
+
+    function: int
+    """That of the addresses: 4 for input registers, else 3."""
+    address: int
+    count: int
+    written: tuple[int, ...] = ()
+    """The words that are written; empty of a read."""
+
+
+@dataclass(frozen=True, slots=True)
+class HeardValue:
+    """One parameter, or a word that no profile names, with its value."""
+
+    code: str
+    """The parameter's code; the address in decimal where none is known."""
+    address: int
+    raw: int
+    value: Value
+    written: bool
+    parameter: Parameter | None = None
+
+
+def spans_of(request: bytes) -> tuple[WordSpan, ...]:
+    """What a request reads and writes; nothing of one without words, or cut short."""
+    try:
+        return tuple(_spans(request))
+    except (struct.error, IndexError):
+        return ()
+
+
+def _spans(request: bytes) -> Iterator[WordSpan]:
+    function, body = request[0], request[1:]
+    if function in (HOLDING, INPUT):
+        yield WordSpan(function, *struct.unpack_from(">HH", body))
+    elif function == WRITE_WORD:
+        address, word = struct.unpack_from(">HH", body)
+        yield WordSpan(HOLDING, address, 1, (word,))
+    elif function == WRITE_WORDS:
+        address, count = struct.unpack_from(">HH", body)
+        yield WordSpan(HOLDING, address, count, struct.unpack_from(f">{count}H", body, 5))
+    elif function == READ_AND_WRITE:
+        address, count, target, written = struct.unpack_from(">HHHH", body)
+        words = struct.unpack_from(f">{written}H", body, 9)
+        yield WordSpan(HOLDING, target, written, words)
+        yield WordSpan(HOLDING, address, count)
+
+
+def words_read(exchange: HeardExchange) -> tuple[int, ...]:
+    """The words that a good reply brings; none of any other."""
+    if exchange.answer != "ok" or exchange.function not in (HOLDING, INPUT, READ_AND_WRITE):
+        return ()
+    count = exchange.reply[1] // 2
+    return struct.unpack_from(f">{count}H", exchange.reply, 2)
+
+
+def values_of(
+    exchange: HeardExchange, profile: Profile | None, raws: Mapping[str, int]
+) -> list[HeardValue]:
+    """What a request wrote and its reply has brought; `raws` are raw values by code.
+
+    What was refused is no value, nor is what a drive did not confirm but a broadcast.
+    """
+    if exchange.answer not in ("ok", "broadcast"):
+        return []
+    found: list[HeardValue] = []
+    read = words_read(exchange)
+    for span in spans_of(exchange.request):
+        words = span.written or read
+        if len(words) == span.count:
+            found += _cut(span, words, profile, raws)
+    return found
+
+
+def names_of_words(span: WordSpan, profile: Profile | None) -> list[str]:
+    """The parameters of a stretch of words; addresses where none is known."""
+    return [code for code, _, _, _ in _parts(span, profile)]
+
+
+def _cut(
+    span: WordSpan, words: Sequence[int], profile: Profile | None, raws: Mapping[str, int]
+) -> Iterator[HeardValue]:
+    for code, at, parameter, wide in _parts(span, profile):
+        word, address, written = words[at], span.address + at, bool(span.written)
+        if parameter is None or profile is None or at + wide > span.count:
+            value = Value(word, None, "", f"16#{word:04X}")
+            yield HeardValue(code, address, word, value, written, parameter)
+            continue
+        raw = from_words(parameter, list(words[at : at + wide]))
+        value = shown(profile, parameter, raw, raws)
+        yield HeardValue(code, address, raw, value, written, parameter)
+
+
+def _parts(
+    span: WordSpan, profile: Profile | None
+) -> Iterator[tuple[str, int, Parameter | None, int]]:
+    """Code, offset, parameter and width of each part of a stretch of words."""
+    at = 0
+    while at < span.count:
+        address = span.address + at
+        parameter = profile.at(address, span.function) if profile is not None else None
+        wide = word_count(parameter) if parameter is not None else 1
+        yield (parameter.code if parameter is not None else str(address)), at, parameter, wide
+        at += wide
+
+
+def objects_told(exchange: HeardExchange) -> IdentificationObjects | None:
+    """What a drive said of itself in an exchange of function 43; None where it said nothing."""
+    if exchange.answer != "ok" or exchange.function != WHO or len(exchange.reply) < _OBJECTS_FROM:
+        return None
+    reply, at, objects = exchange.reply, _OBJECTS_FROM, {}
+    for _ in range(reply[_OBJECTS_FROM - 1]):
+        if at + 2 > len(reply):
+            break
+        number, length = reply[at], reply[at + 1]
+        objects[number] = reply[at + 2 : at + 2 + length]
+        at += 2 + length
+    return IdentificationObjects(reply[3], objects)
