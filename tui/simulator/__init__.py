@@ -3,6 +3,7 @@
 from .drive import SimulatedDrive
 from .errors import SimulatorError
 from .input_lines import check_inputs, set_inputs
+from .plc import PlcOnLine, plc_cycle
 from .server.client_settings import ClientSettings
 from .server.endpoints import ByteStream
 from .simulation import Simulation
@@ -14,10 +15,12 @@ __all__ = [
     "DriveSpec",
     "FaultRates",
     "LineTiming",
+    "PlcOnLine",
     "SimulatedDrive",
     "Simulation",
     "SimulatorError",
     "check_inputs",
     "parse_drives",
+    "plc_cycle",
     "set_inputs",
 ]

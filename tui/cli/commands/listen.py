@@ -1,0 +1,143 @@
+"""`drivepanel listen`: what others say on a line, in drives, codes and values."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..shared.completion import complete_line, complete_profile
+from ..shared.errors import INTERRUPTED, USAGE, Failure, told
+from ..shared.line_argument import LineArgument
+from ..shared.options import json_option
+from ..shared.say import say
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+    from tui.session.capture_file import CaptureFile
+
+LAST_ADDRESS_HEARD = 255
+
+
+@click.command()
+@click.argument("line_text", metavar="LINE", cls=LineArgument, shell_complete=complete_line)
+@click.option(
+    "-p",
+    "--profile",
+    "profile_ids",
+    multiple=True,
+    metavar="[ADDRESS=]ID",
+    shell_complete=complete_profile,
+    help="Profile of all drives, or of the one at an address; several times for several drives.",
+)
+@click.option(
+    "--pcap",
+    "pcap_path",
+    type=click.Path(dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help="Also write the frames to a pcapng file, as Modbus/TCP with the device id.",
+)
+@click.option(
+    "--raw",
+    is_flag=True,
+    help="Write them as they are on the line, with checksum; it is said how tshark reads that.",
+)
+@click.option("--force", is_flag=True, help="Replace a file that exists.")
+@click.option(
+    "--every",
+    type=click.FloatRange(min=1.0),
+    metavar="S",
+    help="Tell what it comes to every S seconds, and not only at the end.",
+)
+@click.option(
+    "--for",
+    "seconds",
+    type=click.FloatRange(min=0, min_open=True),
+    metavar="S",
+    help="Listen for S seconds, else until Ctrl-C.",
+)
+@json_option
+@told
+def listen(
+    line_text: str,
+    profile_ids: tuple[str, ...],
+    pcap_path: Path | None,
+    raw: bool,
+    force: bool,
+    every: float | None,
+    seconds: float | None,
+    as_json: bool,
+) -> None:
+    """Listen to what others say on a serial line, and send nothing.
+
+    Requests and replies of any master are told by drive, code and value, and at the end who
+    commands which drive, how well each is asked, and what goes wrong. The port is opened for
+    reading only, and for this program alone. A sim: LINE has a master of its own that asks.
+    """
+    if pcap_path is None and (raw or force):
+        raise click.UsageError("--raw and --force go with --pcap FILE.")
+    named = profiles_named(profile_ids)
+    from tui.session.listening.families import Families, known_profiles, remembered_families
+
+    from ..running.listening import HearingRun, line_to_listen
+    from ..shared.listen_outputs import HeardJson, HeardLines
+
+    with line_to_listen(line_text) as place:
+        families = Families(known_profiles(), named, remembered_families(place.line.link))
+        output = HeardJson(line_text, families) if as_json else HeardLines(families)
+        file = _opened_file(pcap_path, line_text, raw=raw, force=force)
+        listening = HearingRun(place.line, families, output, file)
+        try:
+            if not as_json:
+                _say_begin(place.line.link.path, pcap_path if raw else None)
+            place.begin()
+            listening.run(seconds, every)
+        except KeyboardInterrupt:
+            listening.end()
+            raise Failure(f"Ended by Ctrl-C. {listening.text}", INTERRUPTED) from None
+        finally:
+            if file is not None:
+                file.close()
+        listening.end()
+    if not as_json:
+        say(listening.text)
+
+
+def profiles_named(given: tuple[str, ...]) -> dict[int | None, Profile]:
+    """Profiles by address, with None for that of all others; raises UsageError, UnknownProfile."""
+    from tui.drive.profile import library
+
+    found: dict[int | None, Profile] = {}
+    for text in given:
+        address, sign, profile_id = text.rpartition("=")
+        if sign and not (address.isdecimal() and 1 <= int(address) <= LAST_ADDRESS_HEARD):
+            raise click.UsageError(f"{text!r}: write ID, or ADDRESS=ID such as 2=ID.")
+        device = int(address) if sign else None
+        if device in found:
+            raise click.UsageError(f"{text!r}: one profile for each address.")
+        found[device] = library.load(profile_id)
+    return found
+
+
+def _opened_file(path: Path | None, line: str, *, raw: bool, force: bool) -> CaptureFile | None:
+    """The file that is wanted; raises Failure where it cannot be begun."""
+    from tui.session.capture_file import CaptureFile
+
+    if path is None:
+        return None
+    try:
+        return CaptureFile(path, line, raw=raw, force=force)
+    except FileExistsError:
+        raise Failure(f"{path} is there already. Use another name, or --force.", USAGE) from None
+    except OSError as error:
+        text = f"{path} cannot be written: {error.strerror or error}."
+        raise Failure(text, USAGE) from error
+
+
+def _say_begin(port: str, raw_file: Path | None) -> None:
+    from tui.wire.capture.forms import READ_RAW
+
+    say(f"Listening at {port}; nothing is sent. Ctrl-C ends it.")
+    if raw_file is not None:
+        say(f"To read the file: {READ_RAW.replace('FILE', str(raw_file))}")

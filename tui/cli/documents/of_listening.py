@@ -1,0 +1,160 @@
+"""Documents of `listen`: what others said on a line, and what that comes to."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from .of_drives import DocumentTold
+from .parts import PartTold
+
+HowTold = Literal["named", "identified", "remembered", "likely"]
+
+
+class HeardValueTold(PartTold):
+    """One value that was read, or written (`written`)."""
+
+    address: int
+    raw: int
+    value: int | float
+    unit: str
+    text: str
+    written: bool
+
+
+class HeardExchangeTold(DocumentTold, kw_only=True):
+    """`listen`: one request with what became of it; `request` and `reply` are hexadecimal."""
+
+    command: Literal["listen"]
+    event: Literal["exchange"]
+    time: str
+    line: str
+    device: int
+    """0 for all devices at once."""
+    profile: str | None
+    how: HowTold | None
+    """Why it is taken for that."""
+    others: list[str]
+    """Profiles that are as likely."""
+    function: int
+    name: str
+    answer: Literal["ok", "exception", "none", "damaged", "broadcast", "again", "unasked"]
+    exception: int | None
+    meaning: str | None
+    turnaround_ms: float | None
+    asked: list[str]
+    values: dict[str, HeardValueTold]
+    request: str
+    reply: str
+    text: str
+
+
+class NoiseTold(PartTold):
+    """Bytes that form no frame."""
+
+    places: int
+    bytes: int
+
+
+class SilencesTold(PartTold):
+    """How the silences between frames are kept, where that can be judged."""
+
+    judged: bool
+    broken_frames: int
+    longest_ms: float
+    too_soon: int
+    together: int
+    """Frames that came in one reading with the one before: nothing is known of their silence."""
+
+
+class HeardWriteTold(PartTold):
+    """One parameter that the master writes; `every` is in seconds, null of a single time."""
+
+    commands: bool
+    """Whether it decides what the motor does."""
+    times: int
+    every: float | None
+    raw: int
+    text: str
+
+
+class HeardReadTold(PartTold):
+    """One read of the master."""
+
+    function: int
+    address: int
+    words: int
+    times: int
+    every: float | None
+
+
+class PlannedReadTold(PartTold):
+    """One read of a shorter plan."""
+
+    function: int
+    address: int
+    words: int
+
+
+class FeedingTold(PartTold):
+    """A communication time-out against the longest pause; seconds, null where it is off."""
+
+    code: str
+    seconds: float | None
+    known: Literal["heard", "factory"]
+    begun: bool
+    longest_pause: float
+    fed: bool | None
+    margin: float | None
+
+
+class ShorterTold(PartTold):
+    """Reads that bring the same values as those of the master's cycle, in less time."""
+
+    codes: list[str]
+    requests_now: int
+    ms_now: float
+    requests: list[PlannedReadTold]
+    ms: float
+
+
+class HeardDriveTold(PartTold):
+    """What was heard of one drive."""
+
+    device: int
+    profile: str | None
+    how: HowTold | None
+    others: list[str]
+    requests: int
+    per_second: float | None
+    longest_pause: float
+    answered: int
+    unanswered: int
+    damaged: int
+    answered_twice: int
+    exceptions: dict[str, int]
+    turnaround_ms: float | None
+    commanded: bool
+    writes: dict[str, HeardWriteTold]
+    reads: list[HeardReadTold]
+    timeout: FeedingTold | None
+    shorter: ShorterTold | None
+
+
+class HeardSummaryTold(DocumentTold, kw_only=True):
+    """`listen`: what it came to by now."""
+
+    command: Literal["listen"]
+    event: Literal["summary"]
+    time: str
+    line: str
+    seconds: float
+    exchanges: int
+    frames: int
+    bytes: int
+    load: float | None
+    crossed: int
+    """Requests that began while another waited for its answer: a second master."""
+    noise: NoiseTold
+    silences: SilencesTold
+    drives: list[HeardDriveTold]
+    text: list[str]

@@ -1,0 +1,223 @@
+"""Where what was heard goes: lines of text, or JSON, one object a line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, Protocol
+
+from .output import iso_time, print_json
+from .say import say
+
+if TYPE_CHECKING:
+    from tui.drive.read_plan import ReadRequest
+    from tui.session.listening.families import Families, TakenFamily
+    from tui.session.listening.listener import ToldExchange
+    from tui.session.listening.summary import DriveSummary, ListeningSummary
+    from tui.session.listening.tally import ReadTally, WriteTally
+    from tui.session.listening.words import HeardValue, WordSpan
+
+TIME_WIDTH = 13
+"""Characters of a time of day and its gap."""
+FURTHER = 24
+"""Where the rest of a line goes on that does not fit."""
+
+
+class HeardOutput(Protocol):
+    """Takes exchanges and summaries; `wall` is a time in seconds since 1970."""
+
+    def exchange(self, told: ToldExchange, wall: float) -> None:
+        """Put one exchange out, at once."""
+
+    def summary(self, summary: ListeningSummary, wall: float) -> None:
+        """Put a summary out."""
+
+
+class HeardLines:
+    """Readable text: a line an exchange."""
+
+    def __init__(self, families: Families) -> None:
+        self._families = families
+        self._taken: dict[int, str] = {}
+
+    def exchange(self, told: ToldExchange, wall: float) -> None:
+        """Print one exchange, and before it what its drive is taken for where that is new."""
+        from tui.session.listening.summary import family_text
+        from tui.session.listening.telling import exchange_text
+
+        device = told.exchange.device
+        if told.family is not None and self._taken.get(device) != told.family.profile.id:
+            self._taken[device] = told.family.profile.id
+            say(f"Device {device}: {family_text(told.family)}")
+        say(f"{iso_time(wall)[11:23]} {exchange_text(told, self._families)}", indent=FURTHER)
+
+    def summary(self, summary: ListeningSummary, wall: float) -> None:
+        """Print a summary, apart from the lines around it."""
+        from tui.session.listening.summary import summary_lines
+
+        say()
+        for line in summary_lines(summary):
+            say(line, indent=4 if line.startswith(" ") else 2)
+        say()
+
+
+class HeardJson:
+    """One object a line on standard output."""
+
+    def __init__(self, line_text: str, families: Families) -> None:
+        self._line_text = line_text
+        self._families = families
+
+    def exchange(self, told: ToldExchange, wall: float) -> None:
+        """Print one exchange as an object."""
+        print_json(exchange_json(self._line_text, told, self._families, wall), compact=True)
+
+    def summary(self, summary: ListeningSummary, wall: float) -> None:
+        """Print a summary as an object."""
+        print_json(summary_json(self._line_text, summary, wall), compact=True)
+
+
+def exchange_json(
+    line_text: str, told: ToldExchange, families: Families, wall: float
+) -> dict[str, Any]:
+    """The object of one exchange."""
+    from tui.session.listening.summary import exception_meaning
+    from tui.session.listening.telling import exchange_text, function_name, names_asked
+
+    one, code = told.exchange, told.exchange.exception
+    return {
+        "event": "exchange",
+        "time": iso_time(wall),
+        "line": line_text,
+        "device": one.device,
+        **_family_json(told.family),
+        "function": one.function,
+        "name": function_name(one.function),
+        "answer": one.answer,
+        "exception": code,
+        "meaning": None if code is None else exception_meaning(code, told.profile),
+        "turnaround_ms": _milliseconds(one.turnaround),
+        "asked": names_asked(told),
+        "values": {value.code: heard_value_json(value) for value in told.values},
+        "request": one.request.hex(),
+        "reply": one.reply.hex(),
+        "text": exchange_text(told, families).strip(),
+    }
+
+
+def heard_value_json(value: HeardValue) -> dict[str, Any]:
+    """One value; that of a name or a bit word is its raw number."""
+    from .output import plain_number
+
+    number = value.value.number
+    return {
+        "address": value.address,
+        "raw": value.raw,
+        "value": value.raw if number is None else plain_number(number),
+        "unit": value.value.unit,
+        "text": value.value.text,
+        "written": value.written,
+    }
+
+
+def summary_json(line_text: str, summary: ListeningSummary, wall: float) -> dict[str, Any]:
+    """The object of a summary."""
+    from tui.session.listening.summary import summary_lines
+
+    tally = summary.tally
+    return {
+        "event": "summary",
+        "time": iso_time(wall),
+        "line": line_text,
+        "seconds": round(summary.seconds, 3),
+        "exchanges": tally.exchanges,
+        "frames": tally.frames,
+        "bytes": tally.bytes,
+        "load": None if summary.load is None else round(summary.load, 3),
+        "crossed": tally.crossed,
+        "noise": {"places": tally.noises, "bytes": tally.noise_bytes},
+        "silences": {
+            "judged": summary.silences_told,
+            "broken_frames": tally.cut,
+            "longest_ms": _milliseconds(tally.longest_cut) or 0.0,
+            "too_soon": tally.hasty,
+            "together": tally.together,
+        },
+        "drives": [_drive_json(one) for one in summary.drives],
+        "text": summary_lines(summary),
+    }
+
+
+def _drive_json(drive: DriveSummary) -> dict[str, Any]:
+    tally = drive.tally
+    return {
+        "device": tally.device,
+        **_family_json(drive.family),
+        "requests": tally.requests,
+        "per_second": None if drive.pace is None else round(drive.pace, 3),
+        "longest_pause": round(tally.longest_pause, 3),
+        "answered": tally.answered,
+        "unanswered": tally.answers["none"],
+        "damaged": tally.answers["damaged"],
+        "answered_twice": tally.answers["again"],
+        "exceptions": {str(code): times for code, times in sorted(tally.exceptions.items())},
+        "turnaround_ms": _milliseconds(tally.turnaround),
+        "commanded": tally.commanded,
+        "writes": {code: _write_json(one) for code, one in tally.writes.items()},
+        "reads": [_read_json(one) for one in tally.reads.values()],
+        "timeout": _feeding_json(drive),
+        "shorter": _shorter_json(drive),
+    }
+
+
+def _family_json(family: TakenFamily | None) -> dict[str, Any]:
+    return {
+        "profile": family.profile.id if family is not None else None,
+        "how": family.how if family is not None else None,
+        "others": list(family.others) if family is not None else [],
+    }
+
+
+def _write_json(one: WriteTally) -> dict[str, Any]:
+    every = None if one.every is None else round(one.every, 3)
+    kind = {"commands": one.commands, "times": one.times, "every": every}
+    return {**kind, "raw": one.raw, "text": one.text}
+
+
+def _read_json(one: ReadTally) -> dict[str, Any]:
+    every = None if one.every is None else round(one.every, 3)
+    return {**_span_json(one.span), "times": one.times, "every": every}
+
+
+def _span_json(span: WordSpan | ReadRequest) -> dict[str, int]:
+    return {"function": span.function, "address": span.address, "words": span.count}
+
+
+def _feeding_json(drive: DriveSummary) -> dict[str, Any] | None:
+    one = drive.feeding
+    if one is None:
+        return None
+    return {
+        "code": one.code,
+        "seconds": one.seconds,
+        "known": one.known,
+        "begun": one.begun,
+        "longest_pause": round(one.longest_pause, 3),
+        "fed": one.fed,
+        "margin": None if one.margin is None else round(one.margin, 3),
+    }
+
+
+def _shorter_json(drive: DriveSummary) -> dict[str, Any] | None:
+    one = drive.shorter
+    if one is None:
+        return None
+    return {
+        "codes": list(one.codes),
+        "requests_now": len(one.now),
+        "ms_now": _milliseconds(one.now_seconds),
+        "requests": [_span_json(request) for request in one.plan.requests],
+        "ms": _milliseconds(one.plan.seconds),
+    }
+
+
+def _milliseconds(seconds: float | None) -> float | None:
+    return None if seconds is None else round(seconds * 1000, 3)

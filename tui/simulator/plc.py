@@ -1,0 +1,111 @@
+"""A master that asks simulated drives as a PLC does, and a port at which both are heard."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+
+from tui.drive.profile.profile import Profile
+
+from .errors import SimulatorError
+from .server.conversation import RtuConversation
+from .server.faults import FaultPlan
+from .server.frames import seal
+from .simulation import Simulation
+from .spec import FaultRates
+
+_PAUSE = 0.02
+"""Seconds between an answer and the next request."""
+_ANSWER_WITHIN = 0.2
+"""Seconds after which the master asks on where nothing answers."""
+_STEP = 0.001
+_ASKED = ("status_word", "output_frequency", "motor_current")
+"""Quantities that the master reads, one by one, as many a program of a PLC does."""
+_GIVEN = ("frequency_reference", "command_frequency")
+"""Quantities of which it writes the first that can be written: 0, which moves nothing."""
+
+
+class PlcOnLine:
+    """Serves the talk on a simulated line to who listens; it begins with `start`.
+
+    `requests` are frames without checksum, asked one after the other, again and again. POSIX only:
+    raises SimulatorError where there are no pseudo-terminals.
+    """
+
+    def __init__(
+        self, simulation: Simulation, requests: Sequence[bytes], pause: float = _PAUSE
+    ) -> None:
+        if os.name != "posix":
+            raise SimulatorError("This system has no pseudo-terminals to listen to.")
+        self._conversation = RtuConversation(simulation.line, FaultPlan(FaultRates(), 0))
+        self._requests = [seal(request) for request in requests]
+        self._pause = pause
+        import tty
+
+        self._ours, self._theirs = os.openpty()
+        tty.setraw(self._theirs)
+        os.set_blocking(self._ours, False)
+        self.path = os.ttyname(self._theirs)
+        """The port to listen at."""
+        self._stopping = threading.Event()
+        self._thread = threading.Thread(target=self._work, name="simulated master", daemon=True)
+        self._simulation = simulation
+
+    def start(self) -> None:
+        """Let the master ask."""
+        self._simulation.start()
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End the talk and take the port away."""
+        self._stopping.set()
+        if self._thread.is_alive():
+            self._thread.join()
+        for descriptor in (self._ours, self._theirs):
+            os.close(descriptor)
+
+    def _work(self) -> None:
+        while not self._stopping.is_set():
+            for request in self._requests:
+                self._ask(request)
+                if self._stopping.wait(self._pause):
+                    return
+
+    def _ask(self, request: bytes) -> None:
+        """One exchange, which everybody hears as it goes."""
+        self._say(request)
+        asked = time.monotonic()
+        self._conversation.feed(request, asked)
+        while not self._stopping.wait(_STEP):
+            now = time.monotonic()
+            if reply := self._conversation.poll(now):
+                self._say(reply)
+                return
+            if now - asked > _ANSWER_WITHIN:
+                return
+
+    def _say(self, data: bytes) -> None:
+        with suppress(BlockingIOError):  # nobody takes what the port holds
+            os.write(self._ours, data)
+
+
+def plc_cycle(drives: Sequence[tuple[int, Profile]]) -> list[bytes]:
+    """A usual cycle over drives at their addresses: who each is, single reads, a reference of 0."""
+    found = []
+    for address, profile in drives:
+        if profile.function(43):
+            found.append(bytes([address, 43, 14, 1, 0]))
+        asked = [profile.quantity(one) for one in _ASKED]  # type: ignore[arg-type]
+        found += [
+            bytes([address, one.function, *one.address.to_bytes(2, "big"), 0, 1])
+            for one in asked
+            if one is not None
+        ]
+        given = [profile.quantity(one) for one in _GIVEN]  # type: ignore[arg-type]
+        written = next((one for one in given if one is not None and "w" in one.access), None)
+        if written is not None:
+            found.append(bytes([address, 6, *written.address.to_bytes(2, "big"), 0, 0]))
+    return found
