@@ -95,6 +95,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
     "a check": (2, ("profiles", "--check", "FOLDER/set.toml"), "CheckTold"),
     "ports": (0, ("ports",), ""),
     "names of lines": (0, ("lines",), "LinesTold"),
+    "what others say": (0, ("listen", "sim:atv71@2", "--for", "0.5"), "HeardSummaryTold"),
     "no such code": (2, ("read", *DRIVE, "NOSUCH"), "ErrorTold"),
 }  # fmt: skip
 

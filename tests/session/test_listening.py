@@ -258,6 +258,15 @@ def test_a_request_that_is_not_answered_feeds_nobody() -> None:
     assert "NOT FED" in heard.lines
 
 
+@pytest.mark.parametrize(("waited", "answers"), [(0.6, ["none"]), (0.2, [])])
+def test_what_is_open_at_the_end_is_told_where_it_waits_since_long(
+    waited: float, answers: list[str]
+) -> None:
+    heard = Heard().say(READ)
+    found = heard.listener.end(heard.now + waited)
+    assert [one.exchange.answer for one in found] == answers
+
+
 def test_two_drives_at_one_address_are_told() -> None:
     heard = cycle(Heard(named("atv71", "atv71")), 3, READ, WORDS, WORDS)
     assert "ANSWERED TWICE 3 times: do two devices have the address 2?" in heard.lines

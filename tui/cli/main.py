@@ -26,6 +26,7 @@ COMMANDS = {
     "identify": ("identify", "Ask a drive who it is."),
     "journal": ("journal", "Show what was written to drives from here."),
     "lines": ("lines", "List the lines that have a name, and what is known of them."),
+    "listen": ("listen", "Tell what others say on a line, sending nothing."),
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "prove": ("prove", "Prove that a drive reacts to a silent line."),

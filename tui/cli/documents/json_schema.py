@@ -23,6 +23,7 @@ from .of_drives import (
     StatusTold,
     StopTold,
 )
+from .of_listening import HeardExchangeTold, HeardSummaryTold
 from .of_others import (
     CheckTold,
     InputsTold,
@@ -55,7 +56,7 @@ DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     CommandTold, StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
     BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
     ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
-    JournalTold, LinesTold,
+    JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""
 

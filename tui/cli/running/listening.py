@@ -116,8 +116,10 @@ class HearingRun:
             self._tell(self._listener.take(data, now) if data else self._listener.idle(now))
 
     def end(self) -> None:
-        """Tell what it came to."""
-        self._sum_up(time.monotonic())
+        """Tell what is still open, and what it came to."""
+        now = time.monotonic()
+        self._tell(self._listener.end(now))
+        self._sum_up(now)
 
     def _tell(self, exchanges: list[ToldExchange]) -> None:
         for one in exchanges:

@@ -101,7 +101,7 @@ def reading_json(reading: Reading) -> dict[str, Any]:
     what so high a raw value means.
     """
     number = reading.value.number if reading.value else None
-    value = reading.raw if number is None else _plain(number)
+    value = reading.raw if number is None else plain_number(number)
     return {
         "address": reading.parameter.address,
         "raw": reading.raw,
@@ -114,7 +114,7 @@ def reading_json(reading: Reading) -> dict[str, Any]:
     }
 
 
-def _plain(number: Decimal) -> int | float:
+def plain_number(number: Decimal) -> int | float:
     """A JSON number: an integer where the value has no decimals."""
     return int(number) if int(number.as_tuple().exponent) >= 0 else float(number)
 

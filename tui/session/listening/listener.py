@@ -16,6 +16,8 @@ from .words import HeardValue, values_of
 SHORTEST_PAUSE = 0.05
 """Seconds without a byte that end a frame: an adapter may hand over the rest so much later."""
 BESIDE_SILENCE = 0.02
+LONG_FOR_AN_ANSWER = 0.5
+"""Seconds after which a request that is open at the end counts as not answered."""
 
 FrameHeard = Callable[[HeardFrame, bool | None], None]
 """Takes each frame, with whether it is a request; None of bytes that form no frame."""
@@ -69,6 +71,11 @@ class LineListener:
         """No byte came for a pause: what ends with it, and what is not answered any more."""
         found = self._told(self._splitter.pause())
         return found + [self._tell(one) for one in self._pairing.wait(now)]
+
+    def end(self, now: float) -> list[ToldExchange]:
+        """Nothing more is heard: a request that waits for its answer since long has none."""
+        found = self._told(self._splitter.pause())
+        return found + [self._tell(one) for one in self._pairing.wait(now, LONG_FOR_AN_ANSWER)]
 
     def _told(self, frames: list[HeardFrame]) -> list[ToldExchange]:
         found = []

@@ -83,9 +83,9 @@ class Pairing:
         self._asked = _Asked(frame)
         return found, True
 
-    def wait(self, now: float) -> list[HeardExchange]:
-        """The time is `now`, and nothing has come: what no answer will come to any more."""
-        if self._asked is None or now - self._asked.frame.ended < GIVEN_UP_AFTER:
+    def wait(self, now: float, longest: float = GIVEN_UP_AFTER) -> list[HeardExchange]:
+        """The time is `now`, and nothing has come: the request that waits for `longest` seconds."""
+        if self._asked is None or now - self._asked.frame.ended < longest:
             return []
         return self._given_up()
 

@@ -1,0 +1,149 @@
+"""A port that is listened to: reading only, and for one program alone."""
+
+from __future__ import annotations
+
+import fcntl
+import os
+import pty
+import tty
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
+from tui.bus.line import Line
+from tui.bus.link import SerialLink
+from tui.bus.listening_line import ListeningLine
+from tui.bus.program import Program
+from tui.bus.share.place import SharePlace
+from tui.bus.transport.serial_listening import open_listening
+
+ME = Program("1", "listen", os.getpid())
+
+
+class Talk:
+    """A pseudo-terminal at whose other end somebody talks."""
+
+    def __init__(self) -> None:
+        self.ours, self.theirs = pty.openpty()
+        tty.setraw(self.theirs)
+        self.path = os.ttyname(self.theirs)
+
+    def close(self) -> None:
+        for one in (self.ours, self.theirs):
+            if one >= 0:
+                os.close(one)
+        self.ours = self.theirs = -1
+
+
+@pytest.fixture
+def talk() -> Iterator[Talk]:
+    made = Talk()
+    yield made
+    made.close()
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> SharePlace:
+    return SharePlace("serial:x", tmp_path / "lines", (tmp_path / "run",))
+
+
+def test_bytes_are_read_as_they_come(talk: Talk) -> None:
+    with ListeningLine(SerialLink(talk.path), None, ME) as line:
+        assert line.read(0.0) == b""
+        os.write(talk.ours, b"\x02\x03\x00\r\n\x1a\x11")
+        assert line.read(5.0) == b"\x02\x03\x00\r\n\x1a\x11"
+        assert not line.has_times
+        assert line.character == 0.0
+
+
+def test_the_system_lets_nothing_be_written(talk: Talk) -> None:
+    with ListeningLine(SerialLink(talk.path), None, ME):
+        opened = [int(fd) for fd in os.listdir("/proc/self/fd") if _leads_to(int(fd)) == talk.path]
+        (port,) = [fd for fd in opened if fd != talk.theirs]
+        assert fcntl.fcntl(port, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY
+        with pytest.raises(OSError, match="Bad file descriptor"):
+            os.write(port, b"x")
+    assert _leads_to(port) != talk.path
+
+
+def _leads_to(descriptor: int) -> str:
+    try:
+        return os.readlink(f"/proc/self/fd/{descriptor}")
+    except OSError:
+        return ""
+
+
+def test_a_port_that_goes_away_is_told(talk: Talk) -> None:
+    with ListeningLine(SerialLink(talk.path), None, ME) as line:
+        talk.close()
+        with pytest.raises(LineLost, match="went away"):
+            line.read(5.0)
+
+
+def test_one_program_at_a_time(talk: Talk) -> None:
+    with ListeningLine(SerialLink(talk.path), None, ME):
+        with pytest.raises(PortBusy), ListeningLine(SerialLink(talk.path), None, ME):
+            pass
+        with pytest.raises(PortBusy):
+            open_listening(talk.path, 19200, "8E1")
+    with ListeningLine(SerialLink(talk.path), None, ME):
+        pass
+
+
+def test_another_program_with_a_real_port_open_is_named(
+    talk: Talk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.listening_line.others_at", lambda _path: "mbpoll (pid 7)")
+    with (
+        pytest.raises(PortBusy, match=r"mbpoll \(pid 7\)"),
+        ListeningLine(SerialLink(talk.path), None, ME),
+    ):
+        pass
+
+
+def test_a_line_of_another_drivepanel_is_left_to_it(talk: Talk, place: SharePlace) -> None:
+    owner = Line(SerialLink(talk.path), place=place, program=Program("2", "panel", os.getpid()))
+    owner.open(wait=5.0)
+    try:
+        with (
+            pytest.raises(NotShared, match=r"drivepanel panel \(pid \d+\) has .* Frames screen"),
+            ListeningLine(SerialLink(talk.path), place, ME),
+        ):
+            pass
+    finally:
+        owner.close()
+    with ListeningLine(SerialLink(talk.path), place, ME):
+        pass
+
+
+def test_no_other_drivepanel_takes_a_line_that_is_listened_to(
+    talk: Talk, place: SharePlace, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.share.sharing.NO_OWNER", 0.1)
+    late = Line(SerialLink(talk.path), place=place, program=Program("2", "panel", os.getpid()))
+    with ListeningLine(SerialLink(talk.path), place, ME):
+        try:
+            with pytest.raises(NotShared, match=r"listen \(pid \d+\) holds the line"):
+                late.open(wait=5.0)
+        finally:
+            late.close()
+
+
+def test_ports_that_cannot_be_listened_to(talk: Talk, tmp_path: Path) -> None:
+    with pytest.raises(PortMissing):
+        open_listening(str(tmp_path / "none"), 19200, "8E1")
+    with pytest.raises(PortRefused, match="12345 baud"):
+        open_listening(talk.path, 12345, "8E1")
+    with pytest.raises(PortRefused):
+        open_listening(str(tmp_path), 19200, "8E1")
+
+
+def test_silence_and_characters_are_those_of_the_line(
+    talk: Talk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.listening_line.is_pseudo_terminal", lambda _path: False)
+    line = ListeningLine(SerialLink(talk.path, 9600, "8N1"), None, ME)
+    assert line.character == pytest.approx(10 / 9600)
+    assert line.silence == pytest.approx(35 / 9600)

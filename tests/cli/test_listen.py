@@ -1,0 +1,219 @@
+"""`drivepanel listen`: what it prints and writes, on a line that a PLC of ours asks."""
+
+from __future__ import annotations
+
+import os
+import signal
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.programs import DRIVEPANEL, served, wait_until
+from tui.simulator import DriveSpec, PlcOnLine, Simulation
+from tui.wire.frames import is_whole
+
+from .commands import ended, refused, run
+from .test_documents import documents
+
+TWO = "sim:atv71@1,atv312@2"
+
+
+def blocks(path: Path) -> list[tuple[int, bytes]]:
+    """The blocks of a pcapng file, each whole: its kind and body."""
+    data, found, at = path.read_bytes(), [], 0
+    while at < len(data):
+        kind, length = struct.unpack_from("<II", data, at)
+        assert struct.unpack_from("<I", data, at + length - 4) == (length,)
+        found.append((kind, data[at + 8 : at + length - 4]))
+        at += length
+    return found
+
+
+def packets(path: Path) -> list[bytes]:
+    """The packets of a pcapng file."""
+    found = [body for kind, body in blocks(path) if kind == 6]
+    return [body[20 : 20 + struct.unpack_from("<I", body, 12)[0]] for body in found]
+
+
+def told(*arguments: str | Path) -> list[dict[str, Any]]:
+    """The objects that `listen --json` prints; all fit the schema."""
+    return documents(run(0, "listen", *arguments, "--json"))
+
+
+@contextmanager
+def plc(*requests: str, profile: str = "atv71") -> Iterator[PlcOnLine]:
+    """A master that asks a simulated drive at 2 these requests, as soon as it is started."""
+    with Simulation([DriveSpec(profile, 2)]) as simulation:
+        master = PlcOnLine(simulation, [bytes.fromhex(one) for one in requests], pause=0.005)
+        try:
+            yield master
+        finally:
+            master.stop()
+
+
+READ_ETA, WRITE_LFR, NOBODY, NO_WORD = "030c810001", "0621360000", "09030c810001", "0300010001"
+CYCLE = tuple(f"02{pdu}" for pdu in (READ_ETA, WRITE_LFR, NO_WORD))
+
+
+def test_a_line_of_text_for_each_exchange_and_a_summary() -> None:
+    text = run(0, "listen", TWO, "--for", "1")
+    lines = text.splitlines()
+    assert lines[0].startswith("Listening at /dev/pts/")
+    assert "Device 1: Altivar 71 (as it says itself)" in lines
+    assert any(line[12:] == "   1 read   RFR 0.0 Hz" for line in lines)
+    assert any(line[12:] == "   2 write  LFr ← 0.0 Hz" for line in lines)
+    assert text.count("commanded by the master") == 2
+    assert lines[-1].startswith("Heard ")
+
+
+def test_an_object_for_each_exchange_and_a_summary() -> None:
+    *exchanges, summary = told(TWO, "--for", "0.8")
+    assert {one["event"] for one in exchanges} == {"exchange"}
+    read = next(one for one in exchanges if one["device"] == 1 and "RFR" in one["values"])
+    assert (read["function"], read["answer"], read["how"]) == (3, "ok", "identified")
+    assert read["values"]["RFR"] == {
+        "address": 3202, "raw": 0, "value": 0.0, "unit": "Hz", "text": "0.0", "written": False,
+    }  # fmt: skip
+    written = next(one for one in exchanges if one["device"] == 2 and one["function"] == 6)
+    assert written["values"]["LFr"]["written"] is True
+    assert [one["device"] for one in summary["drives"]] == [1, 2]
+    first = summary["drives"][0]
+    assert first["commanded"] is True
+    assert first["timeout"]["known"] == "factory"
+    assert first["shorter"]["requests_now"] == 3
+    assert len(first["shorter"]["requests"]) == 1
+    assert summary["silences"]["judged"] is False
+
+
+def test_profiles_of_all_drives_and_of_one() -> None:
+    *exchanges, _ = told(TWO, "--for", "0.5", "-p", "atv31", "-p", "2=atv71")
+    taken = {(one["device"], one["profile"], one["how"]) for one in exchanges}
+    assert taken == {(1, "atv31", "named"), (2, "atv71", "named")}
+
+
+def test_summaries_on_the_way() -> None:
+    found = told(TWO, "--for", "2.5", "--every", "1")
+    assert [one["event"] for one in found].count("summary") == 3
+
+
+def test_a_file_of_frames_in_modbus_tcp_form(tmp_path: Path) -> None:
+    path = tmp_path / "frames.pcapng"
+    *exchanges, summary = told(TWO, "--for", "0.8", "--pcap", path)
+    found = packets(path)
+    assert len(found) == summary["frames"]
+    mbap = [packet[40:] for packet in found]
+    assert {one[6] for one in mbap} == {1, 2}
+    whole = [one for one in exchanges if one["answer"] == "ok"]
+    assert [one[7:].hex() for one in mbap[: 2 * len(whole)]] == [
+        pdu for one in whole for pdu in (one["request"], one["reply"])
+    ]
+
+
+def test_a_file_of_raw_frames_says_how_it_is_read(tmp_path: Path) -> None:
+    path = tmp_path / "frames.pcapng"
+    text = run(0, "listen", TWO, "--for", "0.5", "--pcap", path, "--raw")
+    assert all(is_whole(packet) for packet in packets(path))
+    assert "mbrtu" in text
+    assert f"-r {path}" in text
+
+
+def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:
+    path = tmp_path / "frames.pcapng"
+    path.write_bytes(b"mine")
+    assert "--force" in refused(2, "listen", TWO, "--for", "0.2", "--pcap", path)
+    assert path.read_bytes() == b"mine"
+    ended(0, "listen", TWO, "--for", "0.3", "--pcap", path, "--force")
+    assert packets(path)
+    nowhere = tmp_path / "none" / "x.pcapng"
+    assert "cannot be written" in refused(2, "listen", TWO, "--for", "0.2", "--pcap", nowhere)
+
+
+@pytest.mark.parametrize(
+    ("words", "why"),
+    [
+        (("tcp:127.0.0.1",), "listening needs a serial port"),
+        (("rtu-tcp:127.0.0.1:5020",), "listening needs a serial port"),
+        ((TWO, "--raw"), "--pcap"),
+        ((TWO, "-p", "300=atv71"), "ADDRESS=ID"),
+        ((TWO, "-p", "nosuch"), "no profile"),
+        ((TWO, "-p", "atv71", "-p", "atv31"), "one profile"),
+    ],
+)
+def test_what_cannot_be_listened_to(words: tuple[str, ...], why: str) -> None:
+    assert why in refused(2, "listen", *words, "--for", "0.1")
+
+
+def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+    assert "does not exist" in refused(3, "listen", f"serial:{tmp_path}/none", "--for", "0.1")
+
+
+def test_ctrl_c_ends_with_a_whole_file_and_the_summary(tmp_path: Path) -> None:
+    path = tmp_path / "frames.pcapng"
+    with plc(*CYCLE) as master:
+        words = ["listen", master.path, "--pcap", str(path), "-p", "atv71"]
+        with served([*DRIVEPANEL, *words], ready="Listening at") as listening:
+            master.start()
+            wait_until(lambda: path.stat().st_size > 5000, "frames in the file")
+            listening.process.send_signal(signal.SIGINT)
+            out, err = listening.process.communicate(timeout=60)
+    assert listening.process.returncode == 130
+    assert "Device 2: Altivar 71 (as -p says)" in out
+    assert "refused" in out
+    found = packets(path)
+    assert len(found) > 30
+    assert f"{len(found)} packets written to {path}" in err
+
+
+def test_a_kill_leaves_a_whole_file(tmp_path: Path) -> None:
+    path = tmp_path / "frames.pcapng"
+    with plc(*CYCLE) as master:
+        words = ["listen", master.path, "--pcap", str(path)]
+        with served([*DRIVEPANEL, *words], ready="Listening at") as listening:
+            master.start()
+            wait_until(lambda: path.stat().st_size > 5000, "frames in the file")
+            listening.end(signal.SIGKILL)
+    assert len(packets(path)) > 30
+
+
+def test_silence_and_refusals_of_a_plc_cycle() -> None:
+    with plc(*CYCLE, NOBODY) as master:
+        master.start()
+        *exchanges, summary = told(master.path, "--for", "2")
+    answers = {(one["device"], one["function"], one["answer"]) for one in exchanges}
+    assert {(2, 3, "ok"), (2, 6, "ok"), (2, 3, "exception"), (9, 3, "none")} <= answers
+    two, nine = summary["drives"]
+    assert two["exceptions"] == {"2": two["exceptions"]["2"]}
+    assert (nine["answered"], nine["unanswered"] > 2) == (0, True)
+    refusal = next(one for one in exchanges if one["answer"] == "exception")
+    assert refusal["exception"] == 2
+    assert refusal["values"] == {}
+    assert refusal["asked"] == ["1"]
+
+
+def test_what_came_from_the_wire_commands_no_terminal() -> None:
+    """A drive whose name is an escape sequence, asked who it is by another master."""
+    spec = DriveSpec("atv71", 2, identity={6: "\x1b[2J\x07"})
+    with Simulation([spec]) as simulation:
+        master = PlcOnLine(simulation, [bytes.fromhex("022b0e0100")])
+        try:
+            master.start()
+            text = run(0, "listen", master.path, "--for", "0.5")
+            found = run(0, "listen", master.path, "--for", "0.5", "--json")
+        finally:
+            master.stop()
+    assert "␛[2J␇" in text
+    assert not {"\x1b", "\x07"} & set(text + found)
+
+
+def test_nobody_talks() -> None:
+    ours, theirs = os.openpty()
+    try:
+        text = run(0, "listen", os.ttyname(theirs), "--for", "0.3")
+        assert "Nothing was heard" in text
+    finally:
+        os.close(ours)
+        os.close(theirs)
