@@ -1,0 +1,115 @@
+"""Defects of listening: what others say is misheard, or disturbed."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+DEFECTS = (
+    Defect(
+        "listener-can-write",
+        "tui/bus/transport/serial_listening.py",
+        "os.O_RDONLY | os.O_NOCTTY",
+        "os.O_RDWR | os.O_NOCTTY",
+        "A listener that is to send nothing could disturb a motor that another master commands.",
+        ("tests/bus/test_listening_line.py::test_the_system_lets_nothing_be_written",),
+    ),
+    Defect(
+        "listener-drains",
+        "tui/bus/transport/serial_listening.py",
+        "termios.TCSANOW",
+        "termios.TCSADRAIN",
+        "Opening a port to listen waits for its output, and touches it.",
+        ("tests/line/test_listening.py::test_no_write_no_break_no_drain_reaches_the_port",),
+    ),
+    Defect(
+        "listener-shares-the-port",
+        "tui/bus/transport/serial_listening.py",
+        "        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)\n",
+        "",
+        "Listener and master on one port take each other's bytes.",
+        ("tests/bus/test_listening_line.py::test_one_program_at_a_time",),
+    ),
+    Defect(
+        "listener-takes-an-owned-line",
+        "tui/bus/listening_line.py",
+        "            if self._lock.take():\n",
+        "            if self._lock.take() or True:\n",
+        "Listening takes the replies from the panel that commands a motor.",
+        ("tests/bus/test_listening_line.py::test_a_line_of_another_drivepanel_is_left_to_it",),
+    ),
+    Defect(
+        "frame-cut-at-its-zero",
+        "tui/wire/heard/lengths.py",
+        "for length in sorted(found, reverse=True):",
+        "for length in sorted(found):",
+        "A reply that ends with a zero is cut short, and its values are lost.",
+        (
+            "tests/wire/test_heard.py::test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it",
+        ),
+    ),
+    Defect(
+        "reply-of-whoever-was-asked",
+        "tui/wire/heard/pairing.py",
+        "frame.device != asked.device or frame.function",
+        "frame.function",
+        "A late reply of one drive is told as the values of another.",
+        ("tests/wire/test_heard.py::test_what_becomes_of_requests",),
+    ),
+    Defect(
+        "write-again-taken-for-its-reply",
+        "tui/wire/heard/pairing.py",
+        "and not _repeated(asked, frame)\n",
+        "\n",
+        "A drive that answers nothing is told to take its commands.",
+        ("tests/wire/test_heard.py::test_a_write_that_is_sent_again_is_no_reply",),
+    ),
+    Defect(
+        "second-answer-not-told",
+        "tui/wire/heard/pairing.py",
+        "if same and last is not None",
+        "if False and last is not None",
+        "Nobody learns that two drives have one address.",
+        ("tests/session/test_listening.py::test_two_drives_at_one_address_are_told",),
+    ),
+    Defect(
+        "refused-write-told-as-a-value",
+        "tui/session/listening/words.py",
+        'if exchange.answer not in ("ok", "broadcast"):',
+        'if exchange.answer == "again":',
+        "A command that the drive refused is told as if it held.",
+        ("tests/session/test_listening.py",),
+    ),
+    Defect(
+        "likely-told-as-sure",
+        "tui/session/listening/families.py",
+        'return TakenFamily(first, "likely",',
+        'return TakenFamily(first, "identified",',
+        "A guessed family is shown as one that the drive has told.",
+        ("tests/session/test_listening.py::test_a_family_is_likely_by_what_the_drive_answers",),
+    ),
+    Defect(
+        "requests-feed-without-an-answer",
+        "tui/session/listening/tally.py",
+        "        if exchange.turnaround is not None:\n",
+        "        if exchange.turnaround is None:\n            self.fed = exchange.time\n"
+        "        else:\n",
+        "A drive that trips for want of requests is told to be fed.",
+        ("tests/session/test_listening.py::test_a_request_that_is_not_answered_feeds_nobody",),
+    ),
+    Defect(
+        "pause-of-now-forgotten",
+        "tui/session/listening/tally.py",
+        "now - self.fed if self.fed is not None else 0.0)",
+        "0.0)",
+        "A master that has died is told to feed its drives.",
+        ("tests/session/test_listening.py::test_a_pause_that_goes_on_counts_too",),
+    ),
+    Defect(
+        "half-a-packet-left",
+        "tui/session/capture_file.py",
+        "            self._file.truncate(self._size)\n",
+        "",
+        "A full disk leaves a file of frames that no program reads.",
+        ("tests/session/test_capture_file.py",),
+    ),
+)
