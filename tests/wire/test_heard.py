@@ -172,7 +172,7 @@ def answers(*readings: bytes, every: float = 0.01) -> list[tuple[int, int, str]]
         ((WORDS, READ, WORDS), [(2, 3, "unasked"), (2, 3, "ok")]),
         # a late reply of one drive takes nothing from the one that is asked now
         (
-            (READ, read_frame(3, 3201, 1), WORDS, reply_words(3, 7)),
+            (READ, read_frame(3, 3201, 2), WORDS, reply_words(3, 7, 8)),
             [(2, 3, "none"), (2, 3, "unasked"), (3, 3, "ok")],
         ),
         # a reply of another length belongs to another request

@@ -23,8 +23,12 @@ class CaptureFile:
         self._form: PacketForm = RtuForm() if raw else ModbusTcpForm()
         self._file = path.open("wb" if force else "xb", buffering=0)
         self._size = 0
-        self._write(section_block(f"drivepanel {tui.__version__}"))
-        self._write(interface_block(self._form.link_type, line))
+        try:
+            self._write(section_block(f"drivepanel {tui.__version__}"))
+            self._write(interface_block(self._form.link_type, line))
+        except OSError:
+            self._file.close()
+            raise
 
     def add_frame(self, device: int, pdu: bytes, wall: float, *, request: bool) -> None:
         """Add a whole frame; `wall` is its time in seconds since 1970."""

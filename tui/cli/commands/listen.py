@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -140,4 +141,5 @@ def _say_begin(port: str, raw_file: Path | None) -> None:
 
     say(f"Listening at {port}; nothing is sent. Ctrl-C ends it.")
     if raw_file is not None:
-        say(f"To read the file: {READ_RAW.replace('FILE', str(raw_file))}")
+        say("To read the file:")
+        say(READ_RAW.replace("FILE", shlex.quote(str(raw_file))), to_copy=True)

@@ -10,13 +10,13 @@ import click
 from tui.drive.plain import plain
 
 
-def say(text: str = "", *, err: bool = False, indent: int = 0) -> None:
+def say(text: str = "", *, err: bool = False, indent: int = 0, to_copy: bool = False) -> None:
     """Print lines on standard output, or on standard error; on a terminal broken at words.
 
-    What does not fit goes on `indent` characters from the left.
+    What does not fit goes on `indent` characters from the left. What is `to_copy` is not broken.
     """
     stream = sys.stderr if err else sys.stdout
-    width = get_terminal_size().columns if stream.isatty() else 0
+    width = get_terminal_size().columns if stream.isatty() and not to_copy else 0
     told = printable(text, stream.encoding)
     click.echo("\n".join(_broken(line, width, indent) for line in told.split("\n")), err=err)
 
