@@ -26,6 +26,7 @@ from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.dialogs.palette import Palette
 from tui.screens.faults.screen import FaultsScreen
+from tui.screens.frames.screen import FramesScreen
 from tui.screens.monitor.screen import MonitorScreen
 from tui.screens.parameters.edit_value import EditNumber
 from tui.screens.parameters.screen import ParametersScreen
@@ -164,6 +165,9 @@ async def faults(made: Bench) -> None:
     screen = made.app.screen
     await until(made.pilot, lambda: screen._recorder.latest is not None)  # type: ignore[attr-defined]
     await dialog(made, "ctrl+s")
+    await made.pilot.press("7")
+    await until(made.pilot, lambda: isinstance(made.app.screen, FramesScreen))
+    await dialog(made, "ctrl+s")
 
 
 async def connection(made: Bench) -> None:
@@ -202,6 +206,7 @@ ASKED = {
     "words",
     "X",
     "Ctrl+S of Faults",
+    "Ctrl+S of Frames",
     "n",
 }
 

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Mapping
+from datetime import datetime
+from pathlib import Path
 from typing import ClassVar
 
 from rich.text import Text
 from textual.app import ComposeResult
 
 from tui.bus.api import Frame
-from tui.bus.link import TcpLink
+from tui.bus.link import TcpLink, label
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
+from tui.session.paths import state_folder
 from tui.widgets.drawing import cut, cut_at_word, rule, short
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 from tui.wire.frames import hex_text
 
 from ..base import PanelScreen
+from ..dialogs.files import fault_of_new
 from ..keys.table import FRAMES, bindings
 from .decoded import decoded
 
@@ -88,10 +93,62 @@ class FramesScreen(PanelScreen):
         self._held = tuple(self._line.trace) if self._held is None else None
         self.look()
 
+    def action_save_file(self) -> None:
+        """Write the frames that are kept, or held, to a file whose name the person may change."""
+        from ..dialogs.ask import Ask
+        from .saving import SAVED_AS
+
+        frames = self._held if self._held is not None else tuple(self._line.trace)
+        if not frames:
+            self.app.tell("Nothing to save: no frame is kept yet.")
+            return
+        name = f"frames-{time.strftime('%Y%m%d-%H%M%S')}.pcapng"
+        proposed = str(state_folder() / name)
+
+        def told(name: str | None) -> None:
+            if name:
+                self._write(Path(name).expanduser(), frames)
+
+        asked = Ask(
+            "Save the frames as",
+            fault_of_new,
+            text=proposed,
+            about=SAVED_AS,
+            takes="writes the file",
+        )
+        self.app.push_screen(asked, told)
+
+    def _write(self, path: Path, frames: tuple[Frame, ...]) -> None:
+        from .saving import save_frames
+
+        tcp = isinstance(self._line.link, TcpLink)
+        words = decoded(frames, self._profile, self._raws, tcp=tcp)
+        since_1970 = time.time() - self.app.clock.monotonic()
+        try:
+            count = save_frames(
+                path,
+                frames,
+                words,
+                label(self._line.link),
+                tcp=tcp,
+                wall_of=lambda moment: moment + since_1970,
+                time_text=_time_text,
+            )
+        except OSError as error:
+            self.app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
+        else:
+            self.app.tell(f"Saved: {count} frames in {path}")
+
     def action_other_page(self) -> None:
         """The bytes as they are, or words."""
         self._bytes = not self._bytes
         self.look()
+
+
+def _time_text(wall: float) -> str:
+    """A time of the day with its date, to the millisecond."""
+    moment = datetime.fromtimestamp(wall).astimezone()
+    return moment.isoformat(sep=" ", timespec="milliseconds")
 
 
 def frame_line(frame: Frame, now: float, width: int, words: str = "") -> Text:
