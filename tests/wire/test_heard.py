@@ -195,3 +195,18 @@ def test_an_exchange_tells_its_times_and_its_words() -> None:
     assert (one.request, one.reply) == (READ[1:-2], WORDS[1:-2])
     (refused,) = heard(READ, REFUSED)
     assert refused.exception == 2
+
+
+def test_noise_costs_no_more_the_more_of_it_comes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At a wrong baud rate all is noise, byte after byte."""
+    looked: list[int] = []
+
+    def counted(data: bytes | bytearray) -> int:
+        looked.append(len(data))
+        return whole_length(data)
+
+    monkeypatch.setattr("tui.wire.heard.splitting.whole_length", counted)
+    splitter, chance, noise = FrameSplitter(CHARACTER), random.Random(1), 2000
+    for number in range(noise):
+        splitter.take(chance.randbytes(1), number * CHARACTER)
+    assert len(looked) < 4 * noise

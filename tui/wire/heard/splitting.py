@@ -13,6 +13,8 @@ from .lengths import may_grow, whole_length
 
 LONGEST_HEAP = 4 * MAX_FRAME
 """Bytes without a frame that are kept at most, waiting for a pause."""
+SILENT_BEFORE = 0.001
+"""Seconds of silence before a reading with which a frame may begin, whatever lies before it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -51,6 +53,8 @@ class _Chunk:
     length: int
     begun: float
     ended: float
+    apart: bool = False
+    """Whether it was silent before it."""
     fresh: bool = True
     """Whether none of it was given yet."""
 
@@ -73,6 +77,8 @@ class FrameSplitter:
         self._character = character
         self._data = bytearray()
         self._chunks: list[_Chunk] = []
+        self._dead = 0
+        """Bytes at the beginning with none of which a frame can begin."""
         self._ended = float("-inf")
         """When the last byte that was read had ended."""
         self._given: float | None = None
@@ -87,8 +93,9 @@ class FrameSplitter:
         """Bytes that were read at a time; the frames that are whole by now."""
         if data:
             self._data += data
-            begun = max(self._ended, time - len(data) * self._character)
-            self._chunks.append(_Chunk(len(data), min(begun, time), time))
+            begun = min(time, max(self._ended, time - len(data) * self._character))
+            apart = begun - self._ended > SILENT_BEFORE
+            self._chunks.append(_Chunk(len(data), begun, time, apart))
             self._ended = time
         return self._frames(final=False)
 
@@ -107,12 +114,15 @@ class FrameSplitter:
 
     def _next(self) -> tuple[bool, int]:
         """Whether a frame or noise is at the beginning, and how much; 0 where it is not known."""
-        if length := whole_length(self._data):
-            return True, length
-        start = self._frame_of_its_own() if may_grow(self._data) else self._frame_behind()
-        if not start and len(self._data) > LONGEST_HEAP:
-            start = len(self._data) - MAX_FRAME
-        return False, start
+        while self._dead < len(self._data):
+            rest = self._data[self._dead : self._dead + MAX_FRAME]
+            if length := whole_length(rest):
+                return not self._dead, self._dead or length
+            if may_grow(rest):
+                break
+            self._dead += 1
+        start = self._frame_of_its_own()
+        return False, start or (self._dead if self._dead > LONGEST_HEAP else 0)
 
     def _last(self) -> tuple[bool, int]:
         """The same where nothing more comes."""
@@ -126,25 +136,26 @@ class FrameSplitter:
 
     def _frame_behind(self) -> int:
         """Where the next whole frame begins; 0 where there is none."""
-        starts = range(1, len(self._data) - MIN_FRAME + 1)
+        starts = range(max(1, self._dead), len(self._data) - MIN_FRAME + 1)
         return next((at for at in starts if whole_length(self._data[at:])), 0)
 
     def _frame_of_its_own(self) -> int:
-        """Where a frame begins that readings begin and end with, so that it is no part of another.
+        """Where a frame begins that lies between a silence and the last byte that was read.
 
-        Returns 0 where there is none.
+        So it is no part of another. Returns 0 where there is none.
         """
         at = 0
-        for chunk in self._chunks[:-1]:
-            at += chunk.length
-            if whole_length(self._data[at:]) == len(self._data) - at:
+        for chunk in self._chunks:
+            if chunk.apart and at and whole_length(self._data[at:]) == len(self._data) - at:
                 return at
+            at += chunk.length
         return 0
 
     def _cut(self, length: int, *, whole: bool) -> HeardFrame:
         """Give so many bytes from the beginning."""
         data = bytes(self._data[:length])
         del self._data[:length]
+        self._dead = max(0, self._dead - length)
         first = self._chunks[0]
         begun, ended, gap = first.begun, first.begun, 0.0
         pause = begun - self._given if first.fresh and self._given is not None else None
