@@ -13,6 +13,7 @@ from typing import Any
 import pytest
 
 from tests.programs import DRIVEPANEL, served, wait_until
+from tui.session.connect.named_lines import settings_file
 from tui.simulator import DriveSpec, PlcOnLine, Simulation
 from tui.wire.frames import is_whole
 
@@ -207,6 +208,34 @@ def test_what_came_from_the_wire_commands_no_terminal() -> None:
             master.stop()
     assert "␛[2J␇" in text
     assert not {"\x1b", "\x07"} & set(text + found)
+
+
+def test_the_name_of_a_line_names_the_profile_of_its_drive() -> None:
+    path = settings_file()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    path.write_text(
+        f'[lines.fan]\nline = "{TWO}"\ndevice = 2\nprofile = "atv71"\n', encoding="utf-8"
+    )
+    *exchanges, _ = told("fan", "--for", "0.5")
+    assert {(one["device"], one["profile"], one["how"]) for one in exchanges} == {
+        (1, "atv71", "identified"),
+        (2, "atv71", "named"),
+    }
+
+
+def test_a_port_that_goes_away_ends_with_what_was_heard(tmp_path: Path) -> None:
+    path = tmp_path / "frames.pcapng"
+    with plc(*CYCLE) as master:
+        words = ["listen", master.path, "--pcap", str(path)]
+        with served([*DRIVEPANEL, *words], ready="Listening at") as listening:
+            master.start()
+            wait_until(lambda: path.stat().st_size > 5000, "frames in the file")
+            master.stop()
+            out, err = listening.process.communicate(timeout=60)
+    assert listening.process.returncode == 3
+    assert "went away" in err
+    assert "Listened " in out
+    assert len(packets(path)) > 30
 
 
 def test_nobody_talks() -> None:

@@ -60,12 +60,14 @@ class PlcOnLine:
         self._thread.start()
 
     def stop(self) -> None:
-        """End the talk and take the port away."""
+        """End the talk and take the port away; may be called twice."""
         self._stopping.set()
         if self._thread.is_alive():
             self._thread.join()
         for descriptor in (self._ours, self._theirs):
-            os.close(descriptor)
+            if descriptor >= 0:
+                os.close(descriptor)
+        self._ours = self._theirs = -1
 
     def _work(self) -> None:
         while not self._stopping.is_set():

@@ -79,6 +79,7 @@ def listen(
     if pcap_path is None and (raw or force):
         raise click.UsageError("--raw and --force go with --pcap FILE.")
     named = profiles_named(profile_ids)
+    from tui.bus.errors import LineError
     from tui.session.listening.families import Families, known_profiles, remembered_families
 
     from ..running.listening import HearingRun, line_to_listen
@@ -94,6 +95,9 @@ def listen(
                 _say_begin(place.line.link.path, pcap_path if raw else None)
             place.begin()
             listening.run(seconds, every)
+        except LineError:
+            listening.end()
+            raise
         except KeyboardInterrupt:
             listening.end()
             raise Failure(f"Ended by Ctrl-C. {listening.text}", INTERRUPTED) from None

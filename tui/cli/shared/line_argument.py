@@ -107,6 +107,8 @@ def _resolved(ctx: click.Context, text: str) -> str:
         usual |= {"device": (named.device,), "devices": (named.device,)}
     if named.profile is not None:
         usual["profile_id"] = lambda: _profile_here(ctx, named)
+        of_drive = "" if named.device is None else f"{named.device}="
+        usual["profile_ids"] = (f"{of_drive}{named.profile}",)
     ctx.default_map = {key: one for key, one in usual.items() if key in _names(ctx)}
     return named.line
 
