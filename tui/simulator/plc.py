@@ -81,12 +81,15 @@ class PlcOnLine:
         self._say(request)
         asked = time.monotonic()
         self._conversation.feed(request, asked)
+        answered = False
         while not self._stopping.wait(_STEP):
             now = time.monotonic()
             if reply := self._conversation.poll(now):
                 self._say(reply)
+                answered = True
+            if answered and self._conversation.due is None:
                 return
-            if now - asked > _ANSWER_WITHIN:
+            if not answered and now - asked > _ANSWER_WITHIN:
                 return
 
     def _say(self, data: bytes) -> None:
