@@ -188,7 +188,10 @@ def _trouble_texts(drive: DriveSummary, profile: Profile | None) -> Iterator[str
     if tally.answers["none"] and not drive.silent:
         yield f"no answer {_times(tally.answers['none'])}"
     if tally.answers["damaged"]:
-        yield f"damaged answer {_times(tally.answers['damaged'])}"
+        yield (
+            f"damaged answer {_times(tally.answers['damaged'])}: noise, or several devices with the"
+            f" address {tally.device}"
+        )
     if tally.answers["again"]:
         yield (
             f"ANSWERED TWICE {_times(tally.answers['again'])}: do two devices have the address"
