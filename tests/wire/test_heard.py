@@ -125,6 +125,13 @@ def test_a_cut_reply_does_not_take_the_next_request_with_it() -> None:
     ]
 
 
+@pytest.mark.parametrize("noise", [b"\x00", b"\x00\x5a", b"\x02\x10\x00"])
+def test_noise_right_before_a_request_does_not_take_it_along(noise: bytes) -> None:
+    """An adapter has handed over both at once; the reply comes behind a silence."""
+    found = split(noise + READ, WORDS, pause=False)
+    assert [one.data for one in found] == [noise, READ, WORDS]
+
+
 def test_what_never_becomes_a_frame_is_given_up() -> None:
     splitter = FrameSplitter()
     noise = bytes([0x55, 0x55]) * 3000

@@ -121,8 +121,10 @@ class FrameSplitter:
             if may_grow(rest):
                 break
             self._dead += 1
-        start = self._frame_of_its_own()
-        return False, start or (self._dead if self._dead > LONGEST_HEAP else 0)
+        if self._frame_of_its_own():
+            # what it proves is that nothing goes on; there may be whole frames before it
+            return False, self._frame_behind()
+        return False, self._dead if self._dead > LONGEST_HEAP else 0
 
     def _last(self) -> tuple[bool, int]:
         """The same where nothing more comes."""
@@ -139,17 +141,14 @@ class FrameSplitter:
         starts = range(max(1, self._dead), len(self._data) - MIN_FRAME + 1)
         return next((at for at in starts if whole_length(self._data[at:])), 0)
 
-    def _frame_of_its_own(self) -> int:
-        """Where a frame begins that lies between a silence and the last byte that was read.
-
-        So it is no part of another. Returns 0 where there is none.
-        """
+    def _frame_of_its_own(self) -> bool:
+        """Whether a frame lies between a silence and the last byte: it is no part of another."""
         at = 0
         for chunk in self._chunks:
             if chunk.apart and at and whole_length(self._data[at:]) == len(self._data) - at:
-                return at
+                return True
             at += chunk.length
-        return 0
+        return False
 
     def _cut(self, length: int, *, whole: bool) -> HeardFrame:
         """Give so many bytes from the beginning."""
