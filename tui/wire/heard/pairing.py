@@ -17,7 +17,7 @@ HeardAnswer = Literal["ok", "exception", "none", "damaged", "broadcast", "again"
 BROADCAST_DEVICE = 0
 GIVEN_UP_AFTER = 3.0
 """Seconds after which a request counts as not answered, though no other follows it."""
-REPLY_WITHIN = 0.25
+REPLY_WITHIN = 0.15
 """Seconds in which a reply that may as well be its request once more counts as a reply."""
 AGAIN_WITHIN = 0.05
 """Seconds in which a write like the one before, which nobody answers, is a second reply."""
