@@ -33,6 +33,8 @@ def honest_pdu(pdu: bytes) -> bytes:
             return bytes([pdu[0], 2 * count]) + b"".join(words)
         case 43:
             return bytes([43, 14, pdu[2], 1, 0, 0, 1, 0, 4]) + b"none"
+        case 17:
+            return bytes([17, 6, 9]) + b"none" + b"\xff"
         case _:
             return pdu[:5]
 
@@ -54,7 +56,7 @@ def silent(_request: bytes, _count: int) -> Sequence[Step]:
 
 def request_length(data: bytes) -> int:
     """Length of the RTU request that begins with these bytes, 0 if too few are there."""
-    fixed = {3: 8, 4: 8, 6: 8, 8: 8, 43: 7}
+    fixed = {3: 8, 4: 8, 6: 8, 8: 8, 17: 4, 43: 7}
     counted = {16: 6, 23: 10}
     if len(data) < 2:
         return 0

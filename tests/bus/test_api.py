@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import pytest
 
-from tui.bus.api import LineState, LineStatus, LineWorker, ModbusLine
+from tui.bus.api import LineState, LineStatus, LineWorker, ModbusLine, Priority
 from tui.bus.errors import (
     DeviceException,
     LineClosed,
@@ -53,6 +53,8 @@ def answer(pdu: bytes) -> bytes:
     address, count = int.from_bytes(pdu[1:3], "big"), int.from_bytes(pdu[3:5], "big")
     if pdu[0] == 43:
         return bytes([43, 14, pdu[2], 1, 0, 0, 1, 0, 4]) + IDENTITY[0]
+    if pdu[0] == 17:
+        return bytes([17, 6, 9]) + IDENTITY[0] + b"\xff"
     if pdu[0] == 8:
         return pdu
     span = [address] if pdu[0] == 6 else range(address, address + count)
@@ -93,6 +95,7 @@ def end(request: pytest.FixtureRequest) -> Iterator[Open]:
         def fake(*, read_only: bool = False, timing: Timing = PATIENT) -> End:
             line = FakeLine({THERE: HELD}, read_only=read_only)
             line.devices[THERE].identity = IDENTITY
+            line.devices[THERE].called = IDENTITY[0]
             stack.callback(line.close)
             return described(End(line, lambda: [request.pdu() for request in line.requests]))
 
@@ -204,6 +207,22 @@ async def test_identification_diagnosis_and_broadcast(end: Open) -> None:
         await made.line.broadcast(100, [3], limits=CAUTIOUS)
     await made.line.read(THERE, 101)
     assert [pdu[0] for pdu in made.sent()] == [43, 8, 6, 3]
+
+
+async def test_a_device_without_function_43_is_asked_by_17(end: Open) -> None:
+    made = end()
+    made.line.describe(THERE, CAUTIOUS)
+    found = await made.line.identify(THERE, function=17)
+    assert (found.conformity, found.objects) == (0, {1: IDENTITY[0]})
+    assert made.sent() == [bytes([17])]
+
+
+async def test_who_asks_a_stranger_says_how_long_is_waited(end: Open) -> None:
+    made = end(timing=Timing(first_timeout=600.0, scan_timeout=600.0, retries=0))
+    with pytest.raises(NoAnswer):
+        await made.line.read(SILENT, 100, priority=Priority.BACKGROUND, within=0.01)
+    with pytest.raises(NoAnswer):
+        await made.line.identify(SILENT, priority=Priority.BACKGROUND, within=0.01)
 
 
 async def test_a_closed_line_says_so_and_ends_what_works_on_it(end: Open) -> None:

@@ -14,10 +14,12 @@ from tui.bus.requests import (
     Identify,
     Read,
     ReadWrite,
+    ReportId,
     Request,
     WriteMany,
     WriteOne,
     objects_of,
+    own_words_of,
     words_of,
 )
 from tui.wire.frames import frame
@@ -38,6 +40,7 @@ REQUESTS: list[tuple[Request, str]] = [
         "02 17 0C 1E 00 04 23 29 00 02 04 00 14 00 1E D2 F5",
     ),
     (Identify(2), "02 2B 0E 01 00 34 77"),
+    (ReportId(1), "01 11 C0 2C"),
 ]
 
 
@@ -55,6 +58,7 @@ def test_bytes(request_: Request, text: str) -> None:
         ReadWrite(1, 5, 2, 9, (1, 2, 3)),
         Diagnose(1, 0, 0x1234),
         Identify(1),
+        ReportId(1),
     ],
 )
 def test_right_reply_fits_and_every_shorter_or_longer_one_does_not(request_: Request) -> None:
@@ -101,6 +105,11 @@ def test_contents_of_replies() -> None:
     assert found.objects == {0: b"TELEMECANIQUE", 1: b"ATV31HU09M3S323", 2: b"0201"}
     assert found.conformity == 2
     assert found.next_object is None
+
+
+def test_the_text_of_function_17_is_found_among_the_bytes_of_its_maker() -> None:
+    assert own_words_of(b"\x11\x0f\x02ATV71HU15M3\xff\0AB") == b"ATV71HU15M3"
+    assert own_words_of(b"\x11\x02\x05\xff") == b""
 
 
 REFUSED: list[tuple[Request, str]] = [
@@ -173,6 +182,7 @@ SCANNER = replace(ATV21, read_windows=(Window(100, 1, 8, fixed_start=False),))
         (Read(1, 5, 1), CAUTIOUS, True),
         (Read(1, 5, 2), CAUTIOUS, False),
         (Identify(1), CAUTIOUS, True),
+        (ReportId(1), CAUTIOUS, True),
         (WriteOne(1, 5, 1), CAUTIOUS, False),
         (Diagnose(1, 0, 0), CAUTIOUS, False),
         (WriteOne(0, 5, 1), WIDE, True),

@@ -18,7 +18,7 @@ from tui.bus.share.place import SharePlace
 from tui.wire.frames import frame
 
 from .conftest import Share
-from .peer import PtyPeer, Step, eventually, honest, reply
+from .peer import PtyPeer, Step, eventually, honest, reply, silent
 from .sharing import QUICK, frozen, place_in
 
 UNANSWERED = 98
@@ -386,3 +386,13 @@ async def test_where_no_folder_takes_a_socket_the_line_works_unshared(
         assert (await line.read(1, 4)).words == (4,)
         line.facts.give_stop([1], "here")
         await line.write(1, 8, [1])
+
+
+async def test_how_long_a_stranger_is_waited_for_is_said_to_the_owner(share: Share) -> None:
+    patient = replace(QUICK, first_timeout=600.0, scan_timeout=600.0, retries=0)
+    with PtyPeer(silent) as peer:
+        lines = share(peer.path)
+        lines.open("panel", timing=patient)
+        other = lines.open("scan", timing=patient)
+        with pytest.raises(NoAnswer):
+            await other.read(9, 100, priority=Priority.BACKGROUND, within=0.01)

@@ -53,6 +53,7 @@ class SlowDrive(OneDrive):
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         if address <= STATUS < address + count and self._coming:
             self.registers[STATUS] = self._coming.pop(0)

@@ -89,7 +89,12 @@ class Answering(OneDrive):
         self.asked_by: list[Priority] = []
 
     async def identify(
-        self, device: int, *, priority: Priority = Priority.OPERATOR_READ
+        self,
+        device: int,
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+        within: float | None = None,
+        function: int = 43,
     ) -> IdentificationObjects:
         self.asked_by.append(priority)
         if isinstance(self.answer, Exception):

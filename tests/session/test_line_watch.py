@@ -58,6 +58,7 @@ class HeardLine(OneDrive):
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         self.looked.append((address, priority))
         reply = await super().read(device, address, count, priority=priority, function=function)

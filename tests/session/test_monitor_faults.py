@@ -76,6 +76,7 @@ class FaultyLine(OneDrive):
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         fault = self.faults.pop(0) if self.faults else None
         self.addresses.append(address)

@@ -76,6 +76,7 @@ class WatchingDrive(OneDrive):
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         hushed = self.facts.hushed.get(device)
         if hushed and priority is not Priority.STOP:

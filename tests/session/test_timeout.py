@@ -49,6 +49,7 @@ class Ports(OneDrive):
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         self.read_so_far.append(address)
         if self.silent in range(address, address + count):

@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Coroutine, Sequence
 from typing import TYPE_CHECKING, Any, Protocol
 
+from .expectation import IDENTIFY
 from .model import (
     DeviceState,
     IdentificationObjects,
@@ -119,10 +120,13 @@ class ModbusLine(Protocol):
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         """Read `count` registers by function 3, or input registers by 4.
 
         What was read for another program up to `max_age` seconds ago is taken in its place.
+        `within` is in how many seconds from the end of the request the answer is to begin, where
+        perhaps nobody is there; without, the line goes by what it knows of the device.
         """
 
     async def write(
@@ -158,9 +162,17 @@ class ModbusLine(Protocol):
         """Write registers, then read `count` others, by function 23, once; see `write`."""
 
     async def identify(
-        self, device: int, *, priority: Priority = Priority.OPERATOR_READ
+        self,
+        device: int,
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+        within: float | None = None,
+        function: int = IDENTIFY,
     ) -> IdentificationObjects:
-        """Ask a device who it is by function 43/14."""
+        """Ask a device who it is by function 43/14, or by 17; `within` as for a read.
+
+        What function 17 brings stands as object 1, the reference, with conformity 0.
+        """
 
     async def diagnose(
         self,

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from tui.wire.frames import hex_text
 
 EXCEPTION = 0x80
-IDENTIFY = 43
+IDENTIFY, REPORT_ID = 43, 17
 MEI_IDENTIFICATION = 14
 _MEI_HEADER = 7
 """Function, MEI type, read code, conformity, more follows, next object, number of objects."""
@@ -17,8 +17,8 @@ _MEI_HEADER = 7
 class Expectation:
     """A reply without device and checksum: its first bytes and its length.
 
-    `length` None means function 43, whose reply says its length itself. Two requests to one
-    device with equal expectations have replies that cannot be told apart.
+    `length` None means function 43 or 17, whose reply says its length itself. Two requests to
+    one device with equal expectations have replies that cannot be told apart.
     """
 
     function: int
@@ -32,7 +32,11 @@ class Expectation:
             return 0
         if len(head) < len(self.prefix):
             return None
-        return identification_extent(data, start) if self.length is None else self.length
+        if self.length is not None:
+            return self.length
+        if self.function == REPORT_ID:
+            return 2 + data[start + 1] if len(data) > start + 1 else None
+        return identification_extent(data, start)
 
     def fits(self, pdu: bytes) -> bool:
         """Whether a whole reply is what was asked for."""

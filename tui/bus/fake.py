@@ -24,6 +24,7 @@ from typing import Any, TypeVar
 
 from .api import LineWorker
 from .errors import ExchangeError, LineClosed, LineError, LineLost, NoAnswer, RequestRefused
+from .expectation import IDENTIFY
 from .fake_device import FakeDevice, PlannedFailure
 from .limits import CAUTIOUS, Limits, send_refusal
 from .link import Link, SerialLink
@@ -42,6 +43,7 @@ from .requests import (
     Diagnose,
     Identify,
     ReadWrite,
+    ReportId,
     Request,
     read_request,
     write_request,
@@ -165,6 +167,7 @@ class FakeLine:
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         """Read registers; nothing is shared here, so each is read anew."""
         held = self._device(device).held
@@ -212,11 +215,18 @@ class FakeLine:
         return Reply(await self._exchange(request, "write", both, forbidden), self._clock())
 
     async def identify(
-        self, device: int, *, priority: Priority = Priority.OPERATOR_READ
+        self,
+        device: int,
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+        within: float | None = None,
+        function: int = IDENTIFY,
     ) -> IdentificationObjects:
-        """The objects that the device's `identity` holds."""
-        objects = self._device(device).objects
-        return await self._exchange(Identify(device), "identify", objects)
+        """The objects that the device's `identity` holds; by function 17 those of `called`."""
+        there = self._device(device)
+        if function == ReportId.function:
+            return await self._exchange(ReportId(device), "identify", there.own_words)
+        return await self._exchange(Identify(device), "identify", there.objects)
 
     async def diagnose(
         self,

@@ -8,7 +8,16 @@ from dataclasses import dataclass, replace
 from .errors import DeviceException, ExchangeError, LineError, NoAnswer
 from .limits import STANDARD_EXCEPTIONS
 from .model import DeviceState, IdentificationObjects
-from .requests import Identify, Read, ReadWrite, Request, WriteMany, WriteOne
+from .requests import (
+    REFERENCE,
+    Identify,
+    Read,
+    ReadWrite,
+    ReportId,
+    Request,
+    WriteMany,
+    WriteOne,
+)
 
 UNKNOWN_FUNCTION, UNKNOWN_ADDRESS = 1, 2
 
@@ -42,6 +51,8 @@ class FakeDevice:
         """The registers: what a read finds, and where a write goes."""
         self.identity: Mapping[int, bytes] | None = None
         """Objects of function 43/14; None where it does not know the function."""
+        self.called: bytes | None = None
+        """What it answers to function 17; None where it does not know the function."""
         self.silent = False
         self.seconds = 0.0
         """How long each answer takes."""
@@ -68,6 +79,12 @@ class FakeDevice:
         if self.identity is None:
             raise refusal(self.number, Identify.function, 0, UNKNOWN_FUNCTION)
         return IdentificationObjects(1, self.identity)
+
+    def own_words(self) -> IdentificationObjects:
+        """What it calls itself. Raises DeviceException where it does not know the function."""
+        if self.called is None:
+            raise refusal(self.number, ReportId.function, 0, UNKNOWN_FUNCTION)
+        return IdentificationObjects(0, {REFERENCE: self.called})
 
     def fail(self, kind: str, failure: PlannedFailure) -> None:
         """Let something go wrong, in the place of what was to go wrong with that address."""

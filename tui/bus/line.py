@@ -10,6 +10,7 @@ from dataclasses import replace
 from functools import partial
 
 from .errors import RequestRefused, WrongReply
+from .expectation import IDENTIFY
 from .limits import Limits, send_refusal
 from .link import Link
 from .model import (
@@ -25,12 +26,15 @@ from .model import (
 from .program import Program
 from .requests import (
     BROADCAST,
+    REFERENCE,
     Diagnose,
     Identify,
     ReadWrite,
+    ReportId,
     Request,
     diagnostic_of,
     objects_of,
+    own_words_of,
     read_request,
     write_request,
 )
@@ -144,13 +148,15 @@ class Line:
         priority: Priority = Priority.POLL,
         function: int = 3,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         """Read `count` registers by function 3, or input registers by 4.
 
         What was read for another program up to `max_age` seconds ago is taken in its place.
+        `within` is in how many seconds the answer is to begin; see tui.bus.api.
         """
         request = read_request(device, address, count, function)
-        return await self._ask(request, priority, max_age=max_age)
+        return await self._ask(request, priority, max_age=max_age, within=within)
 
     async def write(
         self,
@@ -204,14 +210,22 @@ class Line:
         return diagnostic_of((await self._ask(Diagnose(device, subfunction, data), priority)).pdu)
 
     async def identify(
-        self, device: int, *, priority: Priority = Priority.OPERATOR_READ
+        self,
+        device: int,
+        *,
+        priority: Priority = Priority.OPERATOR_READ,
+        within: float | None = None,
+        function: int = IDENTIFY,
     ) -> IdentificationObjects:
-        """Ask a device who it is by function 43/14, until nothing more follows."""
+        """Ask a device who it is by function 43/14, until nothing more follows; or by 17."""
+        if function == ReportId.function:
+            reply = await self._ask(ReportId(device), priority, within=within)
+            return IdentificationObjects(0, {REFERENCE: own_words_of(reply.pdu)})
         found: dict[int, bytes] = {}
         first = 0
         while True:
             request = Identify(device, first_object=first)
-            part = objects_of((await self._ask(request, priority)).pdu)
+            part = objects_of((await self._ask(request, priority, within=within)).pdu)
             found.update(part.objects)
             if part.next_object is None:
                 return IdentificationObjects(part.conformity, found)
@@ -254,6 +268,7 @@ class Line:
         replaceable: bool = False,
         forbidden: Callable[[], str] | None = None,
         max_age: float = 0.0,
+        within: float | None = None,
     ) -> Reply:
         """Check a request, queue it, await its reply."""
         limits = limits or self._devices[request.device].limits
@@ -262,7 +277,7 @@ class Line:
         if reason:
             raise RequestRefused(reason)
         job = Job(request, priority, limits, replaceable=replaceable, forbidden=forbidden)
-        job.max_age = max_age
+        job.max_age, job.within = max_age, within
         self._engine.submit(job)
         return await asyncio.wrap_future(job.answer)
 

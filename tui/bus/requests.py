@@ -6,6 +6,7 @@ before anything is read from a reply.
 
 from __future__ import annotations
 
+import re
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -13,6 +14,7 @@ from typing import ClassVar
 
 from pymodbus.pdu.diag_message import DiagnosticBase
 from pymodbus.pdu.mei_message import ReadDeviceInformationRequest
+from pymodbus.pdu.other_message import ReportDeviceIdRequest
 from pymodbus.pdu.pdu import ModbusPDU
 from pymodbus.pdu.register_message import (
     ReadHoldingRegistersRequest,
@@ -24,7 +26,7 @@ from pymodbus.pdu.register_message import (
 )
 
 from .errors import RequestRefused
-from .expectation import IDENTIFY, MEI_IDENTIFICATION, Expectation
+from .expectation import IDENTIFY, MEI_IDENTIFICATION, REPORT_ID, Expectation
 
 DATA_ECHOED = frozenset({0x00, 0x01, 0x03, 0x0A, 0x14})
 """Sub-functions of 8 whose reply repeats the data; the others answer with a value."""
@@ -226,6 +228,19 @@ class Identify(Request):
         )
 
 
+@dataclass(frozen=True, slots=True)
+class ReportId(Request):
+    """Function 17: what the device calls itself, in bytes of its maker's choice."""
+
+    function: ClassVar[int] = REPORT_ID
+
+    def message(self) -> ModbusPDU:
+        return ReportDeviceIdRequest()
+
+    def expectation(self) -> Expectation:
+        return Expectation(self.function, bytes([self.function]), None)
+
+
 def write_request(
     device: int,
     address: int,
@@ -256,6 +271,16 @@ def words_of(pdu: bytes) -> tuple[int, ...]:
     response = ReadHoldingRegistersResponse()
     response.decode(pdu[1:])
     return tuple(response.registers)
+
+
+REFERENCE = 1
+"""The object of function 43/14 that says which drive it is."""
+_WORDS = re.compile(rb"[ -~]{3,}")
+
+
+def own_words_of(pdu: bytes) -> bytes:
+    """The longest text in a checked reply of function 17; the bytes around it are its maker's."""
+    return max(_WORDS.findall(pdu[2:]), key=len, default=b"").strip()
 
 
 def diagnostic_of(pdu: bytes) -> int:

@@ -189,7 +189,9 @@ class RtuMaster:
             latest = deadline + length * self._character + self._gap
         while True:
             now = clock()
-            until = min(max(deadline, self._last + self._gap), latest)
+            # a lump may follow what has come; where nothing has, the time is up by itself
+            lump = self._last + self._gap if exchange.buffer else deadline
+            until = min(max(deadline, lump), latest)
             if now >= until:
                 return exchange.expired()
             await asyncio.wait((self._done,), timeout=until - now)

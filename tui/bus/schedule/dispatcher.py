@@ -266,7 +266,7 @@ class Dispatcher:
             request.device,
             job.pdu,
             job.expectation,
-            self._devices.time_out(request.device, request.function, job.priority),
+            self._devices.time_out(request.device, request.function, job.priority, job.within),
             sure,
             skip,
             look,

@@ -130,9 +130,16 @@ class Devices:
         due = [one.expires for record in self._devices.values() for one in record.outstanding]
         return max([now, *due])
 
-    def time_out(self, device: int, function: int, priority: Priority) -> float:
-        """Seconds to wait for a reply, from the end of the request to the reply's start."""
+    def time_out(
+        self, device: int, function: int, priority: Priority, within: float | None = None
+    ) -> float:
+        """Seconds to wait for a reply, from the end of the request to the reply's start.
+
+        `within` is what the asker says; no longer than the longest ever waited.
+        """
         timing, record = self._timing, self[device]
+        if within is not None and within >= 0.0:
+            return min(within, timing.first_timeout)
         if priority >= Priority.BACKGROUND and not record.ever_answered:
             patient = priority is Priority.PATIENT
             wait = timing.patient_timeout if patient else timing.scan_timeout

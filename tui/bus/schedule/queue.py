@@ -43,6 +43,9 @@ class Job:
     max_age: float = 0.0
     """A reply to the same question is taken, from whoever asked it, up to this age in seconds."""
 
+    within: float | None = None
+    """Seconds in which its answer is to begin, where the asker says it; else the line knows."""
+
     def __post_init__(self) -> None:
         # made now, in the thread of the one who asks: the line's own has a silence to keep
         self.pdu = self.request.pdu()

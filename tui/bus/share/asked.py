@@ -53,7 +53,7 @@ class RequestsAsked:
         self._tell(
             Asking(
                 number, kind, fields, int(job.priority), job.replaceable, job.max_age,
-                job.stamp, job.asked, limits,
+                job.stamp, job.asked, limits, job.within,
             )
         )  # fmt: skip
 

@@ -96,6 +96,7 @@ class Client:
         job = Job(request, priority, limits, replaceable=message.replaceable)
         job.program, job.stamp = self.program.id, message.stamp
         job.max_age, job.asked = message.max_age, message.asked
+        job.within = message.within
         self.asked[message.number] = job
         job.answer.add_done_callback(partial(self._answered, message.number))
         late = inside.clock() - message.asked

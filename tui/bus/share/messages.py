@@ -14,7 +14,17 @@ import msgspec
 from ..limits import Limits
 from ..model import DeviceState, LineCounters, LineState, Priority
 from ..program import Program
-from ..requests import Diagnose, Identify, Read, ReadInput, ReadWrite, Request, WriteMany, WriteOne
+from ..requests import (
+    Diagnose,
+    Identify,
+    Read,
+    ReadInput,
+    ReadWrite,
+    ReportId,
+    Request,
+    WriteMany,
+    WriteOne,
+)
 from .failures import ErrorForm
 
 VERSION = 2
@@ -79,6 +89,8 @@ class Asking(Message, frozen=True):
     """When the program asked."""
     limits: Limits | None = None
     """Where they are not those of the device: of a broadcast."""
+    within: float | None = None
+    """Seconds in which the answer is to begin, where the asker says it."""
 
 
 class Withdraw(Message, frozen=True):
@@ -224,7 +236,7 @@ _DECODER: msgspec.msgpack.Decoder[AnyMessage] = msgspec.msgpack.Decoder(AnyMessa
 
 REQUEST_KINDS: Mapping[str, type[Request]] = {
     kind.__name__: kind
-    for kind in (Read, ReadInput, WriteOne, WriteMany, ReadWrite, Diagnose, Identify)
+    for kind in (Read, ReadInput, WriteOne, WriteMany, ReadWrite, Diagnose, Identify, ReportId)
 }
 
 
