@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import pytest
 
@@ -44,7 +44,7 @@ class End:
 
 def device(request: bytes, _count: int) -> Sequence[Step]:
     """A device that holds HELD; another says nothing."""
-    if request[0] != THERE:
+    if request[0] != THERE or (request[1] == 17 and held.get(17) == 0):
         return []
     return [frame(THERE, answer(request[1:-2]))]
 
@@ -223,6 +223,26 @@ async def test_who_asks_a_stranger_says_how_long_is_waited(end: Open) -> None:
         await made.line.read(SILENT, 100, priority=Priority.BACKGROUND, within=0.01)
     with pytest.raises(NoAnswer):
         await made.line.identify(SILENT, priority=Priority.BACKGROUND, within=0.01)
+    assert len(made.sent()) == 2
+
+
+async def test_who_looks_whether_a_silent_device_is_there_waits_for_no_back_off() -> None:
+    held.update(HELD | {17: 0})  # function 17 meets silence
+    with TcpPeer(device) as peer:
+        timing = replace(PATIENT, back_off_first=600.0, back_off_longest=600.0, retries=0)
+        line = Line(RtuTcpLink("127.0.0.1", peer.port), timing=timing)
+        line.open(wait=10.0)
+        try:
+            await line.read(THERE, 100)
+            with pytest.raises(NoAnswer):
+                await line.identify(THERE, priority=Priority.BACKGROUND, within=0.01, function=17)
+            with pytest.raises(NoAnswer, match="It is asked again in"):
+                await line.read(THERE, 100, priority=Priority.POLL)
+            assert (await line.read(THERE, 100, priority=Priority.POLL, within=5.0)).words
+            assert line.counters.timeouts == 0
+            assert line.counters.searched == 1
+        finally:
+            line.close()
 
 
 async def test_a_closed_line_says_so_and_ends_what_works_on_it(end: Open) -> None:

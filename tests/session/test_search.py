@@ -9,9 +9,10 @@ from typing import cast
 
 import pytest
 
-from tui.bus.api import IdentificationObjects, ModbusLine, Priority
+from tui.bus.api import DeviceState, IdentificationObjects, ModbusLine, Priority
 from tui.bus.errors import (
     ChecksumFault,
+    DeviceException,
     LineBusy,
     LineClosed,
     LineError,
@@ -21,17 +22,22 @@ from tui.bus.errors import (
     WrongReply,
 )
 from tui.bus.line import Timing
+from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.schedule.pace import Pace
 from tui.drive.profile import library
 from tui.session.connect.identify import ScanResult, identify_drive
 from tui.session.connect.open_line import demo_line, open_line
 from tui.session.connect.search import REST, Search
+from tui.session.connect.strangers import JITTER
 from tui.session.drive import DriveSession
 
 
 @dataclass
 class Replies:
-    """A line on which these addresses answer, some only when they are asked once more."""
+    """A line on which these addresses answer, some only when they are asked once more.
+
+    The read that finds them is refused, as by a drive that has no such word.
+    """
 
     present: set[int]
     late: set[int] = field(default_factory=set)
@@ -39,17 +45,46 @@ class Replies:
     asked: list[tuple[int, Priority]] = field(default_factory=list)
     pace: Pace = field(default_factory=Pace)
     timing: Timing = field(default_factory=Timing)
+    link: Link = field(default_factory=lambda: SerialLink("/dev/null", 19200, "8E1"))
+    heard_late: set[int] = field(default_factory=set)
+    waits: list[float | None] = field(default_factory=list)
+    """How long each answer was waited for that did not come."""
 
-    async def identify(self, device: int, *, priority: Priority) -> IdentificationObjects:
+    def device_state(self, device: int) -> DeviceState:
+        return DeviceState(device in self.heard_late, 0, None, None, None, None, None)
+
+    async def identify(self, device: int, **_: object) -> IdentificationObjects:
+        if device in self.errors:
+            raise self.errors[device]
+        return IdentificationObjects(1, {1: b"ATV71HU15M3"})
+
+    async def read(
+        self,
+        device: int,
+        address: int,
+        _count: int,
+        *,
+        priority: Priority,
+        within: float | None = None,
+    ) -> None:
         self.asked.append((device, priority))
         if device in self.errors:
             raise self.errors[device]
         if device in self.present or (device in self.late and priority is Priority.PATIENT):
-            return IdentificationObjects(1, {1: b"ATV71HU15M3"})
-        raise NoAnswer(device, 43, 0)
-
-    async def read(self, device: int, address: int, *_: object, **__: object) -> None:
+            raise DeviceException(device, 3, address, 2)
+        self.waits.append(within)
         raise NoAnswer(device, 3, address)
+
+    async def no_time(self, _seconds: float) -> None:
+        """In place of a rest."""
+
+    def background(self) -> list[int]:
+        """Who was asked in the first round."""
+        return [device for device, priority in self.asked if priority is Priority.BACKGROUND]
+
+    def patiently(self) -> list[int]:
+        """Who was asked once more."""
+        return [device for device, priority in self.asked if priority is Priority.PATIENT]
 
 
 async def searched(
@@ -73,13 +108,57 @@ def devices(results: Iterable[ScanResult]) -> list[int]:
 
 async def test_a_drive_missed_once_is_asked_again_with_more_patience() -> None:
     line, texts = Replies({1, 4}, late={3}), list[str]()
-    search = Search(range(1, 6))
+    search = Search(range(1, 6), line.no_time)
     assert devices(await searched(search, line, texts)) == [1, 4, 3]
-    background = [device for device, priority in line.asked if priority is Priority.BACKGROUND]
-    patient = [device for device, priority in line.asked if priority is Priority.PATIENT]
-    assert (background, patient) == ([1, 2, 3, 4, 5], [2, 3, 5])
+    assert (line.background(), line.patiently()) == ([1, 2, 3, 4, 5], [2, 3, 5])
     assert texts == ["1 of 5, 1 found", "4 of 5, 2 found", "2 of 3 again"]
     assert (search.text, set(search.answered)) == ("done, 3 found", {1, 3, 4})
+
+
+async def test_an_empty_address_costs_one_request_and_the_longest_turnaround() -> None:
+    line = Replies({1})
+    await searched(Search(range(1, 4), line.no_time, once=True), line)
+    assert line.asked == [
+        (1, Priority.BACKGROUND),
+        (2, Priority.BACKGROUND),
+        (3, Priority.BACKGROUND),
+    ]
+    # Leroy-Somer's 10 ms, the first character of the reply, and what a computer is late
+    assert line.waits == [pytest.approx(0.010 + 11 / 19200 + JITTER)] * 2
+
+
+async def test_slow_characters_are_waited_for() -> None:
+    line = Replies(set(), link=SerialLink("/dev/null", 1200, "8N1"))
+    await searched(Search([1], line.no_time, once=True), line)
+    # the silence that ends the request, and the first character
+    assert line.waits == [pytest.approx(4.5 * 10 / 1200 + JITTER)]
+
+
+async def test_a_network_is_waited_for_as_ever() -> None:
+    line = Replies(set(), link=TcpLink("127.0.0.1"))
+    await searched(Search([1], line.no_time, once=True), line)
+    assert line.waits == [None]
+
+
+async def test_who_answers_too_late_is_heard_and_asked_again() -> None:
+    line = Replies({1}, late={3}, heard_late={3})
+    assert devices(await searched(Search(range(1, 5), line.no_time, once=True), line)) == [1, 3]
+    assert (line.background(), line.patiently()) == ([1, 2, 3, 4], [3])
+    assert line.waits[-1] is not None
+
+
+async def test_what_is_called_between_two_addresses_may_end_the_search() -> None:
+    line, asked = Replies({1, 2}), list[int]()
+
+    def look() -> None:
+        asked.append(len(line.asked))
+        if len(asked) > 1:
+            raise LineBusy("another master")
+
+    search = Search([1, 2], line.no_time, between=look)
+    with pytest.raises(LineBusy):
+        await searched(search, line)
+    assert (line.background(), search.text) == ([1], "stopped, 1 found")
 
 
 async def test_who_polls_has_the_line_between_two_waits_in_vain() -> None:
@@ -88,14 +167,12 @@ async def test_who_polls_has_the_line_between_two_waits_in_vain() -> None:
     async def rest(seconds: float) -> None:
         rests.append(seconds)
 
-    line = Replies({1})
+    line = Replies({1}, link=TcpLink("127.0.0.1"))
     await searched(Search([1, 2], rest), line)
     assert not rests, "nobody polls: nothing to wait for"
     line.pace.claim("a monitor", 1, 0.1, 0.5)
     await searched(Search([1, 2], rest), line)
-    timing = line.timing
-    # function 43 and the status word of the families without it, in both rounds
-    assert rests == [REST * timing.scan_timeout] * 2 + [REST * timing.patient_timeout] * 2
+    assert rests == [REST * line.timing.scan_timeout, REST * line.timing.patient_timeout]
 
 
 async def test_a_search_that_is_ended_says_so() -> None:
@@ -118,7 +195,7 @@ async def test_a_search_that_is_ended_says_so() -> None:
 async def test_a_search_finds_every_drive_and_no_other() -> None:
     opened = demo_line({"atv21": 35.0, "atv71": 50.0, "powerdrive": 30.0})
     try:
-        assert devices(await searched(Search(range(1, 6)), opened.line)) == [1, 2, 3]
+        assert devices(await searched(Search(range(1, 6), patient=True), opened.line)) == [1, 2, 3]
         # an empty address that was searched is no failure of the line
         assert opened.line.counters.timeouts == 0
         assert opened.line.counters.searched > 4
@@ -129,10 +206,10 @@ async def test_a_search_finds_every_drive_and_no_other() -> None:
 async def test_a_second_search_finds_drives_without_function_43_and_those_behind_them() -> None:
     opened = open_line("sim:powerdrive@1,varmeca@2,atv71@3")
     try:
-        first = await searched(Search(range(1, 5)), opened.line)
+        first = await searched(Search(range(1, 5), patient=True), opened.line)
         for device, profile in enumerate(("powerdrive", "varmeca", "atv71"), start=1):
             DriveSession(opened.line, device, library.load(profile))  # describes it to the line
-        again = await searched(Search(range(1, 5)), opened.line)
+        again = await searched(Search(range(1, 5), patient=True), opened.line)
         assert again == first
         assert devices(again) == [1, 2, 3]
         assert not any(result.error for result in again)
@@ -155,14 +232,14 @@ async def test_a_second_search_finds_drives_without_function_43_and_those_behind
     ids=lambda error: type(error).__name__,
 )
 async def test_what_is_wrong_with_one_address_ends_no_search(error: LineError) -> None:
-    results = await searched(Search(range(1, 4)), Replies({1, 3}, errors={2: error}))
+    results = await searched(Search(range(1, 4), patient=True), Replies({1, 3}, errors={2: error}))
     assert devices(results) == [1, 2, 3]
     assert [result.error for result in results] == ["", str(error), ""]
 
 
 @pytest.mark.parametrize("error", [LineLost("gone"), LineClosed()])
 async def test_a_search_ends_with_its_line(error: LineError) -> None:
-    search = Search(range(1, 4))
+    search = Search(range(1, 4), patient=True)
     with pytest.raises(type(error)):
         await searched(search, Replies({1, 3}, errors={2: error}))
     assert search.text == "stopped, 1 found"
@@ -174,7 +251,7 @@ async def test_a_broken_profile_of_the_user_ends_no_search() -> None:
     (folder / "mine.toml").write_text('[profile]\nid = "mine"\n', encoding="utf-8")
     opened = demo_line({"atv71": 50.0, "powerdrive": 30.0})
     try:
-        results = await searched(Search([1, 2]), opened.line)
+        results = await searched(Search([1, 2], patient=True), opened.line)
     finally:
         opened.close()
     assert [r.identity.candidates[0] for r in results if r.identity] == ["atv71", "powerdrive"]

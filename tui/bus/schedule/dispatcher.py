@@ -159,7 +159,7 @@ class Dispatcher:
         now = self._clock()
         if job.priority is not Priority.STOP and self.held_back():
             return now + HELD_LOOK
-        if self._devices.backed_off(job.request.device, job.priority, now) is not None:
+        if self._devices.backed_off(job.request.device, job.priority, now, job.within) is not None:
             # taken out at once, to be told
             return 0.0
         return self._devices.not_before(job.request.device, job.expectation, job.priority, now)
@@ -167,7 +167,7 @@ class Dispatcher:
     def _left_alone(self, job: Job) -> bool:
         """Fail a poll of a silent device that is not asked again yet."""
         device = job.request.device
-        rest = self._devices.backed_off(device, job.priority, self._clock())
+        rest = self._devices.backed_off(device, job.priority, self._clock(), job.within)
         if rest is None:
             return False
         text = f"Device {device} does not answer."

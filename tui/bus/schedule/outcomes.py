@@ -107,7 +107,8 @@ class Outcomes:
                 self._devices.may_come(request.device, expectation, result.sent, now)
                 error = WrongReply(*place, result.detail, result.received)
             case _:
-                known = self._devices[request.device].ever_answered
+                # who says how long is waited looks whether anybody answers that at all
+                known = job.within is None and self._devices[request.device].ever_answered
                 self._tally.count_silence(job.priority, known=known)
                 self._devices.silent(request.device, expectation, result.sent, now)
                 error = NoAnswer(*place, self._no_answer(job, result.detail))

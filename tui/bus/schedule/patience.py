@@ -135,7 +135,7 @@ class Devices:
     ) -> float:
         """Seconds to wait for a reply, from the end of the request to the reply's start.
 
-        `within` is what the asker says; no longer than the longest ever waited.
+        No longer than the longest ever waited, also where the asker says `within`.
         """
         timing, record = self._timing, self[device]
         if within is not None and within >= 0.0:
@@ -150,10 +150,14 @@ class Devices:
         known = max(timing.min_timeout, MARGIN * max(recent))
         return min(timing.first_timeout, known * float(2 ** min(record.failures, 8)))
 
-    def backed_off(self, device: int, priority: Priority, now: float) -> float | None:
-        """Seconds until polls of a silent device are sent again, None when they are sent now."""
+    def backed_off(
+        self, device: int, priority: Priority, now: float, within: float | None = None
+    ) -> float | None:
+        """Seconds until polls of a silent device are sent again, None when they are sent now:
+        always so for who says `within` how long is waited, and so looks whether it is there."""
         record = self[device]
-        if priority < Priority.POLL or record.next_try is None or now >= record.next_try:
+        asked_now = within is not None or priority < Priority.POLL
+        if asked_now or record.next_try is None or now >= record.next_try:
             return None
         if priority >= Priority.BACKGROUND and not record.ever_answered:
             return None

@@ -30,7 +30,7 @@ async def every_drive(opened: OpenLine, target: Target, addresses: str | None) -
     async def take(result: ScanResult) -> None:
         found.append(result.device)
 
-    await Search(devices).run(opened.line, take)
+    await Search(devices, patient=opened.simulation is not None).run(opened.line, take)
     if not found:
         raise Failure(f"Nobody answers at {addresses or USUAL_SEARCH}.", LINE_TROUBLE)
     first, *others = sorted(found)

@@ -53,7 +53,9 @@ class Scanning(LineView):
         fleet = self.app.fleet
         if fleet is None:
             return
-        search = fleet.search = Search(devices)
+        opened = self.app.opened
+        patient = opened is not None and opened.simulation is not None
+        search = fleet.search = Search(devices, patient=patient)
         self.tell_search()
         self.look()
         if typed:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import asyncio
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
 from tui.bus.api import IdentificationObjects, Priority, Reply
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
-from tui.bus.expectation import IDENTIFY
+from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.drive.errors import DriveError
+from tui.drive.finding import PresenceProbe
 from tui.drive.plain import plain
 from tui.drive.profile import library
 
@@ -19,11 +21,26 @@ VENDOR, REFERENCE, VERSION, NAME = 0, 1, 2, 6
 class Askable(Protocol):
     """As much of a line as it takes to ask who is there."""
 
-    async def identify(self, device: int, *, priority: Priority) -> IdentificationObjects:
-        """Function 43."""
+    async def identify(
+        self,
+        device: int,
+        *,
+        priority: Priority,
+        within: float | None = None,
+        function: int = IDENTIFY,
+    ) -> IdentificationObjects:
+        """Function 43, or 17."""
         ...
 
-    async def read(self, device: int, address: int, count: int = 1, *, priority: Priority) -> Reply:
+    async def read(
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority,
+        within: float | None = None,
+    ) -> Reply:
         """Function 3."""
         ...
 
@@ -55,6 +72,8 @@ class ScanResult:
     device: int
     identity: DriveIdentity | None
     error: str = ""
+    by: str = ""
+    """What told who it is: `function 43`, `function 17`, a read; empty where nothing did."""
 
 
 async def identify_drive(
@@ -89,6 +108,81 @@ async def _ask(line: Askable, device: int, priority: Priority) -> Identification
         if priority >= Priority.BACKGROUND:
             raise
         return await line.identify(device, priority=priority)
+
+
+BY_IDENTIFICATION = {IDENTIFY: "function 43", REPORT_ID: "function 17"}
+
+
+async def find_drive(
+    line: Askable,
+    device: int,
+    probes: Sequence[PresenceProbe],
+    *,
+    priority: Priority,
+    within: float | None,
+    patience: float | None = None,
+) -> ScanResult:
+    """Find out whether anybody is at an address, by the fewest requests, and then who.
+
+    An empty address costs one request a probe, and `within` seconds for each; None leaves that to
+    the line. Who tells its state, as a family does that cannot say who it is, is asked who it is
+    with so much `patience`, in seconds. Raises NoAnswer where nothing answers, and the line's
+    other errors.
+    """
+    there = await _present(line, device, probes, priority, within)
+    likely = patience if there.families else None
+    for function, how in BY_IDENTIFICATION.items():
+        try:
+            answer = there.objects if function == IDENTIFY else None
+            if answer is None:
+                answer = await line.identify(
+                    device, priority=priority, within=likely, function=function
+                )
+        except (DeviceException, NoAnswer, RequestRefused):
+            continue
+        if answer.objects.get(REFERENCE) or function == IDENTIFY:
+            return ScanResult(device, await identity_told(device, answer), by=how)
+    if there.families:
+        # that it has no such functions makes it no silent one: its last answer is what counts
+        await line.read(device, there.register, 1, priority=priority, within=likely)
+    by = f"read of register {there.register}" if there.families else ""
+    return ScanResult(device, _nameless(device, there.families), by=by)
+
+
+@dataclass(frozen=True, slots=True)
+class _Presence:
+    """What has shown that somebody is at an address."""
+
+    register: int = 0
+    families: tuple[str, ...] = ()
+    """Ids of those that tell their state by the read that was answered."""
+    objects: IdentificationObjects | None = None
+
+
+async def _present(
+    line: Askable,
+    device: int,
+    probes: Sequence[PresenceProbe],
+    priority: Priority,
+    within: float | None,
+) -> _Presence:
+    """How somebody answers at an address, were it with a refusal. Raises NoAnswer."""
+    refused = False
+    for probe in probes:
+        try:
+            if probe.register is None:
+                found = await line.identify(device, priority=priority, within=within)
+                return _Presence(objects=found)
+            await line.read(device, probe.register, 1, priority=priority, within=within)
+        except (DeviceException, RequestRefused) as error:
+            refused |= isinstance(error, DeviceException)
+        except NoAnswer:
+            continue
+        else:
+            return _Presence(probe.register or 0, probe.families)
+    if refused:
+        return _Presence()
+    raise NoAnswer(device, IDENTIFY, 0)
 
 
 def _nameless(device: int, candidates: tuple[str, ...] = ()) -> DriveIdentity:

@@ -2,27 +2,47 @@
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Sequence
+from functools import partial
 
 from tui.bus.api import IdentificationObjects, ModbusLine, Priority, Reply
 from tui.bus.errors import LineClosed, LineError, LineLost, NoAnswer
+from tui.bus.expectation import IDENTIFY
 
 from ..clock import REAL_CLOCK
-from .identify import ScanResult, identify_drive
+from .identify import ScanResult, find_drive
+from .strangers import Strangers, strangers_of
 
 REST = 2.0
 """A search beside regular polls rests so many times as long as it waited in vain."""
+SECOND_WAIT = 0.1
+"""Seconds in which a reply begins at the latest when silent addresses are asked once more."""
 
 Rests = Callable[[float], Awaitable[None]]
+Found = Callable[[ScanResult], Awaitable[None]]
 
 
 class Search:
     """Asks each address in turn, behind everything else; those that stay silent once more.
 
+    An address at which nobody is costs its request and the longest turnaround of the profiles.
+    Whoever answers later than that is heard all the same, and asked again with more patience;
+    unless `once`, so are all the others. A `patient` search waits as the line does by itself: for
+    a stop, and for drives simulated in this very program, which are late when it is. `between` is
+    called before each address, and may end the search by what it raises.
     Any loop may look at how far it is.
     """
 
-    def __init__(self, devices: Iterable[int], rests: Rests = REAL_CLOCK.sleep) -> None:
+    def __init__(
+        self,
+        devices: Iterable[int],
+        rests: Rests = REAL_CLOCK.sleep,
+        *,
+        once: bool = False,
+        patient: bool = False,
+        between: Callable[[], None] = lambda: None,
+    ) -> None:
         self.devices = tuple(devices)
         self.of = len(self.devices)
         """How many addresses are asked in this round."""
@@ -35,12 +55,20 @@ class Search:
         self.answered: frozenset[int] = frozenset()
         self.ended = ""
         """`done`, `stopped`, or empty while it goes on."""
+        self.cost = 0.0
+        """Seconds that an address costs at which nobody is; 0 before the first is asked."""
         self._rests = rests
+        self._once, self._patient, self._between = once, patient, between
 
     @property
     def goes_on(self) -> bool:
         """Whether it has not ended."""
         return not self.ended
+
+    @property
+    def left(self) -> float:
+        """Seconds that this round still takes where nobody else answers."""
+        return 0.0 if self.ended else (self.of - self.asked) * self.cost
 
     @property
     def text(self) -> str:
@@ -53,16 +81,26 @@ class Search:
     def _first_round(self, found: str) -> str:
         return f"{self.asked} of {self.of}, {found}"
 
-    async def run(self, line: ModbusLine, found: Callable[[ScanResult], Awaitable[None]]) -> None:
+    async def run(self, line: ModbusLine, found: Found) -> None:
         """Search; `found` hears of every address that is not silent.
 
         What is wrong with one address ends nothing. Raises LineClosed and LineLost.
         """
         try:
-            silent = await self._round(line, self.devices, Priority.BACKGROUND, found)
-            if silent:
-                self.again = True
-                await self._round(line, silent, Priority.PATIENT, found)
+            wait = line.timing.scan_timeout
+            how = await asyncio.to_thread(strangers_of, line.link, wait, patient=self._patient)
+            self.cost = how.cost
+            first = partial(self._round, line, how, found)
+            silent = await first(self.devices, Priority.BACKGROUND, how.within)
+            if silent and how.within is not None:
+                await self._rests(SECOND_WAIT)  # the last ones may be late as well
+            late = [device for device in silent if line.device_state(device).answers]
+            self.again = bool(silent)
+            if late:
+                await first(late, Priority.PATIENT, None)
+            if not self._once and (rest := [one for one in silent if one not in late]):
+                within = None if how.within is None else max(SECOND_WAIT, how.within)
+                await first(rest, Priority.PATIENT, within)
             self.ended = "done"
         finally:
             self.ended = self.ended or "stopped"
@@ -71,18 +109,28 @@ class Search:
     async def _round(
         self,
         line: ModbusLine,
+        how: Strangers,
+        found: Found,
         devices: Sequence[int],
         priority: Priority,
-        found: Callable[[ScanResult], Awaitable[None]],
+        within: float | None,
     ) -> list[int]:
         """Ask these addresses; returns those that were silent."""
         self.asked, self.of = 0, len(devices)
         silent: list[int] = []
         asks = _Considerate(line, self._rests)
         for number, device in enumerate(devices, start=1):
+            self._between()
             self.asked, self.at = number, device
             try:
-                result = ScanResult(device, await identify_drive(asks, device, priority=priority))
+                result = await find_drive(
+                    asks,
+                    device,
+                    how.probes,
+                    priority=priority,
+                    within=within,
+                    patience=how.patience,
+                )
             except NoAnswer:
                 silent.append(device)
                 continue
@@ -105,25 +153,44 @@ class _Considerate:
         self._line = line
         self._rests = rests
 
-    async def identify(self, device: int, *, priority: Priority) -> IdentificationObjects:
+    async def identify(
+        self,
+        device: int,
+        *,
+        priority: Priority,
+        within: float | None = None,
+        function: int = IDENTIFY,
+    ) -> IdentificationObjects:
         """As the line's own."""
         try:
-            return await self._line.identify(device, priority=priority)
+            return await self._line.identify(
+                device, priority=priority, within=within, function=function
+            )
         except NoAnswer:
-            await self._rest(priority)
+            await self._rest(priority, within)
             raise
 
-    async def read(self, device: int, address: int, count: int = 1, *, priority: Priority) -> Reply:
+    async def read(
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority,
+        within: float | None = None,
+    ) -> Reply:
         """As the line's own."""
         try:
-            return await self._line.read(device, address, count, priority=priority)
+            return await self._line.read(device, address, count, priority=priority, within=within)
         except NoAnswer:
-            await self._rest(priority)
+            await self._rest(priority, within)
             raise
 
-    async def _rest(self, priority: Priority) -> None:
+    async def _rest(self, priority: Priority, within: float | None) -> None:
         if self._line.pace.busy:
             timing = self._line.timing
             patient = priority is Priority.PATIENT
             waited = timing.patient_timeout if patient else timing.scan_timeout
-            await self._rests(REST * min(waited, timing.first_timeout))
+            await self._rests(
+                REST * min(waited if within is None else within, timing.first_timeout)
+            )

@@ -1,0 +1,69 @@
+"""What profiles tell about finding drives: settings by likelihood, reads, time-outs."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.session.fakes import profile_of
+from tui.drive.finding import (
+    LineSetting,
+    PresenceProbe,
+    likely_settings,
+    longest_turnaround,
+    presence_probes,
+    silent_cost,
+    wait_for_reply,
+    watching_families,
+    watching_text,
+)
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+
+
+@pytest.fixture(scope="module")
+def families() -> list[Profile]:
+    return [library.load(listing.id) for listing in library.listings()]
+
+
+def test_factory_settings_come_first_and_what_costs_most_last(families: list[Profile]) -> None:
+    found = likely_settings([one.data.link for one in families], longest_turnaround(families))
+    assert [str(one) for one in found[:3]] == ["19200 8E1", "19200 8N2", "19200 8N1"]
+    assert found.index(LineSetting(9600, "8E1")) < found.index(LineSetting(38400, "8E1"))
+    assert str(found[-1]) == "300 8O1"
+    assert len(found) == len(set(found)) == 40
+
+
+def test_of_two_that_are_as_likely_the_faster_comes_first() -> None:
+    link = profile_of(link={"baud": 9600, "format": "8E1", "bauds": [300, 9600, 38400]}).data.link
+    found = likely_settings([link], 0.005)
+    assert [one.baud for one in found] == [9600, 38400, 300]
+
+
+def test_an_empty_address_costs_its_request_and_the_turnaround() -> None:
+    fast, slow = LineSetting(19200, "8E1"), LineSetting(300, "8N1")
+    character = 11 / 19200
+    assert wait_for_reply(fast, 0.010) == pytest.approx(0.010 + character)
+    assert silent_cost(fast, wait_for_reply(fast, 0.010)) == pytest.approx(0.010 + 9 * character)
+    # no drive answers before the silence that ends the request
+    assert wait_for_reply(slow, 0.010) == pytest.approx(4.5 * 10 / 300)
+
+
+def test_one_read_finds_every_family(families: list[Profile]) -> None:
+    (probe,) = presence_probes(families)
+    assert probe == PresenceProbe(1039, ("powerdrive", "proxidrive", "varmeca"))
+
+
+def test_a_family_that_meets_an_unknown_word_with_silence_is_asked_who_it_is() -> None:
+    functions = [{"code": 3, "name": "Read"}, {"code": 43, "name": "Identify"}]
+    mute = profile_of(functions=functions, reading={"unknown_exception": None})
+    assert presence_probes([mute]) == (PresenceProbe(None),)
+    assert presence_probes([]) == (PresenceProbe(None),)
+
+
+def test_who_watches_the_line_from_the_first_request_on_is_named(families: list[Profile]) -> None:
+    found = watching_families(families)
+    assert [one.id for one in found if one.sure] == ["atv21"]
+    assert "atv71" not in {one.id for one in found}
+    told = watching_text(found)
+    assert "Altivar 21 (F803), and perhaps Altivar 31 (ttO)" in told
+    assert watching_text([]) == ""

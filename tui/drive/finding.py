@@ -1,0 +1,158 @@
+"""What profiles tell about finding drives on a line: settings, turnaround, reads, time-outs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+from typing import TypeVar
+
+from tui.wire.times import character_seconds, silent_seconds
+
+from .profile.profile import Profile
+from .profile.schema import LinkSettings
+
+T = TypeVar("T")
+
+FACTORY_SHARE = Decimal("0.5")
+"""How many of the drives of a family are taken to be as they left the factory, in each setting."""
+IDENTIFY = 43
+ASKED_CHARACTERS = 8
+"""Characters of the request that finds out whether anybody is there."""
+
+
+@dataclass(frozen=True, slots=True)
+class LineSetting:
+    """Baud and format of a line."""
+
+    baud: int
+    format: str
+
+    def __str__(self) -> str:
+        return f"{self.baud} {self.format}"
+
+    @property
+    def stop_bits(self) -> int:
+        """1 or 2."""
+        return int(self.format[2])
+
+    def hears(self, other: LineSetting) -> bool:
+        """Whether a drive of the one setting may understand the other: but for stop bits alike."""
+        return (self.baud, self.format[:2]) == (other.baud, other.format[:2])
+
+
+@dataclass(frozen=True, slots=True)
+class WatchingFamily:
+    """A family that watches the line from the first request on."""
+
+    id: str
+    name: str
+    code: str
+    """The parameter that sets its time-out."""
+    sure: bool
+    """Whether a document says so; it is taken so where none does."""
+
+
+@dataclass(frozen=True, slots=True)
+class PresenceProbe:
+    """A question to which drives answer if they are there: a read, or who they are."""
+
+    register: int | None
+    """The one register that is read by function 3; None for function 43."""
+    families: tuple[str, ...] = ()
+    """Ids of the families without function 43 that tell their state there."""
+
+
+def wait_for_reply(setting: LineSetting, turnaround: float) -> float:
+    """Seconds from the end of a request until the first character of a reply must have come.
+
+    A drive answers after its `turnaround`, and not before the silence that ends a frame.
+    """
+    character = character_seconds(setting.baud, setting.format)
+    return max(turnaround, silent_seconds(setting.baud, setting.format)) + character
+
+
+def silent_cost(setting: LineSetting, wait: float, probes: int = 1) -> float:
+    """Seconds that an address costs at which nobody is: the requests, and the wait for each."""
+    request = ASKED_CHARACTERS * character_seconds(setting.baud, setting.format)
+    return probes * (request + wait)
+
+
+def longest_turnaround(profiles: Iterable[Profile]) -> float:
+    """Seconds that the slowest family takes before it answers, as it leaves the factory."""
+    return max((float(one.data.link.turnaround_ms) / 1000 for one in profiles), default=0.0)
+
+
+def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[LineSetting]:
+    """Every baud and format that a family can have, in the order in which they are worth a try.
+
+    Factory settings first; then by how many drives are likely to have it, for the time that it
+    takes to ask an address: at 300 baud one costs as much as thirty at 19 200.
+    """
+    shares: dict[LineSetting, Decimal] = {}
+    for link in links:
+        for baud, of_baud in _shares(link.baud, link.bauds).items():
+            for form, of_form in _shares(link.format, link.formats).items():
+                one = LineSetting(baud, form)
+                shares[one] = shares.get(one, Decimal(0)) + of_baud * of_form
+    factory = {LineSetting(link.baud, link.format) for link in links}
+
+    def worth(one: LineSetting) -> tuple[bool, float, int, str]:
+        cost = silent_cost(one, wait_for_reply(one, turnaround))
+        return one not in factory, -float(shares[one]) / cost, -one.baud, one.format
+
+    return sorted(shares, key=worth)
+
+
+def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:
+    """How likely each value is: the factory's half of the time, the others alike."""
+    others = [one for one in dict.fromkeys(all_of_them) if one != factory]
+    if not others:
+        return {factory: Decimal(1)}
+    rest = (1 - FACTORY_SHARE) / len(others)
+    return {factory: FACTORY_SHARE, **dict.fromkeys(others, rest)}
+
+
+def presence_probes(profiles: Iterable[Profile]) -> tuple[PresenceProbe, ...]:
+    """The fewest questions of which every family answers one, be it with a refusal.
+
+    A family without function 43 answers a read of its status word; one that refuses the read of
+    a word it does not have is found by that read as well.
+    """
+    registers: dict[int, tuple[str, ...]] = {}
+    needs_identification = False
+    for one in profiles:
+        status = one.quantity("status_word")
+        if any(function.code == IDENTIFY for function in one.data.functions):
+            needs_identification |= one.data.reading.unknown_exception is None
+        elif status is not None and status.function == 3:
+            registers[status.address] = (*registers.get(status.address, ()), one.id)
+    found = [PresenceProbe(register, families) for register, families in registers.items()]
+    if needs_identification or not found:
+        found.append(PresenceProbe(None))
+    return tuple(found)
+
+
+def watching_families(profiles: Iterable[Profile]) -> list[WatchingFamily]:
+    """Families whose communication time-out begins with any request; the documented ones first."""
+    found = []
+    for one in profiles:
+        rules = one.data.communication_fault
+        if rules is None or not rules.timeout or rules.needs_write:
+            continue
+        sure = rules.starts_confidence != "unverified"
+        found.append(WatchingFamily(one.id, one.data.profile.name, rules.timeout, sure))
+    return sorted(found, key=lambda one: not one.sure)
+
+
+def watching_text(families: Sequence[WatchingFamily]) -> str:
+    """Who acts when it was asked once and is asked no more, in a sentence; empty where nobody."""
+    sure = ", ".join(f"{one.name} ({one.code})" for one in families if one.sure)
+    likely = ", ".join(f"{one.name} ({one.code})" for one in families if not one.sure)
+    if not families:
+        return ""
+    parts = [part for part in (sure, f"and perhaps {likely}" if likely else "") if part]
+    return (
+        f"From the first request on these watch the line, and act on their communication time-out"
+        f" when they are asked no more: {', '.join(parts)}."
+    )

@@ -1,0 +1,76 @@
+"""How addresses are asked at which perhaps nobody is: by the profiles, for one line."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tui.bus.link import Link, SerialLink
+from tui.drive.errors import DriveError
+from tui.drive.finding import (
+    LineSetting,
+    PresenceProbe,
+    likely_settings,
+    longest_turnaround,
+    presence_probes,
+    silent_cost,
+    wait_for_reply,
+)
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+
+PATIENCE = 3.0
+"""Who is there is waited for so many times longer than an empty address."""
+JITTER = 0.002
+"""Seconds by which this computer, or an adapter on USB, is late with what came."""
+
+
+@dataclass(frozen=True, slots=True)
+class Strangers:
+    """How addresses of one line are asked for the first time."""
+
+    probes: tuple[PresenceProbe, ...]
+    within: float | None
+    """Seconds in which a reply begins; None where the way of the line takes longer than a drive."""
+    patience: float
+    """The same for what somebody who is there perhaps does not answer at all."""
+    cost: float
+    """Seconds that an address costs at which nobody is."""
+
+
+def known_profiles() -> list[Profile]:
+    """Every profile that can be used; one that cannot is told where it is chosen."""
+    found = []
+    for listing in library.listings():
+        try:
+            found.append(library.load(listing.id))
+        except DriveError:
+            continue
+    return found
+
+
+def strangers_of(link: Link, network_wait: float, *, patient: bool = False) -> Strangers:
+    """How addresses of a line are asked; reads files.
+
+    A line over a network, or one whose time-out a person has set, is waited for `network_wait`
+    seconds, as are all where that is to be `patient`.
+    """
+    profiles = known_profiles()
+    probes = presence_probes(profiles)
+    if patient or not isinstance(link, SerialLink) or link.timeout is not None:
+        return Strangers(probes, None, network_wait, network_wait * len(probes))
+    setting = LineSetting(link.baud, link.format)
+    within = wait_for_reply(setting, longest_turnaround(profiles)) + JITTER
+    return Strangers(probes, within, PATIENCE * within, silent_cost(setting, within, len(probes)))
+
+
+def settings_worth_a_try(first: LineSetting, *, parity: bool = True) -> list[LineSetting]:
+    """The setting that a line is open at, then all that families can have, likely ones first.
+
+    Without `parity`, as on a pseudo-terminal, those that differ in nothing else are one.
+    """
+    profiles = known_profiles()
+    links = [one.data.link for one in profiles]
+    found = [first, *likely_settings(links, longest_turnaround(profiles))]
+    if parity:
+        return list(dict.fromkeys(found))
+    return list({(one.baud, one.stop_bits): one for one in reversed(found)}.values())[::-1]
