@@ -36,6 +36,7 @@ COMMANDS = {
     "reset": ("single_orders", "Reset a drive's fault."),
     "restore": ("restore", "Write a parameter set back to a drive."),
     "run": ("run", "Run a motor until this command ends."),
+    "scan": ("scan", "Find the drives on a line."),
     "simulate": ("simulate", "Serve simulated drives to any Modbus client."),
     "status": ("status", "Tell a drive's state, control source and fault."),
     "stop": ("stop", "Stop a drive, or every drive of a line."),

@@ -24,6 +24,8 @@ TOLERANCE = 0.001
 """Seconds by which the end of a request is uncertain."""
 REMEMBERED, JUDGED, SELDOM = 64, 8, 0.15
 """Replies looked back at; how many are enough; the share of early ones on a line with a baud."""
+MUCH_TALK = 256
+"""Bytes that came in while nothing was due, and no silence, after which they are looked at."""
 IDLE_LIMIT = 4096
 """Bytes kept of what comes in while nothing is due."""
 
@@ -77,7 +79,10 @@ class RtuMaster:
         if self._exchange is None:
             self._idle += data
             del self._idle[:-IDLE_LIMIT]
-            self._start_timer(self._gap, self._sort_idle)
+            if len(self._idle) < MUCH_TALK:
+                self._start_timer(self._gap, self._sort_idle)
+            else:
+                self._sort_idle()  # others talk on and on: no silence would ever come
             return
         result = self._exchange.feed(data)
         while result is not None and self._came_too_early(result, time):

@@ -20,6 +20,10 @@ from .of_drives import (
     ProveTold,
     ReadTold,
     RunTold,
+    ScanEndTold,
+    ScanFamiliesTold,
+    ScanHitTold,
+    ScanUnclearTold,
     StatusTold,
     StopTold,
 )
@@ -53,6 +57,7 @@ from .of_settings import (
 
 DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     ErrorTold, ReadTold, CycleTold, IdentityTold, StatusTold, RunTold, HoldTold, ProveTold,
+    ScanFamiliesTold, ScanHitTold, ScanUnclearTold, ScanEndTold,
     CommandTold, StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
     BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
     ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,

@@ -124,6 +124,84 @@ class HoldTold(DocumentTold, kw_only=True):
     timeout: TimeoutTold | UnsetType | None = UNSET
 
 
+class WatchingFamilyTold(msgspec.Struct, forbid_unknown_fields=True):
+    """A family that acts when it was asked once and is asked no more."""
+
+    profile: str
+    name: str
+    timeout: str
+    """The parameter that sets its time-out."""
+    sure: bool
+    """Whether a document says so."""
+
+
+class LineSettingTold(msgspec.Struct, forbid_unknown_fields=True):
+    """Baud and format of a line."""
+
+    baud: int
+    format: str
+
+
+class ScanFamiliesTold(DocumentTold, kw_only=True):
+    """`scan`: who may be there and watches the line, before the first request."""
+
+    command: Literal["scan"]
+    line: str
+    event: Literal["families"]
+    families: list[WatchingFamilyTold]
+    text: str
+
+
+class ScanHitTold(DocumentTold, kw_only=True):
+    """`scan`: a drive that answered; baud and format are null over a network."""
+
+    command: Literal["scan"]
+    line: str
+    event: Literal["hit"]
+    device: int
+    baud: int | None
+    format: str | None
+    vendor: str
+    reference: str
+    version: str
+    name: str
+    profile: str | None
+    candidates: list[str]
+    """Profiles that may fit, the likeliest first."""
+    sure: Literal["identified", "likely", "unknown"]
+    by: str | None
+    """What told who it is: a function, or a read; null where nothing did."""
+
+
+class ScanUnclearTold(DocumentTold, kw_only=True):
+    """`scan`: what came from an address is no answer; it may be taken twice."""
+
+    command: Literal["scan"]
+    line: str
+    event: Literal["unclear"]
+    device: int
+    baud: int | None
+    format: str | None
+    text: str
+
+
+class ScanEndTold(DocumentTold, kw_only=True):
+    """`scan`: the end; `done` is false where it was ended before."""
+
+    command: Literal["scan"]
+    line: str
+    event: Literal["ended"]
+    done: bool
+    found: int
+    addresses: str
+    settings: list[LineSettingTold]
+    """Those that were tried, in this order."""
+    not_tried: int
+    held_back: str | None
+    """Why others were not tried; null where nothing kept them back."""
+    text: str
+
+
 class ProveTold(OfDriveTold, kw_only=True):
     """`prove`: the silences between which the drive has reacted, and what is set; times in ms."""
 

@@ -6,8 +6,8 @@ What a line is made of is imported when one is opened: the panel shows itself be
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Protocol
 
 from tui.bus.errors import LinkSyntaxError
@@ -16,7 +16,7 @@ from .line_key import SIMULATED_PREFIX
 
 if TYPE_CHECKING:
     from tui.bus.api import ModbusLine
-    from tui.bus.link import Link, UsualSettings
+    from tui.bus.link import Link, SerialLink, UsualSettings
     from tui.simulator import DriveSpec, Simulation
 
     from .known_line import KnownLine
@@ -42,6 +42,8 @@ class OpenLine:
     """Addresses known to be taken: those of a simulated line, else none."""
     known: KnownLine | None = None
     """Whether it is still what it was, where that is looked at; None for a simulated line."""
+    again: Callable[[SerialLink], ModbusLine] | None = None
+    """Makes the line anew at other settings, for this program alone."""
     farewells: dict[int, Farewell] = field(default_factory=dict)
     """By address, what is to be said of each drive at the end."""
 
@@ -92,7 +94,26 @@ def open_line(
     link = parse_link(text, usual)
     place = share_place(text) if program else None
     line = Line(link, read_only=read_only, place=place, program=this_program(program))
-    return _opened(OpenLine(text, line), wait)
+
+    def again(other: SerialLink) -> ModbusLine:
+        return Line(other, read_only=read_only)
+
+    return _opened(OpenLine(text, line, again=again), wait)
+
+
+def reopen(opened: OpenLine, baud: int, format: str, *, wait: float) -> None:
+    """The same serial line at another baud and format, for this program alone from now on.
+
+    Raises the line's errors; then the line is closed.
+    """
+    from tui.bus.link import SerialLink
+
+    link = opened.line.link
+    assert opened.again is not None
+    assert isinstance(link, SerialLink)
+    opened.line.close()
+    opened.line = opened.again(replace(link, baud=baud, format=format))
+    opened.line.open(wait=wait)
 
 
 def check_line(text: str) -> None:
@@ -144,7 +165,11 @@ def _simulated(
     line = Line(_serve(simulation), timing=timing, read_only=read_only)
     text = SIMULATED_PREFIX + ",".join(f"{spec.profile}@{spec.address}" for spec in specs)
     devices = tuple(spec.address for spec in specs)
-    return _opened(OpenLine(text, line, simulation, devices), wait)
+
+    def again(other: SerialLink) -> ModbusLine:
+        return Line(other, timing=timing, read_only=read_only)
+
+    return _opened(OpenLine(text, line, simulation, devices, again=again), wait)
 
 
 def _opened(opened: OpenLine, wait: float | None) -> OpenLine:

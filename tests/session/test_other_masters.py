@@ -1,0 +1,113 @@
+"""Another master is heard before anything is sent, and told with what it asks of whom."""
+
+from __future__ import annotations
+
+import asyncio
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import pytest
+
+from tests.bus.peer import PtyPeer, eventually, silent
+from tui.bus.line import Line
+from tui.bus.link import SerialLink
+from tui.bus.trace import Frame
+from tui.session.connect.other_masters import (
+    MasterLookout,
+    OtherMaster,
+    Overheard,
+    listen,
+    overheard,
+)
+from tui.wire.frames import frame, read_frame
+
+
+def came(data: bytes, note: str, time: float = 1.0) -> Frame:
+    return Frame(time, "in", data, note)
+
+
+READ = read_frame(4, 3201, 8)
+WRITE = frame(7, bytes.fromhex("06 2135 0006"))
+LATE = "late or repeated, device 4"
+
+
+def test_who_asks_is_told_with_what_it_asks_of_whom() -> None:
+    heard = overheard([came(READ, LATE), came(WRITE, "of device 7"), came(READ, LATE)], 0.0)
+    assert heard.text == (
+        "Another master asks drives on this line. Address 4: read of register 3201 on, 8 words;"
+        " address 7: write of register 8501."
+    )
+
+
+def test_of_many_requests_to_one_address_some_are_told() -> None:
+    frames = [came(read_frame(4, register, 1), LATE) for register in range(5)]
+    assert "read of register 2 and 2 more." in overheard(frames, 0.0).text
+
+
+@pytest.mark.parametrize(
+    "frames",
+    [
+        [came(READ, LATE, time=-1.0)],
+        [Frame(0.0, "out", READ), came(READ, LATE)],
+        [came(READ, "echo")],
+        [came(frame(4, bytes.fromhex("03 02 0006")), "")],
+        [came(b"\0\0\0", "noise")],
+    ],
+    ids=["before", "our own, late", "echo", "a reply to us", "a spark"],
+)
+def test_what_is_no_master(frames: list[Frame]) -> None:
+    assert overheard(frames, 0.0).text == ""
+
+
+def test_replies_to_somebody_and_talk_that_is_no_frame_show_a_master_too() -> None:
+    reply = frame(4, bytes.fromhex("03 02 0006"))
+    assert "4 answered it" in overheard([came(reply, LATE)], 0.0).text
+    assert "another baud or format: 6 bytes" in Overheard(loose=6).text
+
+
+@contextmanager
+def talking(peer: PtyPeer, *, gap: float) -> Iterator[None]:
+    """A master at work on the line of a peer, with so many seconds between its frames."""
+    over = threading.Event()
+
+    def talk() -> None:
+        while not over.wait(gap):
+            peer.send(READ)
+
+    thread = threading.Thread(target=talk, name="other master")
+    thread.start()
+    try:
+        yield
+    finally:
+        over.set()
+        thread.join()
+
+
+@pytest.mark.parametrize("gap", [0.1, 0.004], ids=["now and then", "without a silence"])
+async def test_a_master_is_heard_on_a_line_on_which_nothing_is_sent(gap: float) -> None:
+    with PtyPeer(silent) as peer:
+        line = Line(SerialLink(peer.path))
+        line.open(wait=10.0)
+        try:
+            with talking(peer, gap=gap):
+                heard = await listen(line, 2.0)
+            assert {one.device for one in heard.requests} == {4}
+            assert peer.requests == []
+        finally:
+            line.close()
+
+
+async def test_a_master_that_begins_during_a_search_ends_it() -> None:
+    with PtyPeer(silent) as peer:
+        line = Line(SerialLink(peer.path))
+        line.open(wait=10.0)
+        try:
+            lookout = MasterLookout(line)
+            lookout.look()
+            peer.send(READ)
+            await asyncio.to_thread(eventually, lambda: bool(line.trace))
+            with pytest.raises(OtherMaster, match="Address 4"):
+                lookout.look()
+        finally:
+            line.close()

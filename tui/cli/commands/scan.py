@@ -1,0 +1,150 @@
+"""`drivepanel scan`: which drives answer on a line, at which addresses, baud and format."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..shared.errors import INTERRUPTED, LINE_TROUBLE, REFUSED_HERE, Failure, told
+from ..shared.options import hold_option, json_option, line_argument, on_line, read_only_option
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+
+    from ..running.scanning import Scan
+
+ALL_ADDRESSES = "1-247"
+
+
+@click.command()
+@line_argument
+@click.option(
+    "--addresses",
+    default=ALL_ADDRESSES,
+    show_default=True,
+    metavar="LIST",
+    help="Slave addresses to ask: 1-31, or 1,3,5-7.",
+)
+@click.option(
+    "--all-settings",
+    is_flag=True,
+    help="Then try every other baud and format that drives can have, likely ones first. The line"
+    " is not shared meanwhile.",
+)
+@click.option(
+    "--yes",
+    is_flag=True,
+    help="Try other settings although drives that were found act when they are asked no more.",
+)
+@hold_option
+@read_only_option
+@json_option
+@told
+def scan(
+    line_text: str,
+    addresses: str,
+    all_settings: bool,
+    yes: bool,
+    hold: float | None,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Find the drives on a line. It reads, and writes nothing. Ctrl-C ends it.
+
+    It listens first: where another master asks drives, it ends before it sends anything. What is
+    found is asked on until the end, so that its communication time-out does not run out.
+    """
+    from tui.session.connect.addresses import parse_addresses
+
+    from ..running.scan_telling import ScanTelling
+
+    devices = parse_addresses(addresses)
+    tell = ScanTelling(line_text, as_json=as_json)
+    scans: list[Scan] = []
+
+    async def work(opened: OpenLine) -> None:
+        from ..running.holding import hold_on
+        from ..running.scanning import Scan
+
+        one = Scan(opened, line_text, devices, tell, yes=yes)
+        await _prepare(one, all_settings=all_settings)
+        scans.append(one)
+        await one.run()
+        await hold_on(opened, one.sessions, hold)
+
+    try:
+        on_line(line_text, work, read_only=read_only)
+    except KeyboardInterrupt:
+        raise Failure(f"Ended by Ctrl-C. {_end(scans, addresses)}", INTERRUPTED) from None
+    except Failure:
+        raise  # nothing was sent
+    except Exception:
+        _end(scans, addresses)
+        raise
+    text = _end(scans, addresses)
+    if not scans[0].hits:
+        raise Failure(f"{text} {_hint(scans[0])}", LINE_TROUBLE)
+    tell.note(text)
+
+
+async def _prepare(scan: Scan, *, all_settings: bool) -> None:
+    """Which settings are tried; raises UsageError and Failure where others cannot be."""
+    from tui.bus.link import SerialLink
+    from tui.bus.transport.ports import is_pseudo_terminal
+    from tui.session.connect.strangers import settings_worth_a_try, strangers_of
+
+    line, here = scan.opened.line, scan.setting
+    if not all_settings:
+        scan.settings = [here] if here is not None else []
+        return
+    if not isinstance(line.link, SerialLink) or here is None:
+        raise click.UsageError("--all-settings is for serial ports: this line has no baud.")
+    if others := line.facts.others:
+        who = ", ".join(one.text for one in others)
+        raise Failure(
+            f"--all-settings needs the line for itself, and {who} uses it. Nothing was sent.",
+            REFUSED_HERE,
+        )
+    parity = not is_pseudo_terminal(line.link.path)
+    scan.settings = await asyncio.to_thread(settings_worth_a_try, here, parity=parity)
+    wait, patient = line.timing.scan_timeout, scan.opened.simulation is not None
+    for one in scan.settings:
+        link = SerialLink(line.link.path, one.baud, one.format, line.link.timeout)
+        scan.costs[one] = strangers_of(link, wait, patient=patient).cost
+
+
+def _end(scans: list[Scan], addresses: str) -> str:
+    """Tell the end as JSON, where that is wanted; what it has come to, in a sentence."""
+    if not scans:
+        return "Nothing was sent."
+    (scan,) = scans
+    count = len(scan.hits)
+    drives = f"{count or 'No'} drive{'' if count == 1 else 's'} found"
+    text = f"{drives} at addresses {addresses}{_settings_text(scan)}."
+    ended: dict[str, Any] = {
+        "done": scan.done,
+        "found": count,
+        "addresses": addresses,
+        "settings": [{"baud": one.baud, "format": one.format} for one in scan.tried],
+        "not_tried": len(scan.settings) - len(scan.tried),
+        "held_back": scan.held_back or None,
+        "text": text,
+    }
+    scan.tell.ended(ended)
+    return text
+
+
+def _settings_text(scan: Scan) -> str:
+    if len(scan.settings) > 1:
+        return f", {len(scan.tried)} of {len(scan.settings)} settings tried"
+    return f", {scan.tried[0]}" if scan.tried else ""
+
+
+def _hint(scan: Scan) -> str:
+    """What to look at where nobody answers."""
+    look = "Are the drives on, and are the two wires those of the line?"
+    if scan.setting is not None and len(scan.settings) == 1:
+        return f"{look} --all-settings tries other baud rates and formats."
+    return look

@@ -1,0 +1,178 @@
+"""What is told of a search over a line: hits at once, how far it is, and how it ended."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from shutil import get_terminal_size
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from tui.drive.finding import LineSetting, WatchingFamily, watching_text
+from tui.drive.plain import plain
+
+from ..shared.say import printable, say
+
+if TYPE_CHECKING:
+    from tui.session.connect.identify import DriveIdentity, ScanResult
+
+SETTING_WIDTH = 10
+INDENT = 3 + 2 + SETTING_WIDTH + 2
+"""Where the text of a hit begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hit:
+    """A drive that answered, and at which setting; no setting over a network."""
+
+    setting: LineSetting | None
+    identity: DriveIdentity
+    by: str
+
+    @property
+    def sure(self) -> str:
+        """How sure it is which drive it is: identified, likely, unknown."""
+        if self.identity.profile is not None:
+            return "identified"
+        return "likely" if self.identity.candidates else "unknown"
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far a search is."""
+
+    setting: LineSetting | None
+    asked: int
+    of: int
+    found: int
+    left: float
+    """Seconds that it still takes where nobody else answers."""
+    settings_left: int = 0
+
+    @property
+    def text(self) -> str:
+        """In one line."""
+        where = f"{self.setting}: " if self.setting else ""
+        more = f", {self.settings_left} more settings" if self.settings_left else ""
+        left = max(1, round(self.left))
+        return f"{where}{self.asked} of {self.of} asked, {self.found} found{more}, {left} s left"
+
+
+class ScanTelling:
+    """Tells of one search; a hit goes out at once."""
+
+    def __init__(self, line_text: str, *, as_json: bool) -> None:
+        self._line = line_text
+        self._as_json = as_json
+        self._drawn = ""
+        """The line of progress that stands on the terminal."""
+        self._on_terminal = sys.stderr.isatty()
+
+    def families(self, found: Sequence[WatchingFamily]) -> None:
+        """Who may be there and acts when it is asked no more, before the first request."""
+        text = watching_text(found)
+        if not text:
+            return
+        told = f"{text} What is found is asked on until this command ends."
+        if self._as_json:
+            rows = [
+                {"profile": f.id, "name": f.name, "timeout": f.code, "sure": f.sure} for f in found
+            ]
+            self._print({"event": "families", "families": rows, "text": told})
+        self.note(told)
+
+    def hit(self, hit: Hit) -> None:
+        """A drive has answered."""
+        if self._as_json:
+            self._print({"event": "hit", **hit_json(hit)})
+            return
+        self._clear()
+        where = str(hit.setting) if hit.setting else ""
+        head = f"{hit.identity.device:>3}  {where:<{SETTING_WIDTH}}  "
+        say(head + hit_text(hit), indent=INDENT)
+        sys.stdout.flush()
+
+    def unclear(self, setting: LineSetting | None, result: ScanResult) -> None:
+        """Something came from an address that is no answer."""
+        if self._as_json:
+            where = _setting_json(setting)
+            told = {"event": "unclear", "device": result.device, **where, "text": result.error}
+            self._print(told)
+        self.note(f"{result.error} The address is taken, perhaps twice.")
+
+    def progress(self, progress: Progress) -> None:
+        """How far it is, in one line that is written over; on a terminal only."""
+        if not self._on_terminal:
+            return
+        width = get_terminal_size().columns - 1
+        text = printable(progress.text, sys.stderr.encoding)[:width]
+        click.echo(f"\r{text:<{len(self._drawn)}}", err=True, nl=False)
+        self._drawn = text
+
+    def note(self, text: str) -> None:
+        """Something to know, on standard error."""
+        self._clear()
+        say(f"drivepanel: {text}", err=True)
+
+    def ended(self, told: dict[str, Any]) -> None:
+        """The end; its text is said by the one who ends."""
+        self._clear()
+        if self._as_json:
+            self._print({"event": "ended", **told})
+
+    def _clear(self) -> None:
+        """Take the line of progress away."""
+        if self._drawn:
+            click.echo(f"\r{'':<{len(self._drawn)}}\r", err=True, nl=False)
+            self._drawn = ""
+
+    def _print(self, told: dict[str, Any]) -> None:
+        from ..shared.output import print_json
+
+        self._clear()
+        print_json({"line": self._line, **told}, compact=True)
+
+
+def hit_json(hit: Hit) -> dict[str, Any]:
+    """A drive that answered, as JSON tells it."""
+    who = hit.identity
+    return {
+        "device": who.device,
+        **_setting_json(hit.setting),
+        "vendor": who.vendor,
+        "reference": who.reference,
+        "version": who.version,
+        "name": who.name,
+        "profile": who.profile,
+        "candidates": list(who.candidates),
+        "sure": hit.sure,
+        "by": hit.by or None,
+    }
+
+
+def _setting_json(setting: LineSetting | None) -> dict[str, Any]:
+    if setting is None:
+        return {"baud": None, "format": None}
+    return {"baud": setting.baud, "format": setting.format}
+
+
+def hit_text(hit: Hit) -> str:
+    """Which drive it is, as far as it is known."""
+    from tui.drive.profile import library
+
+    who = hit.identity
+    names = {one.id: (one.name, one.vendor) for one in library.listings()}
+    if hit.sure == "identified":
+        parts = (names[who.profile or ""][0], who.reference, who.version_text, who.name)
+        return plain("  ".join(part for part in parts if part))
+    if hit.sure == "likely":
+        fits = [names[one] for one in who.candidates]
+        vendors = " or ".join(dict.fromkeys(vendor for _, vendor in fits))
+        *first, last = (name for name, _ in fits)
+        families = f"{', '.join(first)} or {last}" if first else last
+        return plain(f"likely {vendors}: {families}")
+    if said := " ".join(part for part in (who.vendor, who.reference, who.version_text) if part):
+        return plain(f"{said}: no profile fits")
+    return "answers, but does not say what it is"

@@ -1,0 +1,229 @@
+"""A search over the addresses of a line, at one setting or at all that drives can have."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from tui.bus.errors import PortRefused
+from tui.drive.finding import LineSetting
+
+from ..shared.errors import REFUSED_HERE, Failure
+from ..shared.left_alone import left_alone, look_after, say_farewells
+from ..shared.line_argument import mind_the_drive
+from .asking import may_ask, says_yes
+from .scan_telling import Hit, Progress, ScanTelling
+
+if TYPE_CHECKING:
+    from tui.session.connect.identify import DriveIdentity, ScanResult
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.connect.search import Search
+    from tui.session.drive import DriveSession
+    from tui.session.fleet import Fleet
+
+PROGRESS_EVERY = 0.2
+OPEN_WITHIN = 5.0
+NONE_TRIED = "No other setting is tried"
+
+
+@dataclass(slots=True)
+class Scan:
+    """One run of the command; what it has found stays, however it ends."""
+
+    opened: OpenLine
+    line_text: str
+    devices: Sequence[int]
+    tell: ScanTelling
+    settings: list[LineSetting] = field(default_factory=list)
+    """Those to be tried, that of the line first; none over a network."""
+    costs: dict[LineSetting, float] = field(default_factory=dict)
+    """Seconds that an address costs at each at which nobody is."""
+    yes: bool = False
+    """Whether other settings are tried although drives that were found may act meanwhile."""
+    hits: list[Hit] = field(default_factory=list)
+    tried: list[LineSetting] = field(default_factory=list)
+    held_back: str = ""
+    """Why settings were not tried; empty where all were."""
+    done: bool = False
+    sessions: list[DriveSession] = field(default_factory=list)
+    """With the drives at the present setting of which a profile may be known."""
+    unknown: list[int] = field(default_factory=list)
+    """The others that answered there."""
+
+    async def run(self) -> None:
+        """Listen, then search. Raises Failure before anything is sent, and the line's errors."""
+        from tui.drive.finding import watching_families
+        from tui.session.connect.strangers import known_profiles
+
+        self.tell.families(watching_families(await asyncio.to_thread(known_profiles)))
+        await self._listen()
+        goes_on = await self._at_this_setting(last=len(self.settings) < 2)
+        for number, setting in enumerate(self.settings[1:], start=2):
+            if not goes_on:
+                break
+            if await self._reopened(setting):
+                goes_on = await self._at_this_setting(last=number == len(self.settings))
+        self.done = True
+
+    async def _listen(self) -> None:
+        """Nothing is sent on a line on which another master asks. Raises Failure."""
+        from tui.bus.link import TcpLink
+        from tui.session.connect.other_masters import LISTEN, listen
+
+        line = self.opened.line
+        if self.opened.simulation is not None or isinstance(line.link, TcpLink):
+            return  # nobody else is heard there
+        if line.facts.others:
+            return  # what is said there comes from programs of ours
+        self.tell.note(f"Listening for {LISTEN:g} s before the first request.")
+        if text := (await listen(line)).text:
+            raise Failure(f"{text} Nothing was sent.", REFUSED_HERE)
+
+    @property
+    def setting(self) -> LineSetting | None:
+        """What the line is open at; None over a network."""
+        from tui.bus.link import SerialLink
+
+        link = self.opened.line.link
+        return LineSetting(link.baud, link.format) if isinstance(link, SerialLink) else None
+
+    async def _at_this_setting(self, *, last: bool) -> bool:
+        """Ask all addresses; whether other settings may be tried, with what is found held on."""
+        from tui.session.connect.other_masters import MasterLookout
+        from tui.session.connect.search import Search
+
+        if (setting := self.setting) is not None:
+            self.tried.append(setting)
+        async with self._held() as fleet:
+
+            async def found(result: ScanResult) -> None:
+                await self._take(fleet, result)
+
+            search = Search(
+                self._not_known(),
+                once=True,
+                patient=self.opened.simulation is not None,
+                between=MasterLookout(self.opened.line).look,
+            )
+            await self._searched(search, asyncio.ensure_future(search.run(fleet.line, found)))
+            if last:
+                return True
+            self.held_back = await self._why_no_other()
+            return not self.held_back
+
+    @asynccontextmanager
+    async def _held(self) -> AsyncIterator[Fleet]:
+        """What asks the drives of this setting on, until the line is left."""
+        from tui.session.fleet import Fleet
+        from tui.session.journal import Journal
+
+        fleet = Fleet(self.opened.line, Journal())
+        self.sessions, self.unknown = [], []
+        try:
+            yield fleet
+        finally:
+            fleet.forget()
+
+    def _not_known(self) -> list[int]:
+        """The addresses to ask: not those heard already at a setting that this one understands."""
+        here = self.setting
+        known = {
+            hit.identity.device
+            for hit in self.hits
+            if here is not None and hit.setting is not None and here.hears(hit.setting)
+        }
+        return [device for device in self.devices if device not in known]
+
+    async def _searched(self, search: Search, work: asyncio.Future[None]) -> None:
+        """Tell how far a search is until it has ended."""
+        try:
+            while not work.done():
+                await asyncio.wait({work}, timeout=PROGRESS_EVERY)
+                self.tell.progress(self._progress(search))
+            await work
+        finally:
+            work.cancel()
+
+    def _progress(self, search: Search) -> Progress:
+        later = self.settings[len(self.tried) :]
+        left = search.left + sum(self.costs.get(one, 0.0) for one in later) * len(self.devices)
+        found = len(self.hits)
+        return Progress(self.setting, search.asked, search.of, found, left, len(later))
+
+    async def _take(self, fleet: Fleet, result: ScanResult) -> None:
+        """An address is not silent: tell it at once, then ask the drive on."""
+        if result.identity is None:
+            self.tell.unclear(self.setting, result)
+            return
+        hit = Hit(self.setting, result.identity, result.by)
+        self.hits.append(hit)
+        self.tell.hit(hit)
+        session = await asyncio.to_thread(self._session, result.identity)
+        if len(self.tried) < 2:
+            mind_the_drive(self.opened, result.device, result.identity)
+        if session is None:
+            self.unknown.append(result.device)
+            return
+        self.sessions.append(session)
+        fleet.take(session, guessed=result.identity.profile is None)
+        look_after(self.opened, session, self.line_text)
+
+    def _session(self, who: DriveIdentity) -> DriveSession | None:
+        """A session by the profile, or the likeliest of several; None where none fits."""
+        from tui.drive.errors import DriveError
+        from tui.drive.profile import library
+        from tui.session.drive import DriveSession
+
+        named = who.profile or next(iter(who.candidates), None)
+        try:
+            profile = library.load(named) if named is not None else None
+        except DriveError:
+            return None
+        line = self.opened.line
+        return DriveSession(line, who.device, profile, who) if profile is not None else None
+
+    async def _why_no_other(self) -> str:
+        """Why no other setting is tried; empty where one may be. What is found is held on."""
+        if others := self.opened.line.facts.others:
+            return f"{NONE_TRIED}: {others[0].text} uses the line now."
+        acting = [text for one in self.sessions if (text := await self._acts(one))]
+        acting += [f"Device {one}: what it does when it is asked no more is not known." for one in
+                   self.unknown]  # fmt: skip
+        if not acting or self.yes:
+            return ""
+        told = "\n".join(acting)
+        if not may_ask():
+            return (
+                f"{NONE_TRIED}: none of these would be asked on. --yes tries all the same.\n{told}"
+            )
+        self.tell.note(f"At other settings none of these is asked any more.\n{told}")
+        if await says_yes("Try the other settings?"):
+            return ""
+        return f"{NONE_TRIED}."
+
+    async def _acts(self, session: DriveSession) -> str:
+        """What a drive does once it is asked no more, in a sentence; empty for nothing."""
+        from tui.session.monitor.timeout import timeout_now
+
+        await look_after(self.opened, session, self.line_text).learn()
+        text = left_alone(session, timeout_now(session), self.line_text)
+        return text.partition("\n")[0]
+
+    async def _reopened(self, setting: LineSetting) -> bool:
+        """Have the line at another setting; False where the port has no such one."""
+        from tui.session.connect.open_line import reopen
+
+        await say_farewells(self.opened)
+        self.opened.farewells.clear()
+        try:
+            await asyncio.to_thread(
+                reopen, self.opened, setting.baud, setting.format, wait=OPEN_WITHIN
+            )
+        except PortRefused as error:
+            self.tell.note(f"{setting} is not tried: {error}")
+            self.settings.remove(setting)
+            return False
+        return True

@@ -1,0 +1,110 @@
+"""Whether another master asks drives on a line: heard before anything is sent, and while it is."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineError
+from tui.bus.trace import Frame
+from tui.wire.frames import is_whole
+from tui.wire.overheard import OverheardRequest, overheard_request
+
+from ..clock import REAL_CLOCK, Clock
+from .addresses import addresses_text
+
+LISTEN = 2.0
+"""Seconds that a line is listened to before the first request: a master's cycle is shorter."""
+NOISE = 4
+"""Fewer loose bytes than the shortest frame has are not worth the name of somebody's talk."""
+TOLD_OF_EACH = 3
+"""How many different requests to one address are told."""
+UNASKED = ("late or repeated", "noise")
+"""Notes of what came in while nothing was due."""
+
+
+class OtherMaster(LineError):
+    """Another master talks on the line; two of them disturb each other."""
+
+
+@dataclass(frozen=True, slots=True)
+class Overheard:
+    """What others said on a line."""
+
+    requests: tuple[OverheardRequest, ...] = ()
+    answered: tuple[int, ...] = ()
+    """Addresses that answered somebody."""
+    loose: int = 0
+    """Bytes that are no frame at this baud and format."""
+
+    @property
+    def text(self) -> str:
+        """Who is there, in a sentence: what is asked of which addresses; empty for nobody."""
+        if self.requests:
+            asked = dict.fromkeys(one.device for one in self.requests)
+            told = "; ".join(f"address {device}: {self._of(device)}" for device in asked)
+            return f"Another master asks drives on this line. {told[0].upper()}{told[1:]}."
+        if self.answered:
+            who = addresses_text(self.answered)
+            return f"Another master asks drives on this line: {who} answered it."
+        if self.loose >= NOISE:
+            return (
+                f"Somebody talks on this line at another baud or format: {self.loose} bytes that"
+                " are no frame."
+            )
+        return ""
+
+    def _of(self, device: int) -> str:
+        """What is asked of one address."""
+        texts = list(dict.fromkeys(one.text for one in self.requests if one.device == device))
+        more = len(texts) - TOLD_OF_EACH
+        return ", ".join(texts[:TOLD_OF_EACH]) + (f" and {more} more" if more > 0 else "")
+
+
+def overheard(frames: Iterable[Frame], since: float) -> Overheard:
+    """What others said since a time of the line's clock; echoes of our own do not count."""
+    ours: set[bytes] = set()
+    requests: list[OverheardRequest] = []
+    answered: dict[int, None] = {}
+    loose = 0
+    for frame in frames:
+        if frame.direction == "out":
+            ours.add(frame.data)
+        elif frame.time < since or frame.data in ours:
+            continue
+        elif is_whole(frame.data):
+            request = overheard_request(frame.data)
+            if request is not None and not frame.note.startswith("echo") and frame.note:
+                requests.append(request)
+            elif frame.note.startswith(UNASKED):
+                answered[frame.data[0]] = None
+        elif frame.note.startswith(UNASKED):
+            loose += len(frame.data)
+    return Overheard(tuple(requests), tuple(answered), loose)
+
+
+async def listen(line: ModbusLine, seconds: float = LISTEN, clock: Clock = REAL_CLOCK) -> Overheard:
+    """Listen to a line on which nothing is sent from here."""
+    since = _last_time(line.trace)
+    await clock.sleep(seconds)
+    return overheard(line.trace, since)
+
+
+class MasterLookout:
+    """Looks for requests of other masters while drives are searched for."""
+
+    def __init__(self, line: ModbusLine) -> None:
+        self._line = line
+        self._since = _last_time(line.trace)
+
+    def look(self) -> None:
+        """Raise OtherMaster where somebody else has asked a drive meanwhile."""
+        found = overheard(self._line.trace, self._since)
+        if found.requests:
+            raise OtherMaster(found.text)
+
+
+def _last_time(frames: Sequence[Frame]) -> float:
+    """The time behind which a frame is new."""
+    return frames[-1].time + 1e-9 if frames else 0.0
