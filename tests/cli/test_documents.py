@@ -55,6 +55,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
     "a value": (0, ("read", *DRIVE, "ACC", "ETA"), "ReadTold"),
     "two drives": (3, ("read", *DRIVE, "-d", "9", "ACC"), "ErrorTold"),
     "who it is": (0, ("identify", *DRIVE), "IdentityTold"),
+    "who is there": (0, ("scan", DRIVE[0], "--addresses", "2-3"), "ScanHitTold"),
     "what it does": (0, ("status", *DRIVE), "StatusTold"),
     "cycles": (0, ("watch", *DRIVE, "--every", "0.1", "--count", "2"), "CycleTold"),
     "a reference": (0, ("reference", *DRIVE, "20", "--arm"), "CommandTold"),

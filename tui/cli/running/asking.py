@@ -5,10 +5,9 @@ from __future__ import annotations
 import asyncio
 import os
 import sys
+from contextlib import suppress
 
-import click
-
-from ..shared.say import printable
+from ..shared.say import say_prompt
 
 YES = frozenset({"y", "yes"})
 
@@ -23,9 +22,19 @@ async def says_yes(question: str) -> bool:
 
     The loop goes on meanwhile, and may be cancelled.
     """
-    click.echo(f"{printable(question, sys.stderr.encoding)} [y/N] ", err=True, nl=False)
+    _forget_typed()
+    say_prompt(f"{question} [y/N]")
     answer = await _typed_line()
     return answer.strip().casefold() in YES
+
+
+def _forget_typed() -> None:
+    """What was typed before the question was seen is no answer to it."""
+    if os.name == "posix":
+        import termios
+
+        with suppress(termios.error):
+            termios.tcflush(sys.stdin.fileno(), termios.TCIFLUSH)
 
 
 async def _typed_line() -> str:

@@ -8,12 +8,10 @@ from dataclasses import dataclass
 from shutil import get_terminal_size
 from typing import TYPE_CHECKING, Any
 
-import click
-
 from tui.drive.finding import LineSetting, WatchingFamily, watching_text
 from tui.drive.plain import plain
 
-from ..shared.say import printable, say
+from ..shared.say import say, say_over
 
 if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
@@ -107,8 +105,8 @@ class ScanTelling:
         if not self._on_terminal:
             return
         width = get_terminal_size().columns - 1
-        text = printable(progress.text, sys.stderr.encoding)[:width]
-        click.echo(f"\r{text:<{len(self._drawn)}}", err=True, nl=False)
+        text = progress.text[:width]
+        say_over(text, last=False, before=len(self._drawn))
         self._drawn = text
 
     def note(self, text: str) -> None:
@@ -125,7 +123,8 @@ class ScanTelling:
     def _clear(self) -> None:
         """Take the line of progress away."""
         if self._drawn:
-            click.echo(f"\r{'':<{len(self._drawn)}}\r", err=True, nl=False)
+            say_over("", last=False, before=len(self._drawn))
+            say_over("", last=False)
             self._drawn = ""
 
     def _print(self, told: dict[str, Any]) -> None:

@@ -12,7 +12,7 @@ from tui.bus.errors import PortRefused
 from tui.drive.finding import LineSetting
 
 from ..shared.errors import REFUSED_HERE, Failure
-from ..shared.left_alone import left_alone, look_after, say_farewells
+from ..shared.left_alone import left_alone, look_after
 from ..shared.line_argument import mind_the_drive
 from .asking import may_ask, says_yes
 from .scan_telling import Hit, Progress, ScanTelling
@@ -79,7 +79,7 @@ class Scan:
         if line.facts.others:
             return  # what is said there comes from programs of ours
         self.tell.note(f"Listening for {LISTEN:g} s before the first request.")
-        if text := (await listen(line)).text:
+        if text := (await listen(line, LISTEN)).text:
             raise Failure(f"{text} Nothing was sent.", REFUSED_HERE)
 
     @property
@@ -112,6 +112,8 @@ class Scan:
             if last:
                 return True
             self.held_back = await self._why_no_other()
+            if self.held_back:
+                self.tell.note(self.held_back)
             return not self.held_back
 
     @asynccontextmanager
@@ -192,15 +194,15 @@ class Scan:
         acting = [text for one in self.sessions if (text := await self._acts(one))]
         acting += [f"Device {one}: what it does when it is asked no more is not known." for one in
                    self.unknown]  # fmt: skip
-        if not acting or self.yes:
+        if not acting:
             return ""
         told = "\n".join(acting)
-        if not may_ask():
+        if not (self.yes or may_ask()):
             return (
                 f"{NONE_TRIED}: none of these would be asked on. --yes tries all the same.\n{told}"
             )
         self.tell.note(f"At other settings none of these is asked any more.\n{told}")
-        if await says_yes("Try the other settings?"):
+        if self.yes or await says_yes("Try the other settings?"):
             return ""
         return f"{NONE_TRIED}."
 
@@ -216,8 +218,7 @@ class Scan:
         """Have the line at another setting; False where the port has no such one."""
         from tui.session.connect.open_line import reopen
 
-        await say_farewells(self.opened)
-        self.opened.farewells.clear()
+        self.opened.farewells.clear()  # what they do was told where other settings were decided on
         try:
             await asyncio.to_thread(
                 reopen, self.opened, setting.baud, setting.format, wait=OPEN_WITHIN

@@ -45,9 +45,17 @@ def _broken(line: str, width: int, indent: int) -> str:
     return "\n".join([*parts, gap + rest])
 
 
-def say_over(text: str, *, last: bool) -> None:
-    """Print one line on standard error in place of the one before; the last one stays."""
-    click.echo(f"\r{printable(text, sys.stderr.encoding)}", err=True, nl=last)
+def say_over(text: str, *, last: bool, before: int = 0) -> None:
+    """Print one line on standard error in place of the one before; the last one stays.
+
+    `before` is how long that was, where it may be longer.
+    """
+    click.echo(f"\r{printable(text, sys.stderr.encoding):<{before}}", err=True, nl=last)
+
+
+def say_prompt(text: str) -> None:
+    """Print a question on standard error; the answer is typed behind it."""
+    click.echo(f"{printable(text, sys.stderr.encoding)} ", err=True, nl=False)
 
 
 def printable(text: str, encoding: str | None) -> str:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Protocol
 
 from tui.bus.api import IdentificationObjects, Priority, Reply
-from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
+from tui.bus.errors import DeviceException, ExchangeError, NoAnswer, RequestRefused
 from tui.bus.expectation import IDENTIFY, REPORT_ID
 from tui.drive.errors import DriveError
 from tui.drive.finding import PresenceProbe
@@ -144,7 +145,8 @@ async def find_drive(
             return ScanResult(device, await identity_told(device, answer), by=how)
     if there.families:
         # that it has no such functions makes it no silent one: its last answer is what counts
-        await line.read(device, there.register, 1, priority=priority, within=likely)
+        with suppress(ExchangeError):
+            await line.read(device, there.register, 1, priority=priority, within=likely)
     by = f"read of register {there.register}" if there.families else ""
     return ScanResult(device, _nameless(device, there.families), by=by)
 

@@ -16,11 +16,11 @@ from .addresses import addresses_text
 
 LISTEN = 2.0
 """Seconds that a line is listened to before the first request: a master's cycle is shorter."""
-NOISE = 4
+TALK = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of somebody's talk."""
 TOLD_OF_EACH = 3
 """How many different requests to one address are told."""
-UNASKED = ("late or repeated", "noise")
+NOT_AWAITED = ("late or repeated", "noise")
 """Notes of what came in while nothing was due."""
 
 
@@ -48,7 +48,7 @@ class Overheard:
         if self.answered:
             who = addresses_text(self.answered)
             return f"Another master asks drives on this line: {who} answered it."
-        if self.loose >= NOISE:
+        if self.loose >= TALK:
             return (
                 f"Somebody talks on this line at another baud or format: {self.loose} bytes that"
                 " are no frame."
@@ -77,18 +77,22 @@ def overheard(frames: Iterable[Frame], since: float) -> Overheard:
             request = overheard_request(frame.data)
             if request is not None and not frame.note.startswith("echo") and frame.note:
                 requests.append(request)
-            elif frame.note.startswith(UNASKED):
+            elif frame.note.startswith(NOT_AWAITED):
                 answered[frame.data[0]] = None
-        elif frame.note.startswith(UNASKED):
+        elif frame.note.startswith(NOT_AWAITED):
             loose += len(frame.data)
     return Overheard(tuple(requests), tuple(answered), loose)
 
 
 async def listen(line: ModbusLine, seconds: float = LISTEN, clock: Clock = REAL_CLOCK) -> Overheard:
     """Listen to a line on which nothing is sent from here."""
-    since = _last_time(line.trace)
+    since, before = _last_time(line.trace), line.counters.bytes_in
     await clock.sleep(seconds)
-    return overheard(line.trace, since)
+    found = overheard(line.trace, since)
+    if not found.text:
+        # talk in the midst of which the time was up
+        return Overheard(loose=line.counters.bytes_in - before)
+    return found
 
 
 class MasterLookout:

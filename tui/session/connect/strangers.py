@@ -73,4 +73,7 @@ def settings_worth_a_try(first: LineSetting, *, parity: bool = True) -> list[Lin
     found = [first, *likely_settings(links, longest_turnaround(profiles))]
     if parity:
         return list(dict.fromkeys(found))
-    return list({(one.baud, one.stop_bits): one for one in reversed(found)}.values())[::-1]
+    alike: dict[tuple[int, int], LineSetting] = {}
+    for one in found:
+        alike.setdefault((one.baud, one.stop_bits), one)
+    return list(alike.values())

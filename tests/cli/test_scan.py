@@ -1,0 +1,265 @@
+"""`drivepanel scan`: it listens, asks each address once, shows who answers, and writes nothing."""
+
+from __future__ import annotations
+
+import json
+import os
+import pty
+import select
+import signal
+import subprocess
+import threading
+import time
+import tty
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+
+from tests.bus.peer import PtyPeer, Step, silent
+from tests.programs import DRIVEPANEL, PATIENCE, served
+from tui.drive.finding import likely_settings
+from tui.session.connect import strangers
+from tui.simulator import DriveSpec, LineTiming, Simulation
+from tui.wire.frames import frame, read_frame
+
+from .commands import ended, invoked, tcp_line
+from .test_documents import documents
+
+READS = {3, 4, 17, 43}
+"""Functions that change nothing."""
+MOTORS = (DriveSpec("atv71", 2), DriveSpec("atv312", 4), DriveSpec("powerdrive", 7))
+
+
+@pytest.fixture(autouse=True)
+def busy_machine(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Listens for less long, tries fewer settings, and waits for drives of this very process."""
+    monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.5)
+    monkeypatch.setattr(strangers, "JITTER", 0.25)
+    monkeypatch.setattr(strangers, "likely_settings", lambda *a: likely_settings(*a)[:6])
+
+
+@contextmanager
+def drives(*specs: DriveSpec) -> Iterator[PtyPeer]:
+    """Simulated drives behind a peer that keeps every request."""
+    simulation = Simulation(list(specs), any_settings=True)
+
+    def script(request: bytes, _count: int) -> Sequence[Step]:
+        reply = simulation.line.receive(request)
+        return [reply.data] if reply is not None else []
+
+    with simulation, PtyPeer(script) as peer:
+        yield peer
+
+
+@contextmanager
+def line_of(*specs: DriveSpec) -> Iterator[str]:
+    """Simulated drives on a pseudo-terminal that heed its baud and stop bits."""
+    simulation = Simulation(list(specs), timing=LineTiming(19200, "8E1"))
+    with simulation:
+        yield simulation.serve_pty()
+
+
+def events(text: str, kind: str) -> list[dict[str, Any]]:
+    """The documents of one kind of event, each of which fits the schema."""
+    return [one for one in documents(text) if one.get("event") == kind]
+
+
+def test_who_answers_is_told_with_how_sure_it_is() -> None:
+    with drives(*MOTORS) as peer:
+        text = ended(0, "scan", peer.path, "--addresses", "1-9", "--json").stdout
+    first, second, third = events(text, "hit")
+    assert {key: first[key] for key in ("device", "baud", "format", "vendor", "reference")} == {
+        "device": 2, "baud": 19200, "format": "8E1", "vendor": "Telemecanique",
+        "reference": "ATV71HU15M3",
+    }  # fmt: skip
+    assert [first[key] for key in ("version", "name", "profile", "sure", "by")] == [
+        "0201", "MACHINE 4", "atv71", "identified", "function 43",
+    ]  # fmt: skip
+    assert (second["device"], second["profile"], second["sure"]) == (4, "atv312", "identified")
+    assert (third["device"], third["profile"], third["sure"]) == (7, None, "likely")
+    assert third["candidates"] == ["powerdrive", "proxidrive", "varmeca"]
+    (end,) = events(text, "ended")
+    assert (end["done"], end["found"], end["held_back"]) == (True, 3, None)
+    assert end["settings"] == [{"baud": 19200, "format": "8E1"}]
+
+
+def test_it_writes_nothing_and_asks_an_empty_address_once() -> None:
+    with drives(*MOTORS) as peer:
+        ended(0, "scan", peer.path, "--addresses", "1-12")
+    assert {request[1] for request in peer.requests} <= READS
+    empty = set(range(1, 13)) - {2, 4, 7}
+    assert [request[0] for request in peer.requests if request[0] in empty] == sorted(empty)
+
+
+def test_a_person_reads_which_drive_is_where() -> None:
+    with drives(*MOTORS) as peer:
+        text = ended(0, "scan", peer.path, "--addresses", "1-9").stdout
+    assert text.splitlines() == [
+        "  2  19200 8E1   Altivar 71  ATV71HU15M3  2.1  MACHINE 4",
+        "  4  19200 8E1   Altivar 312  ATV312HU09M3  2.1",
+        "  7  19200 8E1   likely Leroy-Somer: Powerdrive, Proxidrive or Varmeca 33/34",
+    ]
+
+
+def test_silent_addresses_are_no_hits() -> None:
+    with PtyPeer(silent) as peer:
+        done = invoked("scan", peer.path, "--addresses", "1-5", "--json")
+    assert done.exit_code == 3
+    assert not events(done.stdout, "hit")
+    assert "No drives found at addresses 1-5, 19200 8E1." in done.stderr
+
+
+def test_who_watches_the_line_is_named_before_the_first_request() -> None:
+    with drives() as peer:
+        done = invoked("scan", peer.path, "--addresses", "1-2", "--json")
+    assert documents(done.stdout)[0]["event"] == "families"
+    assert "watch the line" in done.stderr.splitlines()[0]
+    (told,) = events(done.stdout, "families")
+    assert {"profile": "atv21", "name": "Altivar 21", "timeout": "F803", "sure": True} in told[
+        "families"
+    ]
+    assert "atv71" not in {one["profile"] for one in told["families"]}
+
+
+@pytest.mark.parametrize("options", [(), ("--all-settings", "--yes")], ids=["one", "all"])
+def test_another_master_ends_it_before_anything_is_sent(options: tuple[str, ...]) -> None:
+    over = threading.Event()
+    with PtyPeer(silent) as peer:
+
+        def talk() -> None:
+            while not over.wait(0.01):
+                peer.send(read_frame(6, 3201, 4))
+                peer.send(frame(6, bytes.fromhex("06 2135 0006")))
+
+        master = threading.Thread(target=talk)
+        master.start()
+        try:
+            done = invoked("scan", peer.path, *options)
+        finally:
+            over.set()
+            master.join()
+        assert peer.requests == []
+    assert done.exit_code == 5
+    assert "Address 6: read of register 3201 on, 4 words, write of register 8501" in done.stderr
+    assert "Nothing was sent." in done.stderr
+
+
+def test_two_drives_at_one_address_are_told_as_unclear() -> None:
+    def script(request: bytes, _count: int) -> Sequence[Step]:
+        return [frame(3, bytes.fromhex("03 02 0001"))[:-1] + b"\0"] if request[0] == 3 else []
+
+    with PtyPeer(script) as peer:
+        done = invoked("scan", peer.path, "--addresses", "2-4", "--json")
+    assert done.exit_code == 3
+    (told,) = events(done.stdout, "unclear")
+    assert told["device"] == 3
+
+
+def test_over_a_network_there_is_no_setting() -> None:
+    with tcp_line("atv71@2") as line:
+        (hit,) = events(ended(0, "scan", line, "--addresses", "1-2", "--json").stdout, "hit")
+        assert (hit["baud"], hit["format"]) == (None, None)
+        assert "no baud" in ended(2, "scan", line, "--all-settings").stderr
+
+
+SLOW = DriveSpec("atv71", 4, sets={"TBR": 28})
+"""At 9600 baud."""
+
+
+def test_other_settings_are_tried_and_what_hears_two_is_told_once() -> None:
+    with line_of(DriveSpec("atv71", 1), SLOW) as line:
+        text = ended(0, "scan", line, "--addresses", "1,4", "--all-settings", "--json").stdout
+    hits = events(text, "hit")
+    assert [(one["device"], one["baud"], one["format"]) for one in hits] == [
+        (1, 19200, "8E1"),
+        (4, 9600, "8E1"),
+    ]
+    (end,) = events(text, "ended")
+    # a pseudo-terminal has no parity: what differs in nothing else is tried once
+    assert [(one["baud"], one["format"]) for one in end["settings"]] == [
+        (19200, "8E1"),
+        (19200, "8N2"),
+        (9600, "8E1"),
+    ]
+    assert end["not_tried"] == 0
+
+
+def test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act() -> None:
+    with line_of(DriveSpec("atv21", 1), SLOW) as line:
+        asked = "scan", line, "--addresses", "1,4", "--all-settings", "--json"
+        held = ended(0, *asked)
+        (end,) = events(held.stdout, "ended")
+        assert len(end["settings"]) == 1
+        assert "Device 1, Altivar 21" in end["held_back"]
+        assert "--yes" in held.stderr
+        text = ended(0, *asked, "--yes").stdout
+        assert [one["device"] for one in events(text, "hit")] == [1, 4]
+
+
+def test_a_line_that_others_use_is_not_taken_for_other_settings() -> None:
+    with line_of(DriveSpec("atv71", 1)) as line:
+        watch = [*DRIVEPANEL, "watch", line, "RFR", "--json"]
+        with served(watch, ready="RFR"):
+            said = ended(5, "scan", line, "--addresses", "1-2", "--all-settings").stderr
+            assert "needs the line for itself" in said
+            assert "watch" in said
+            # beside it at the line's own setting
+            assert "Altivar 71" in ended(0, "scan", line, "--addresses", "1-2").stdout
+
+
+def test_ctrl_c_keeps_what_was_found() -> None:
+    with line_of(DriveSpec("atv71", 1)) as line:
+        scan = [*DRIVEPANEL, "scan", line, "--all-settings", "--json"]
+        with served(scan, ready='"hit"') as program:
+            program.process.send_signal(signal.SIGINT)
+            rest, said = program.process.communicate(timeout=PATIENCE)
+    assert program.process.returncode == 130
+    (end,) = events(rest, "ended")
+    assert (end["done"], end["found"]) == (False, 1)
+    assert "Ended by Ctrl-C. 1 drive found" in said
+
+
+@contextmanager
+def at_a_terminal(*arguments: str) -> Iterator[tuple[subprocess.Popen[bytes], int]]:
+    """A command whose person is at a terminal, and the handle of that; JSON goes to a pipe."""
+    near, far = pty.openpty()
+    tty.setraw(near)
+    process = subprocess.Popen(
+        [*DRIVEPANEL, *arguments], stdin=far, stdout=subprocess.PIPE, stderr=far
+    )
+    os.close(far)
+    try:
+        yield process, near
+    finally:
+        if process.poll() is None:
+            process.kill()
+        process.communicate(timeout=PATIENCE)
+        os.close(near)
+
+
+def seen(near: int, wanted: str) -> None:
+    """Wait until the terminal shows a text."""
+    text, end = "", time.monotonic() + PATIENCE
+    while wanted not in text:
+        assert time.monotonic() < end, text
+        if select.select([near], [], [], 0.1)[0]:
+            text += os.read(near, 4096).decode()
+
+
+def test_drives_are_held_while_the_person_decides() -> None:
+    simulation = Simulation([DriveSpec("atv21", 1, sets={"F803": 2})], timing=LineTiming())
+    with simulation:
+        line, drive = simulation.serve_pty(), simulation.drive(1)
+        scan = "scan", line, "--addresses", "1-2", "--all-settings", "--json"
+        with at_a_terminal(*scan) as (process, near):
+            seen(near, "Try the other settings?")
+            time.sleep(5.0)  # more than two of its time-outs
+            assert drive.fault is None
+            os.write(near, b"n\n")
+            out, _ = process.communicate(timeout=PATIENCE)
+    assert process.returncode == 0
+    (end,) = (one for one in map(json.loads, out.splitlines()) if one.get("event") == "ended")
+    assert end["held_back"] == "No other setting is tried."
+    assert len(end["settings"]) == 1
