@@ -1,0 +1,197 @@
+"""A search for drives against what its line allows: one setting, all settings, a hit on the screen.
+
+    python -m benchmarks.scan [--addresses N] [--rounds N] [--all]
+
+Nobody answers while the time is taken, as that is what a search spends its time on. The limit of
+an address is its request, the longest turnaround of the profiles or the silence that ends the
+request, and the first character of a reply. --all takes two minutes.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import median
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.wire import ROOT, Exchange, WireLine
+from tui.drive.finding import LineSetting, longest_turnaround, silent_cost, wait_for_reply
+from tui.session.connect.identify import ScanResult
+from tui.session.connect.open_line import OpenLine, open_line, reopen
+from tui.session.connect.search import Search
+from tui.session.connect.strangers import known_profiles, settings_worth_a_try
+from tui.simulator import LineTiming
+
+FACTORY = LineSetting(19200, "8E1")
+ELSEWHERE = 200
+"""Address of the one drive on a line on which nobody is asked."""
+AIM_ONE, AIM_ALL = 5.0, 60.0
+"""Seconds in which 31 addresses are to be asked at one setting, and at all."""
+IN_COMMAND = (4, 17, 31)
+"""Addresses of the drives that the command finds."""
+
+
+def limit(setting: LineSetting) -> float:
+    """Seconds that an empty address takes at the least."""
+    return silent_cost(setting, wait_for_reply(setting, longest_turnaround(known_profiles())))
+
+
+async def searched(opened: OpenLine, addresses: Sequence[int]) -> float:
+    """Seconds of one search."""
+
+    async def found(_: ScanResult) -> None:
+        raise RuntimeError("nobody should have answered")
+
+    began = time.monotonic()
+    await Search(addresses, once=True).run(opened.line, found)
+    return time.monotonic() - began
+
+
+def steps(exchanges: Sequence[Exchange]) -> list[float]:
+    """Seconds from each request to the next one."""
+    return [b.began - a.began for a, b in pairwise(exchanges)]
+
+
+def one_setting(wire: WireLine, setting: LineSetting, addresses: Sequence[int]) -> dict[str, Any]:
+    """A search at one setting on a line of its pace."""
+    timing = LineTiming(setting.baud, setting.format, True)
+    wire.set_up({ELSEWHERE: "atv71"}, timing)
+    opened = open_line(wire.text, wait=5.0)
+    try:
+        seconds = asyncio.run(searched(opened, addresses))
+    finally:
+        opened.close()
+    taken = [one for one in wire.take() if one.request[0] != ELSEWHERE]
+    least = limit(setting)
+    return {
+        "setting": str(setting),
+        "seconds": seconds,
+        "limit": least * len(addresses),
+        "requests": len(taken),
+        "request_to_limit": median(steps(taken)) / least,
+    }
+
+
+def all_settings(wire: WireLine, addresses: Sequence[int]) -> dict[str, Any]:
+    """Every setting in turn; the line is opened anew for each."""
+    wire.set_up({ELSEWHERE: "atv71"}, LineTiming(FACTORY.baud, FACTORY.format, True))
+    settings = settings_worth_a_try(FACTORY)
+    opened = open_line(wire.text, wait=5.0)
+    began = time.monotonic()
+    ends: list[float] = []
+    try:
+        for number, setting in enumerate(settings):
+            if number:
+                reopen(opened, setting.baud, setting.format, wait=5.0)
+            asyncio.run(searched(opened, addresses))
+            ends.append(time.monotonic() - began)
+    finally:
+        opened.close()
+    least = [limit(one) * len(addresses) for one in settings]
+    in_time = sum(end <= AIM_ALL for end in ends)
+    return {
+        "settings": len(settings),
+        "seconds": ends[-1],
+        "limit": sum(least),
+        "within_60_s": in_time,
+        "within_60_s_by_the_limit": sum(sum(least[: n + 1]) <= AIM_ALL for n in range(len(least))),
+        "not_within_60_s": [str(one) for one in settings[in_time:]],
+        "from_1200_baud": sum(
+            one for one, setting in zip(least, settings, strict=True) if setting.baud >= 1200
+        ),
+    }
+
+
+def command(wire: WireLine, last: int) -> dict[str, Any]:
+    """The command itself, three drives on its line: all of its time, and how soon a hit shows."""
+    families = dict(zip(IN_COMMAND, ("atv71", "atv312", "powerdrive"), strict=True))
+    wire.set_up(families, LineTiming(FACTORY.baud, FACTORY.format, True))
+    typed = [sys.executable, "-m", "tui", "scan", wire.text, "--addresses", f"1-{last}", "--json"]
+    began = time.monotonic()
+    process = subprocess.Popen(
+        typed, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True
+    )
+    shown: dict[int, float] = {}
+    assert process.stdout is not None
+    for line in process.stdout:
+        told = json.loads(line)
+        if told["event"] == "hit":
+            shown[told["device"]] = time.monotonic()
+    process.wait()
+    seconds = time.monotonic() - began
+    first: dict[int, float] = {}
+    for one in wire.take():
+        if one.size and one.request[0] in families:
+            first.setdefault(one.request[0], one.ended)
+    late = {families[device]: shown[device] - first[device] for device in shown}
+    return {"seconds": seconds, "found": len(shown), "hit_shown_after": late}
+
+
+def show(console: Console, rows: Sequence[dict[str, Any]]) -> None:
+    """Print the searches at one setting."""
+    table = Table(title="Empty addresses at one setting")
+    for title in ("setting", "seconds", "limit", "/ limit", "request / limit", "requests"):
+        table.add_column(title, justify="left" if title == "setting" else "right")
+    for row in rows:
+        table.add_row(
+            row["setting"],
+            f"{row['seconds']:.2f}",
+            f"{row['limit']:.2f}",
+            f"{row['seconds'] / row['limit']:.3f}",
+            f"{row['request_to_limit']:.3f}",
+            str(row["requests"]),
+        )
+    console.print(table)
+
+
+def main() -> None:
+    """Measure, print the tables, and all figures as JSON in the last line."""
+    parser = argparse.ArgumentParser(description="A search for drives.")
+    parser.add_argument("--addresses", type=int, default=31, help="the last address asked")
+    parser.add_argument("--rounds", type=int, default=3, help="searches at each setting")
+    parser.add_argument("--all", action="store_true", help="all settings too, in two minutes")
+    given = parser.parse_args()
+    console, wire = Console(width=100), WireLine()
+    addresses = range(1, given.addresses + 1)
+    settings = [FACTORY, LineSetting(19200, "8N2"), LineSetting(9600, "8E1")]
+    figures: dict[str, Any] = {"benchmark": "scan"}
+    try:
+        figures["one"] = rows = [
+            one_setting(wire, setting, addresses)
+            for setting in settings
+            for _ in range(given.rounds)
+        ]
+        show(console, rows)
+        figures["command"] = told = command(wire, given.addresses)
+        late = ", ".join(f"{one} {1000 * s:.0f} ms" for one, s in told["hit_shown_after"].items())
+        console.print(
+            f"The command, with 1.5 s of listening: {told['seconds']:.2f} s (aim {AIM_ONE:g} s),"
+            f" {told['found']} of {len(IN_COMMAND)} found; from the first answer to the line that"
+            f" tells of it: {late}."
+        )
+        if given.all:
+            figures["all"] = told = all_settings(wire, addresses)
+            console.print(
+                f"All {told['settings']} settings: {told['seconds']:.1f} s, limit"
+                f" {told['limit']:.1f} s ({told['seconds'] / told['limit']:.3f});"
+                f" in {AIM_ALL:g} s {told['within_60_s']} of them, by the limit"
+                f" {told['within_60_s_by_the_limit']}. Left then:"
+                f" {', '.join(told['not_within_60_s'])}. From 1200 baud on the limit is"
+                f" {told['from_1200_baud']:.1f} s."
+            )
+    finally:
+        wire.close()
+    print(json.dumps(figures))
+
+
+if __name__ == "__main__":
+    main()
