@@ -14,7 +14,7 @@ from tui.wire.overheard import OverheardRequest, overheard_request
 from ..clock import REAL_CLOCK, Clock
 from .addresses import addresses_text
 
-LISTEN = 2.0
+LISTEN = 1.5
 """Seconds that a line is listened to before the first request: a master's cycle is shorter."""
 TALK = 4
 """Fewer loose bytes than the shortest frame has are not worth the name of somebody's talk."""

@@ -18,7 +18,7 @@ from tui.drive.finding import (
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 
-PATIENCE = 3.0
+PATIENCE = 2.0
 """Who is there is waited for so many times longer than an empty address."""
 JITTER = 0.002
 """Seconds by which this computer, or an adapter on USB, is late with what came."""
