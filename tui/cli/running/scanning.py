@@ -59,6 +59,7 @@ class Scan:
         from tui.session.connect.strangers import known_profiles
 
         self.tell.families(watching_families(await asyncio.to_thread(known_profiles)))
+        await asyncio.to_thread(_ready_for_hits)
         await self._listen()
         goes_on = await self._at_this_setting(last=len(self.settings) < 2)
         for number, setting in enumerate(self.settings[1:], start=2):
@@ -228,3 +229,14 @@ class Scan:
             self.settings.remove(setting)
             return False
         return True
+
+
+def _ready_for_hits() -> None:
+    """Read and import before the first request what else the first hit would wait for."""
+    import tui.session.connect.known_line
+    import tui.session.fleet
+    import tui.session.journal
+    import tui.session.monitor.timeout  # noqa: F401
+    from tui.drive.profile import library
+
+    library.matching_profiles("-")
