@@ -145,6 +145,21 @@ def test_who_asks_once_more_waits_longer(devices: Devices) -> None:
     assert devices.backed_off(1, Priority.PATIENT, 10.0) is None
 
 
+def test_who_asks_says_how_long_a_stranger_is_waited_for(devices: Devices) -> None:
+    background = Priority.BACKGROUND
+    assert devices.time_out(1, 3, background, 0.01) == 0.01
+    assert devices.time_out(1, 3, background, 5.0) == 1.0, "no longer than the longest"
+    assert devices.time_out(1, 3, background, float("nan")) == 0.3
+
+
+def test_an_address_that_never_answered_owes_no_reply(devices: Devices) -> None:
+    devices.silent(1, EXPECTED, 10.0, 11.0)
+    assert devices.last_reply_by(11.0) == 11.0
+    devices.answered(2, EXPECTED, 0.01, 10.0)
+    devices.silent(2, EXPECTED, 10.0, 11.0)
+    assert devices.last_reply_by(11.0) == 12.0
+
+
 def test_silent_device_is_left_alone_by_polls(devices: Devices) -> None:
     devices.silent(1, EXPECTED, 9.0, 10.0)
     assert devices.backed_off(1, Priority.POLL, 10.0) == 1.0

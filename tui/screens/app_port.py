@@ -116,7 +116,7 @@ class Panel(LeanApp):
         """Show another of the open lines; no drive is open then."""
 
     @abstractmethod
-    async def connect(self, text: str) -> None:
+    async def connect(self, text: str, *, remember: bool = True) -> None:
         """Open a line and show it, beside those with drives; raises the line's errors."""
 
     @abstractmethod

@@ -62,10 +62,11 @@ class LineOwner(Panel):
         """Why what is written is not on record; empty while it is."""
         return self._journal.trouble if self._journal is not None else ""
 
-    async def connect(self, text: str) -> None:
+    async def connect(self, text: str, *, remember: bool = True) -> None:
         """Open a line and show it; raises the line's errors.
 
         Lines with drives stay open below. One that is open with other settings is closed before.
+        One that is not to be remembered is none of those used lately.
         """
         if (here := self.open_line_of(text)) is not None:
             await self._close(here)
@@ -92,7 +93,8 @@ class LineOwner(Panel):
         self.show_line(one)
         self._look_after(fleet)
         log.info("opened %s", opened.label)
-        await asyncio.to_thread(_remember, opened.text)
+        if remember:
+            await asyncio.to_thread(_remember, opened.text)
 
     def open_line_of(self, text: str) -> PanelLine | None:
         """The open line that a text means, whatever its settings; None where it is not open."""

@@ -126,9 +126,10 @@ class Devices:
         record.heard = state.heard
 
     def last_reply_by(self, now: float) -> float:
-        """When the last reply that is still due may have come; now where none is."""
-        due = [one.expires for record in self._devices.values() for one in record.outstanding]
-        return max([now, *due])
+        """When the last reply that is due may have come, of those who ever answered; else now."""
+        there = (record for record in self._devices.values() if record.ever_answered)
+        due = (one.expires for record in there for one in record.outstanding)
+        return max((now, *due))
 
     def time_out(
         self, device: int, function: int, priority: Priority, within: float | None = None
@@ -153,8 +154,7 @@ class Devices:
     def backed_off(
         self, device: int, priority: Priority, now: float, within: float | None = None
     ) -> float | None:
-        """Seconds until polls of a silent device are sent again, None when they are sent now:
-        always so for who says `within` how long is waited, and so looks whether it is there."""
+        """Seconds until a silent device is polled again; None now, or to look `within` a time."""
         record = self[device]
         asked_now = within is not None or priority < Priority.POLL
         if asked_now or record.next_try is None or now >= record.next_try:

@@ -136,5 +136,13 @@ class LineForm(Vertical):
             self._fields[name].disabled = not port
         self._draw()
 
+    def show_settings(self, baud: int, format: str) -> None:
+        """The settings at which drives answered stand in their fields."""
+        for name, value in (("baud", str(baud)), ("format", format)):
+            field = self._fields[name]
+            with field.prevent(Input.Changed):
+                field.value = value
+        self._draw()
+
     def _typed(self, name: str) -> str:
         return self._fields[name].value.strip()

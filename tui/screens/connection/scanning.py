@@ -43,11 +43,13 @@ class Scanning(LineView):
         return True
 
     @work(exclusive=True, group="scan", exit_on_error=False)
-    async def scan(self, devices: Sequence[int], typed: str = "") -> None:
+    async def scan(self, devices: Sequence[int], typed: str = "", *, once: bool = False) -> None:
         """Ask each address; drives appear as they answer, whatever screen is on top.
 
-        `typed` is remembered as the addresses of this line.
+        `typed` is remembered as the addresses of this line. What was asked `once` is one of
+        several settings: whoever tries them tells what it came to.
         """
+        from tui.session.connect.other_masters import MasterLookout
         from tui.session.connect.search import Search
 
         fleet = self.app.fleet
@@ -55,8 +57,10 @@ class Scanning(LineView):
             return
         opened = self.app.opened
         patient = opened is not None and opened.simulation is not None
-        search = fleet.search = Search(devices, patient=patient)
-        self.tell_search()
+        look = MasterLookout(fleet.line).look
+        search = fleet.search = Search(devices, patient=patient, once=once, between=look)
+        if not once:
+            self.tell_search()
         self.look()
         if typed:
             await asyncio.to_thread(_remember, self.app.line_text, typed)
@@ -66,7 +70,8 @@ class Scanning(LineView):
             if self.app.fleet is fleet:
                 self.fail(error)
             return
-        self.sum_up(devices)
+        if not once:
+            self.sum_up(devices)
         self.look()
 
     def tell_search(self) -> None:

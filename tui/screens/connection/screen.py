@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, ClassVar
 from textual.widgets import Input, OptionList
 
 from ..keys.table import CONNECTION, bindings
-from .line_keys import LineKeys
+from .other_settings import OtherSettings
 
 if TYPE_CHECKING:
     from tui.session.console import DriveConsole
 
 
-class ConnectionScreen(LineKeys):
+class ConnectionScreen(OtherSettings):
     """What the cursor and Enter do in the two lists."""
 
     CSS_PATH = "connection.tcss"

@@ -47,6 +47,7 @@ SAVE = "Save what is shown to a file: a backup, an assignment, the record of a t
 OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
 FIND = "Find a parameter by code, name, address or value, from anywhere."
 WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
+SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks where drives act."
 ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
@@ -72,6 +73,7 @@ ACTIONS: tuple[Action, ...] = (
         ("addresses", "c", "range", "Change the addresses to search: 1-31, or 1,3,5-7."),
         ("type_line", "n", "line", "Type a line: serial, TCP, RTU over TCP, sim."),
         ("stop_scan", "escape", "", "End the search for drives."),
+        ("scan_settings", "", "", SCAN_SETTINGS),
         ("refresh_lines", "", "", "Look for serial ports again."),
         ("disconnect", "", "", "Close the line; asks where a drive acts on that."),
     ),

@@ -1,0 +1,89 @@
+"""Line searches at other baud rates and formats, likely ones first, until a drive answers."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+
+import pytest
+from textual.pilot import Pilot
+
+from tests.bus.peer import PtyPeer, silent
+from tui.app import DrivePanelApp
+from tui.drive.finding import likely_settings
+from tui.screens.dialogs.confirm import Confirm
+from tui.session.connect import strangers
+from tui.session.paths import recent_lines
+from tui.simulator import DriveSpec, LineTiming, Simulation
+from tui.wire.frames import read_frame
+
+from .test_flows import until
+
+
+@pytest.fixture(autouse=True)
+def few_settings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+    monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.5)
+    monkeypatch.setattr(strangers, "JITTER", 0.25)
+    monkeypatch.setattr(strangers, "likely_settings", lambda *a: likely_settings(*a)[:6])
+
+
+@asynccontextmanager
+async def panel_on(line: str) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]:
+    """The panel on a line that was searched at its own setting."""
+    app = DrivePanelApp(start=f"{line},19200,8E1")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.opened is not None)
+        app.connection.form.offer_addresses("1-2")
+        app.connection.action_scan()
+        await until(pilot, lambda: bool(app.connection.search and app.connection.search.ended))
+        yield app, pilot
+
+
+def said(app: DrivePanelApp) -> str:
+    return "\n".join(event.text for event in app.events.events)
+
+
+async def test_a_drive_at_another_baud_is_found_and_the_line_stays_there() -> None:
+    drive = DriveSpec("atv71", 1, sets={"TBR": 28})
+    with Simulation([drive], timing=LineTiming(19200, "8E1")) as simulation:
+        async with panel_on(simulation.serve_pty()) as (app, pilot):
+            assert not app.connection.found
+            app.connection.action_scan_settings()
+            await until(pilot, lambda: "Drives answer at 9600 8E1" in said(app))
+            assert set(app.connection.found) == {1}
+            assert app.line_text.endswith(",9600,8E1")
+            assert app.connection.form.line_at("p") == "serial:p,9600,8E1"
+            assert sum(",19200,8N2" in one for one in recent_lines()) == 0
+            assert any(",9600,8E1" in one for one in recent_lines())
+
+
+async def test_a_drive_that_would_act_is_left_alone_only_with_a_yes() -> None:
+    with Simulation([DriveSpec("atv21", 1)], timing=LineTiming(19200, "8E1")) as simulation:
+        async with panel_on(simulation.serve_pty()) as (app, pilot):
+            await until(pilot, lambda: set(app.connection.found) == {1})
+            app.connection.action_scan_settings()
+            await until(pilot, lambda: isinstance(app.screen, Confirm))
+            await pilot.press("n")
+            await until(pilot, lambda: not isinstance(app.screen, Confirm))
+            assert set(app.connection.found) == {1}
+            assert app.line_text.endswith(",19200,8E1")
+
+
+async def test_another_master_is_told_and_nothing_is_sent() -> None:
+    with PtyPeer(silent) as peer:
+        async with panel_on(peer.path) as (app, pilot):
+            sent = len(peer.requests)
+            app.connection.action_scan_settings()
+            await until(pilot, lambda: "Listening" in app.connection._advice[0])
+            peer.send(read_frame(6, 3201, 4))
+            await until(pilot, lambda: "Address 6: read of register 3201" in said(app))
+            assert len(peer.requests) == sent
+
+
+async def test_a_line_without_settings_says_so() -> None:
+    app = DrivePanelApp(start="sim:atv71")
+    async with app.run_test(size=(80, 24)) as pilot:
+        await until(pilot, lambda: app.opened is not None)
+        app.connection.action_scan_settings()
+        await until(pilot, lambda: "no baud or format of its own" in said(app))
