@@ -9,6 +9,7 @@ from pathlib import Path
 import msgspec
 
 from ..errors import ProfileError
+from .converting import converted
 from .form import form_faults, place_label
 from .rules import RULES
 from .schema import ProfileData
@@ -50,7 +51,7 @@ def examined(path: Path, packaged: Path) -> tuple[ProfileData | None, list[Profi
     """
     sources = read_tables(path, packaged)
     try:
-        data = msgspec.convert(sources.tables, ProfileData)
+        data: ProfileData = converted(sources.tables, ProfileData)
     except msgspec.ValidationError:
         return None, _faults_of_form(sources)
     return data, _in_order(_placed(sources, _broken_rules(data)))
@@ -64,7 +65,7 @@ def _faults_of_form(sources: ProfileTables) -> list[ProfileFault]:
         for path, text in form.found
     ]
     try:
-        data = msgspec.convert(mended, ProfileData)
+        data: ProfileData = converted(mended, ProfileData)
     except msgspec.ValidationError as error:
         told = told or [((), f"the file: {error}.")]
     else:

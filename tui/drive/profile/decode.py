@@ -7,6 +7,7 @@ from typing import TypeVar
 import msgspec
 
 from ..errors import ProfileError
+from .converting import converted
 from .form import form_faults, place_label
 from .shared_rows import SourceText, parsed
 from .toml_lines import TomlPath
@@ -18,7 +19,7 @@ def decode_tables(source: SourceText, form: type[T]) -> T:
     """The data of a TOML text in a form; raises ProfileError with each fault, file and line."""
     tables = parsed(source)
     try:
-        return msgspec.convert(tables, form)
+        data: T = converted(tables, form)
     except msgspec.ValidationError as error:
         found = form_faults(tables, form)[0].found or [((), str(error))]
         lines = [
@@ -27,6 +28,7 @@ def decode_tables(source: SourceText, form: type[T]) -> T:
             for path, fault in found
         ]
         raise ProfileError("\n".join(lines)) from error
+    return data
 
 
 def line_of(source: SourceText, path: TomlPath) -> int:

@@ -17,6 +17,7 @@ import msgspec
 from ..errors import ProfileError
 from ..small_file import read_small_text
 from . import library
+from .converting import converted
 from .heads import section, shared_texts
 from .schema import Chart
 
@@ -82,7 +83,7 @@ def _quick(path: Path) -> tuple[tuple[Chart, ...], Mapping[str, int]] | None:
     if shared is None or any("[[charts]]" in one for one in shared):
         return None
     try:
-        charts = msgspec.convert(rows, tuple[Chart, ...])
+        charts: tuple[Chart, ...] = converted(rows, tuple[Chart, ...])
     except msgspec.ValidationError:
         return None
     places: dict[str, int] = {}

@@ -1,0 +1,35 @@
+"""Profiles that several threads want at once, as a search and a stop do, are loaded."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+from tests.programs import PATIENCE
+
+PROGRAM = """
+import sys, threading
+sys.setswitchinterval(1e-6)
+from tui.drive.profile import library, stop_facts
+ids = [listing.id for listing in library.listings()]
+start = threading.Barrier(len(ids) + 1)
+def load(id):
+    start.wait()
+    library.load(id)
+threads = [threading.Thread(target=load, args=(id,)) for id in ids]
+for thread in threads:
+    thread.start()
+start.wait()
+for listing in library.listings():
+    stop_facts._quick(listing.path)
+for thread in threads:
+    thread.join()
+print(len({library.load(id).id for id in ids}))
+"""
+
+
+def test_no_thread_crashes_the_program_that_meets_a_profile_first() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM], capture_output=True, text=True, timeout=PATIENCE
+    )
+    assert (done.returncode, done.stdout.strip()) == (0, "7"), done.stderr
