@@ -30,6 +30,12 @@ def patience(patient_lines: None) -> None:
 
 
 @pytest.fixture(autouse=True)
+def nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
+    """No search listens for another master first; `test_other_settings` looks at that."""
+    monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 0.0)
+
+
+@pytest.fixture(autouse=True)
 def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A fifth of the time of a test of the panel would go into the same style sheets."""
     monkeypatch.setattr(Stylesheet, "_parse_rules", parse_once)

@@ -81,6 +81,28 @@ async def test_another_master_is_told_and_nothing_is_sent() -> None:
             assert len(peer.requests) == sent
 
 
+async def test_a_search_of_a_port_listens_first() -> None:
+    with PtyPeer(silent) as peer:
+        app = DrivePanelApp(start=f"{peer.path},19200,8E1")
+        async with app.run_test(size=(80, 24)) as pilot:
+            await until(pilot, lambda: "Listening" in app.connection._advice[0])
+            peer.send(read_frame(6, 3201, 4))
+            await until(pilot, lambda: "Address 6: read of register 3201" in said(app))
+            assert not app.connection.scanning
+            assert peer.requests == []
+
+
+async def test_esc_ends_the_listening_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tui.session.connect.other_masters.LISTEN", 600.0)
+    with PtyPeer(silent) as peer:
+        app = DrivePanelApp(start=f"{peer.path},19200,8E1")
+        async with app.run_test(size=(80, 24)) as pilot:
+            await until(pilot, lambda: "Listening" in app.connection._advice[0])
+            app.connection.action_stop_scan()
+            await until(pilot, lambda: not app.connection.scanning)
+            assert peer.requests == []
+
+
 async def test_a_line_without_settings_says_so() -> None:
     app = DrivePanelApp(start="sim:atv71")
     async with app.run_test(size=(80, 24)) as pilot:

@@ -44,7 +44,7 @@ class OtherSettings(LineKeys):
         question = "Try other baud rates and formats?"
         if not await self.app.may_let_go(question, yes="tries them", no="stays", always=always):
             return
-        if await self._heard_nobody():
+        if not await self.hears_another_master(link):
             await self._try(link, devices, await asyncio.to_thread(self._worth_a_try, link))
 
     def _port(self) -> SerialLink | None:
@@ -64,16 +64,6 @@ class OtherSettings(LineKeys):
         else:
             return link
         return None
-
-    async def _heard_nobody(self) -> bool:
-        """Listen before anything is sent; another master is told, with what it asks of whom."""
-        from tui.session.connect.other_masters import LISTEN, listen
-
-        assert self.app.opened is not None
-        self.advise("Listening for another master.", "Then other settings are tried.")
-        if text := (await listen(self.app.opened.line, LISTEN)).text:
-            self.say(text, "Nothing was sent.", ALARM_KIND)
-        return not text
 
     def _worth_a_try(self, link: SerialLink) -> list[LineSetting]:
         """The settings that are left, likely ones first; all of them where none is left."""

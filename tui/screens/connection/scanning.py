@@ -16,7 +16,9 @@ from .found import WATCHED_ONLY
 from .state import ALARM_KIND, LineView
 
 if TYPE_CHECKING:
+    from tui.bus.link import Link
     from tui.session.connect.identify import DriveIdentity, ScanResult
+    from tui.session.connect.search import Search
 
 
 class Scanning(LineView):
@@ -64,6 +66,8 @@ class Scanning(LineView):
         self.look()
         if typed:
             await asyncio.to_thread(_remember, self.app.line_text, typed)
+        if not once and await self._is_not_alone(search):
+            return
         try:
             await search.run(fleet.line, self._take)
         except LineError as error:
@@ -73,6 +77,36 @@ class Scanning(LineView):
         if not once:
             self.sum_up(devices)
         self.look()
+
+    async def _is_not_alone(self, search: Search) -> bool:
+        """Whether another master was heard before a search for unknown drives; that ends it."""
+        if len(search.devices) < 2 or self.found or self.app.fleet is None:
+            return False
+        heard = True  # also where a key ends it meanwhile
+        try:
+            heard = await self.hears_another_master(self.app.fleet.line.link)
+        finally:
+            search.ended = "stopped" if heard else ""
+        if not heard:
+            self.tell_search()
+        self.look()
+        return heard
+
+    async def hears_another_master(self, link: Link) -> bool:
+        """Listen on a port before anything is sent; another master is told, and what it asks."""
+        from tui.bus.link import SerialLink
+        from tui.session.connect import other_masters
+
+        opened = self.app.opened
+        if opened is None or opened.simulation is not None or not other_masters.LISTEN:
+            return False
+        if not isinstance(link, SerialLink) or opened.line.facts.others:
+            return False  # nobody else is heard there, or programs of ours are
+        self.advise("Listening for another master.", "Then drives are searched for.")
+        text = (await other_masters.listen(opened.line, other_masters.LISTEN)).text
+        if text:
+            self.say(text, "Nothing was sent; s listens again.", ALARM_KIND)
+        return bool(text)
 
     def tell_search(self) -> None:
         """What there is to see while nobody has answered yet."""
@@ -85,7 +119,8 @@ class Scanning(LineView):
         if not self.found:
             self.say(
                 f"No drive answered at address {addresses_text(devices)}, asked twice.",
-                "Check baud, format and wiring; c changes the addresses, s searches again.",
+                "Check the wiring; c changes the addresses, s searches again, Ctrl+P at other baud"
+                " rates.",
                 ALARM_KIND,
             )
             return

@@ -47,7 +47,7 @@ SAVE = "Save what is shown to a file: a backup, an assignment, the record of a t
 OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
 FIND = "Find a parameter by code, name, address or value, from anywhere."
 WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
-SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks where drives act."
+SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks."
 ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
