@@ -100,6 +100,11 @@ class LineCounters:
     bytes_out: int = 0
     bytes_in: int = 0
     busy_seconds: float = 0.0
+    framing: int = 0
+    """Characters that the port saw without their stop bit; 0 too where it does not tell."""
+    parity: int = 0
+    breaks: int = 0
+    overruns: int = 0
 
 
 @dataclass(frozen=True, slots=True)

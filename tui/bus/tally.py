@@ -23,6 +23,10 @@ class Tally:
     bytes_out: int = 0
     bytes_in: int = 0
     busy_seconds: float = 0.0
+    framing: int = 0
+    parity: int = 0
+    breaks: int = 0
+    overruns: int = 0
 
     def count_silence(self, priority: Priority, *, known: bool) -> None:
         """No answer came; an empty address that a search has asked is no failure of the line."""

@@ -13,6 +13,7 @@ from ..link import Link, RtuTcpLink, character_time, silence
 from ..master import LineContext, Sending, settle
 from ..result import ExchangeResult, ResultKind
 from ..transport.base import Transport
+from ..transport.port_errors import PortErrors
 from .exchange import RtuExchange
 from .frames import pieces
 
@@ -41,6 +42,7 @@ class RtuMaster:
         ended: Callable[[], None],
         *,
         wire_time: bool,
+        port_errors: Callable[[], PortErrors | None] = lambda: None,
     ) -> None:
         self.echo: bool | None = None
         self.failure: LineLost | None = None
@@ -65,6 +67,8 @@ class RtuMaster:
         self._idle = bytearray()
         self._early: deque[bool] = deque(maxlen=REMEMBERED)
         """Of the last replies, whether each began before its request was over."""
+        self._port_errors = port_errors
+        self._counted = port_errors()
         transport.start(self)
 
     def close(self) -> None:
@@ -166,6 +170,8 @@ class RtuMaster:
         end = clock() if result.kind is ResultKind.NOTHING else self._last
         tally.busy_seconds += clock() - begun
         tally.resyncs += result.resynchronised
+        if result.kind is not ResultKind.REPLY or result.resynchronised:
+            self._count_port_errors()
         self._log(result, data, sending.device, end)
         reply = (len(result.pdu) + 3) * self._character
         result.sent, result.end = self._sent, end
@@ -241,6 +247,18 @@ class RtuMaster:
             else:
                 note = "" if piece.pdu == result.pdu else "not the reply"
             trace.add(time, "in", piece.data, note)
+
+    def _count_port_errors(self) -> None:
+        """Note what the port has counted since the last look; asked only where an answer fails."""
+        now = self._port_errors()
+        if now is None or self._counted is None:
+            return
+        new, tally = now.since(self._counted), self._around.tally
+        self._counted = now
+        tally.framing += new.framing
+        tally.parity += new.parity
+        tally.breaks += new.breaks
+        tally.overruns += new.overruns
 
     def _start_timer(self, delay: float, action: Callable[[], None]) -> None:
         """Do this once so many seconds have gone by; a timer that is set for it is put off."""

@@ -15,6 +15,7 @@ from ..model import LineState, LineStatus
 from ..rtu.master import RtuMaster
 from ..tcp.master import TcpMaster
 from ..transport.base import Transport
+from ..transport.port_errors import PortErrors
 from ..transport.ports import is_pseudo_terminal, open_serial, other_openers
 from ..transport.serial_posix import PosixSerial
 from ..transport.serial_thread import ThreadedSerial
@@ -80,7 +81,15 @@ async def open_master(
         return TcpMaster(transport, around, wake)
     if around.timing.wire_time is not None:
         wire_time = around.timing.wire_time
-    return RtuMaster(transport, link, around, wake, wire_time=wire_time)
+    if isinstance(transport, PosixSerial | ThreadedSerial):
+        counts: Callable[[], PortErrors | None] = transport.errors
+    else:
+        counts = _no_counts
+    return RtuMaster(transport, link, around, wake, wire_time=wire_time, port_errors=counts)
+
+
+def _no_counts() -> None:
+    """What a device server tells of its port."""
 
 
 class Connection:

@@ -18,6 +18,8 @@ from ..errors import PortBusy, PortMissing, PortRefused
 BUSY = frozenset({errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK})
 MISSING = frozenset({errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR})
 DENIED = frozenset({errno.EACCES, errno.EPERM})
+USUAL_GROUP = "dialout"
+"""The group that serial ports belong to on most systems."""
 PSEUDO_TERMINALS = range(136, 144)
 """Major device numbers of the slave sides of pseudo-terminals on Linux."""
 
@@ -94,8 +96,8 @@ def _openers(path: str) -> list[int]:
 
 
 def _has_open(process: str, path: str) -> bool:
-    with suppress(OSError):
-        for descriptor in os.scandir(f"{process}/fd"):
+    with suppress(OSError), os.scandir(f"{process}/fd") as descriptors:
+        for descriptor in descriptors:
             with suppress(OSError):
                 if os.readlink(descriptor.path) == path:
                     return True
@@ -191,7 +193,8 @@ def port_error(
     if number in DENIED:
         return PortRefused(
             path,
-            "this user may not use it. Add the user to the group of the port (often dialout) "
+            "this user may not use it. Add the user to the group of the port (often "
+            f"{USUAL_GROUP}) "
             "and log in again.",
         )
     if number is None or number == errno.EINVAL:

@@ -10,6 +10,7 @@ import time
 import serial
 
 from .base import Receiver
+from .port_errors import PortErrors, port_errors
 
 LUMP = 4096
 WAITED_ON_PORT = 0.0025
@@ -106,6 +107,10 @@ class PosixSerial:
         # not without a look: a port that holds nothing reads as one that went away
         if self._fd is not None and select.select([self._fd], [], [], 0)[0]:
             self._take()
+
+    def errors(self) -> PortErrors | None:
+        """What the port has counted of broken characters; None where it does not tell."""
+        return port_errors(self._fd) if self._fd is not None else None
 
     def close(self) -> None:
         """Close the port; a lock on it ends with that."""

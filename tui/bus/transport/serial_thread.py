@@ -10,6 +10,7 @@ from contextlib import suppress
 import serial
 
 from .base import Receiver
+from .port_errors import PortErrors
 
 READ_TIMEOUT = 0.05
 COARSE_SLEEP = 0.002
@@ -70,6 +71,10 @@ class ThreadedSerial:
     async def take_in(self) -> None:
         """Let the loop hand over what the thread has read."""
         await asyncio.sleep(0)
+
+    def errors(self) -> PortErrors | None:
+        """Nothing: where ports are read by threads the system tells no counts."""
+        return None
 
     def close(self) -> None:
         """End the thread and close the port."""

@@ -1,0 +1,47 @@
+"""What a serial port itself counts: characters that arrived broken, and breaks on the line."""
+
+from __future__ import annotations
+
+import array
+import os
+from contextlib import suppress
+from typing import NamedTuple
+
+FRAMING, OVERRUN, PARITY, BREAKS, LOST = 6, 7, 8, 9, 10
+"""Places in the system's table of counts (`serial_icounter_struct`)."""
+COUNTS = 20
+
+
+class PortErrors(NamedTuple):
+    """Counts since the driver was loaded; only their growth says anything."""
+
+    framing: int
+    """Characters without a stop bit where one was due: another baud, or another format."""
+    parity: int
+    breaks: int
+    overruns: int
+    """Characters that the port or the system let go."""
+
+    def since(self, before: PortErrors) -> PortErrors:
+        """What has been added; a driver that was loaded anew counts from 0."""
+        grown = [now - then for now, then in zip(self, before, strict=True)]
+        return self if min(grown) < 0 else PortErrors(*grown)
+
+
+def port_errors(descriptor: int) -> PortErrors | None:
+    """The counts of an open port; None where the system or the driver does not tell them."""
+    if os.name != "posix":
+        return None
+    import fcntl
+    import termios
+
+    asks = getattr(termios, "TIOCGICOUNT", None)
+    if asks is None:
+        return None
+    counts = array.array("i", [0] * COUNTS)
+    with suppress(OSError):
+        fcntl.ioctl(descriptor, asks, counts)
+        return PortErrors(
+            counts[FRAMING], counts[PARITY], counts[BREAKS], counts[OVERRUN] + counts[LOST]
+        )
+    return None
