@@ -215,7 +215,7 @@ async def _nameless_families(line: Askable, device: int, priority: Priority) -> 
 
     None of them where it only refuses: it is there. Raises NoAnswer where nothing answers.
     """
-    probes = await asyncio.to_thread(_status_words_without_identification)
+    probes = await asyncio.to_thread(status_words_without_identification)
     refused = False
     for address, profiles in probes.items():
         try:
@@ -231,7 +231,7 @@ async def _nameless_families(line: Askable, device: int, priority: Priority) -> 
     raise NoAnswer(device, IDENTIFY, 0)
 
 
-def _status_words_without_identification() -> dict[int, tuple[str, ...]]:
+def status_words_without_identification() -> dict[int, tuple[str, ...]]:
     found: dict[int, tuple[str, ...]] = {}
     for listing in library.listings():
         if library.mentions_function(listing, IDENTIFY):

@@ -1,0 +1,498 @@
+"""Why a drive does not answer: each rung of the ladder provoked, with its one sentence."""
+
+from __future__ import annotations
+
+import os
+import socket
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from tests.adapters import Adapters
+from tests.adapters import adapters as adapters  # the fixture is for these tests too
+from tests.bus.peer import (
+    PtyPeer,
+    Script,
+    TcpPeer,
+    honest,
+    honest_pdu,
+    reply,
+    silent,
+    tcp_reply,
+    tcp_request_length,
+)
+from tests.misheard import misheard
+from tui.bus.api import ModbusLine
+from tui.bus.errors import (
+    ChecksumFault,
+    DeviceException,
+    ExchangeError,
+    LineError,
+    NoAnswer,
+    NotShared,
+    PortBusy,
+    PortMissing,
+    PortRefused,
+    WrongReply,
+)
+from tui.bus.fake import FakeLine
+from tui.bus.fake_device import FakeDevice
+from tui.bus.line import Line, Timing
+from tui.bus.link import Link, SerialLink, TcpLink
+from tui.bus.transport.port_errors import PortErrors
+from tui.bus.transport.port_seen import PortSeen
+from tui.drive.profile import library
+from tui.session.connect.known_line import KnownLine
+from tui.session.diagnosis.asking import sight_of_drive, sight_of_port
+from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
+from tui.session.diagnosis.heard import Heard, heard_by_errors
+from tui.session.diagnosis.rungs import LADDER
+from tui.session.diagnosis.sight import Sight
+from tui.wire.frames import frame
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
+PROFILE = library.load("atv71")
+SHORT = Timing(first_timeout=0.3, min_timeout=0.3, late_reply=0.4, retries=0)
+PORT = "/dev/ttyUSB0"
+LINK = SerialLink(PORT)
+PROVOKED: set[str] = set()
+"""Rungs that a test has seen to fail."""
+
+OpenedLine = Callable[[Link | str], Line]
+
+
+@pytest.fixture
+def line() -> Iterator[OpenedLine]:
+    """Open lines that wait shortly; they are closed after the test."""
+    lines: list[Line] = []
+
+    def opened(link: Link | str) -> Line:
+        link = SerialLink(link) if isinstance(link, str) else link
+        lines.append(Line(link, timing=SHORT))
+        lines[-1].open(wait=5.0)
+        return lines[-1]
+
+    yield opened
+    for one in lines:
+        one.close()
+
+
+async def why(line: ModbusLine, device: int = 2, family: str | None = "atv71") -> Diagnosis:
+    """The diagnosis of a drive on an open line."""
+    profile = library.load(family) if family else None
+    return told(diagnosed(await sight_of_drive(line, device, profile)))
+
+
+def told(found: Diagnosis) -> Diagnosis:
+    """The same, after a look at its form: one sentence, and steps that are sentences."""
+    PROVOKED.add(found.rung)
+    assert found.text.endswith(".")
+    assert ". " not in found.text
+    assert found.well is (not found.steps)
+    return found
+
+
+def of(sight: Sight) -> Diagnosis:
+    return told(diagnosed(sight))
+
+
+# The port
+
+
+def test_no_port(tmp_path: Path) -> None:
+    path = str(tmp_path / "ttyUSB7")
+    with pytest.raises(PortMissing) as caught:
+        Line(SerialLink(path)).open(wait=5.0)
+    found = of(sight_of_port(SerialLink(path), 2, caught.value))
+    assert (found.rung, found.text) == ("no-port", f"There is no port {path}.")
+    assert "dmesg" in found.steps[-1]
+
+
+def remembered(adapters: Adapters, name: str, serial: str) -> str:
+    """A port that was used once; its path."""
+    port = adapters.plug(name, "1.1", serial=serial)
+    KnownLine(FakeLine({2: {}}, link=SerialLink(port)))
+    return port
+
+
+def test_an_adapter_that_has_another_number_now(adapters: Adapters) -> None:
+    port = remembered(adapters, "ttyUSB0", "A5")
+    adapters.unplug("ttyUSB0")
+    moved = adapters.plug("ttyUSB3", "1.2", serial="A5")
+    found = of(sight_of_port(SerialLink(port), 2, PortMissing(port)))
+    assert found.rung == "renumbered"
+    assert found.text == f"{port} is not there: the adapter that it was is {moved} now."
+    assert moved in found.steps[0]
+    assert "by-id" in found.steps[0]
+
+
+def test_another_adapter_has_the_name_now(adapters: Adapters) -> None:
+    port = remembered(adapters, "ttyUSB0", "A5")
+    adapters.unplug("ttyUSB0")
+    adapters.plug("ttyUSB0", "1.2", serial="B7")
+    found = of(sight_of_port(SerialLink(port), 2))
+    assert found.rung == "renumbered"
+    assert found.text.endswith("the one that it was is not plugged in.")
+    moved = adapters.plug("ttyUSB1", "1.1", serial="A5")
+    assert f"is {moved} now." in of(sight_of_port(SerialLink(port), 2)).text
+
+
+def test_an_adapter_in_its_place_is_no_rung(adapters: Adapters) -> None:
+    port = remembered(adapters, "ttyUSB0", "A5")
+    assert sight_of_port(SerialLink(port), 2).adapter.was == ""
+
+
+def test_a_port_that_a_program_has() -> None:
+    with PtyPeer(honest) as peer:
+        first = Line(SerialLink(peer.path))
+        first.open(wait=5.0)
+        try:
+            with pytest.raises(PortBusy) as caught:
+                Line(SerialLink(peer.path)).open(wait=5.0)
+        finally:
+            first.close()
+    busy = replace(sight_of_port(LINK, 2), port=PortSeen(PORT))
+    found = of(replace(busy, trouble=caught.value))
+    assert found.rung == "busy"
+    assert "(pid " in found.text
+    other = of(replace(busy, trouble=PortBusy(PORT, "minicom (pid 12)")))
+    assert other.text == f"{PORT} is in use by minicom (pid 12)."
+    assert of(replace(busy, trouble=NotShared("It is another user's. So be it."))).rung == "busy"
+
+
+def test_a_program_that_listens_on_the_same_port() -> None:
+    seen = Sight(LINK, 2, PROFILE, port=PortSeen(PORT, others="cat (pid 3)"), heard=Heard(asked=2))
+    assert of(seen).text == f"cat (pid 3) has {PORT} open too, and takes what the drive answers."
+    assert of(replace(seen, heard=Heard(asked=5, answered=5))).well
+
+
+@pytest.mark.parametrize(
+    ("seen", "text", "step"),
+    [
+        (
+            PortSeen(PORT, permitted=False, group="dialout", user="ann"),
+            "may be used by the group dialout alone, and ann is not in it.",
+            "sudo usermod -a -G dialout ann",
+        ),
+        (
+            PortSeen(PORT, permitted=False, group="dialout", user="ann", in_group=True),
+            "and ann is in it since the next log-in only.",
+            "Log out and in again",
+        ),
+        (
+            PortSeen(PORT, permitted=False, user="ann"),
+            "ann may not use /dev/ttyUSB0, and no group of users may.",
+            "sudo usermod",
+        ),
+    ],
+)
+def test_no_permission(seen: PortSeen, text: str, step: str) -> None:
+    found = of(Sight(LINK, 2, trouble=PortRefused(PORT, "no."), port=seen))
+    assert found.rung == "no-permission"
+    assert text in found.text
+    assert step in found.steps[0]
+
+
+def test_a_port_that_takes_no_such_format() -> None:
+    trouble = PortRefused(PORT, "it does not take parity E.")
+    found = of(Sight(LINK, 2, trouble=trouble, port=PortSeen(PORT)))
+    assert (found.rung, "parity E" in found.text) == ("port-refused", True)
+
+
+def test_a_host_that_is_not_reached() -> None:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
+    link = TcpLink("127.0.0.1", port)
+    with pytest.raises(LineError) as caught:
+        Line(link).open(wait=0.5)
+    found = of(sight_of_port(link, 2, caught.value))
+    assert found.rung == "line-lost"
+    assert "gateway" in found.steps[0]
+
+
+# The adapter
+
+
+@pytest.mark.parametrize(
+    ("latency", "turnaround", "rung"),
+    [(16, 0.017, "slow-adapter"), (1, 0.017, "answers"), (16, 0.005, "answers"),
+     (None, 0.017, "answers")],
+)  # fmt: skip
+def test_latency_is_told_where_it_is_set_and_measured(
+    latency: int | None, turnaround: float, rung: str
+) -> None:
+    heard = Heard(asked=5, answered=5)
+    port = PortSeen(PORT, latency=latency)
+    found = of(Sight(LINK, 2, PROFILE, port=port, heard=heard, turnaround=turnaround))
+    assert found.rung == rung
+    if rung == "slow-adapter":
+        assert "17 ms after each request" in found.text
+        assert "up to 16 ms" in found.text
+        assert "ttyUSB0/latency_timer" in found.steps[0]
+
+
+async def test_the_latency_is_measured_on_the_line(line: OpenedLine) -> None:
+    with PtyPeer(lambda request, _: [0.03, reply(request)]) as peer:
+        found = diagnosed(await sight_of_drive(line(peer.path), 2, PROFILE))
+    assert found.sight.turnaround is not None
+    assert found.sight.turnaround >= 0.02
+
+
+async def test_only_the_echo_comes_back(line: OpenedLine) -> None:
+    with PtyPeer(silent, echo=True) as peer:
+        found = await why(line(peer.path))
+    assert found.rung == "echo"
+    assert "nobody answers at address 2" in found.text
+    with PtyPeer(honest, echo=True) as peer:
+        assert (await why(line(peer.path))).well
+
+
+# Baud and format
+
+
+def at(baud: int, format_: str) -> Script:
+    """A drive whose every answer is heard at 19200 8E1, and is sent otherwise."""
+
+    def script(request: bytes, _count: int) -> list[bytes | float]:
+        return [misheard(reply(request), (baud, format_), (19200, "8E1")).data]
+
+    return script
+
+
+@pytest.mark.parametrize("baud", [4800, 9600, 38400])
+async def test_bytes_that_came_at_another_baud_tell_which(baud: int, line: OpenedLine) -> None:
+    with PtyPeer(at(baud, "8E1")) as peer:
+        found = await why(line(peer.path))
+    assert found.rung == "wrong-settings"
+    assert f"at {baud} bit/s most likely" in found.text
+    assert ("slower" in found.text) is (baud < 19200)
+    assert any(f",{baud},8E1." in step for step in found.steps)
+
+
+def test_the_counts_of_a_real_port_tell_it() -> None:
+    errors = PortErrors(framing=3, parity=1, breaks=2, overruns=0)
+    found = of(Sight(LINK, 2, PROFILE, heard=Heard(asked=2), errors=errors))
+    assert found.rung == "wrong-settings"
+    assert "3 without a stop bit and 1 with a wrong parity and 2 breaks" in found.text
+
+
+async def test_the_counts_come_from_the_line() -> None:
+    made = FakeLine(link=TcpLink("gateway"))
+    made.counters = replace(made.counters, framing=40)
+
+    class Noisy(FakeDevice):
+        def noted(self, error: ExchangeError | None, now: float) -> None:
+            made.counters = replace(made.counters, framing=made.counters.framing + 2)
+
+    made.devices[2] = Noisy(2)
+    made.silence(2)
+    found = diagnosed(await sight_of_drive(made, 2, PROFILE))
+    assert found.rung == "wrong-settings"
+    assert 0 < found.sight.errors.framing < 40
+
+
+@pytest.mark.parametrize("family", ["proxidrive", "varmeca"])
+def test_a_speed_that_the_family_has_not(family: str) -> None:
+    profile = library.load(family)
+    found = of(Sight(SerialLink(PORT, 38400, "8N2"), 2, profile, heard=Heard(asked=2)))
+    assert found.rung == "silence"
+    assert found.steps[0].startswith("38400 bit/s does not work on ")
+    assert "300 to 19200" in found.steps[0]
+
+
+# The drive
+
+
+async def test_silence(line: OpenedLine) -> None:
+    with PtyPeer(silent) as peer:
+        opened = line(peer.path)
+        found = await why(opened)
+        assert found.rung == "silence"
+        assert found.text == "Nobody answers at address 2: not one byte came back."
+        functions = {request[1] for request in peer.requests}
+    assert functions <= {3, 43}
+    neighbour = replace(found.sight, neighbours=(3, 4))
+    assert "while 3, 4 on this line does" in of(neighbour).text
+
+
+async def test_damaged_answers_beside_good_ones(line: OpenedLine) -> None:
+    def script(request: bytes, count: int) -> list[bytes | float]:
+        good = reply(request)
+        return [good[:-3] + bytes([good[-3] ^ 0x40]) + good[-2:]] if count in (1, 3) else [good]
+
+    with PtyPeer(script) as peer:
+        found = await why(line(peer.path))
+    assert found.rung == "checksum"
+    assert "2 of 5 answers came damaged" in found.text
+    assert any("termination" in step for step in found.steps)
+
+
+async def test_another_address_answers(line: OpenedLine) -> None:
+    with PtyPeer(lambda request, _: [frame(7, honest_pdu(request[1:-2]))]) as peer:
+        found = await why(line(peer.path))
+    assert (found.rung, found.text) == (
+        "other-address", "Address 7 answers what address 2 was asked.",
+    )  # fmt: skip
+
+
+async def test_another_function_answers(line: OpenedLine) -> None:
+    with PtyPeer(lambda request, _: [frame(request[0], bytes([4, 2, 0, 0]))]) as peer:
+        found = await why(line(peer.path))
+    assert (found.rung, "function 4." in found.text) == ("wrong-function", True)
+
+    def longer(request: bytes, _count: int) -> list[bytes | float]:
+        return [frame(request[0], bytes([3, 4, 0, 0, 0, 0]))] if request[1] == 3 else []
+
+    with PtyPeer(longer) as peer:
+        found = await why(line(peer.path))
+    assert (found.rung, "not as many registers" in found.text) == ("wrong-function", True)
+
+
+async def test_a_drive_that_refuses(line: OpenedLine) -> None:
+    with PtyPeer(lambda request, _: [frame(request[0], bytes([request[1] | 0x80, 2]))]) as peer:
+        found = await why(line(peer.path))
+    assert found.rung == "exception"
+    assert "exception 2" in found.text
+    assert any("Controller Inside" in step for step in found.steps)
+
+
+@pytest.mark.parametrize(("code", "says"), [(10, "0A, it has no way"), (11, "0B, the drive did")])
+async def test_a_gateway_answers_in_the_drives_place(
+    code: int, says: str, line: OpenedLine
+) -> None:
+    def script(request: bytes, _count: int) -> list[bytes | float]:
+        return [tcp_reply(request, bytes([request[7] | 0x80, code]))]
+
+    with TcpPeer(script, length=tcp_request_length) as peer:
+        found = await why(line(TcpLink("127.0.0.1", peer.port)))
+    assert found.rung == "gateway"
+    assert says in found.text
+    assert "gateway" in found.steps[0]
+
+
+async def test_a_unit_that_is_another_over_tcp(line: OpenedLine) -> None:
+    def script(request: bytes, _count: int) -> list[bytes | float]:
+        answer = tcp_reply(request)
+        return [answer[:6] + b"\x09" + answer[7:]]
+
+    with TcpPeer(script, length=tcp_request_length) as peer:
+        found = await why(line(TcpLink("127.0.0.1", peer.port)))
+    assert (found.rung, found.sight.heard.others) == ("other-address", (9,))
+
+
+async def test_an_answer_after_its_time(line: OpenedLine) -> None:
+    with PtyPeer(lambda request, _: [0.36, reply(request)]) as peer:
+        found = await why(line(peer.path), family="powerdrive")
+    assert found.rung == "late"
+    assert "timeout=2" in found.steps[0]
+
+
+async def test_a_drive_that_is_left_alone_on_purpose(line: OpenedLine) -> None:
+    with PtyPeer(honest) as peer:
+        opened = line(peer.path)
+        opened.facts.hush(2, "A proof is going on.")
+        found = await why(opened)
+        assert (found.rung, found.text) == ("withheld", "A proof is going on.")
+        assert peer.requests == []
+
+
+async def test_a_line_that_is_not_as_it_was(line: OpenedLine) -> None:
+    with PtyPeer(honest) as peer:
+        seen = await sight_of_drive(line(peer.path), 2, PROFILE, changed="Device 2 was a pump.")
+    found = of(seen)
+    assert (found.rung, found.text) == ("changed", "Device 2 was a pump.")
+
+
+async def test_a_drive_that_answers(line: OpenedLine) -> None:
+    with PtyPeer(honest) as peer:
+        found = await why(line(peer.path))
+        assert found.well
+        assert found.text.startswith("Address 2 answers: 5 of 5 requests")
+        assert {request[1] for request in peer.requests} == {3}
+    with PtyPeer(honest) as peer:
+        found = await why(line(peer.path), family=None)
+        assert found.well
+        assert {request[1] for request in peer.requests} == {43}
+
+
+async def test_nothing_is_ever_written(line: OpenedLine) -> None:
+    for script in (silent, honest, at(9600, "8E1")):
+        for family in ("atv71", "powerdrive", None):
+            with PtyPeer(script) as peer:
+                await why(line(peer.path), family=family)
+                assert {request[1] for request in peer.requests} <= {3, 4, 43}, family
+
+
+# Where no frames are at hand: a line that another program owns tells errors alone
+
+
+@pytest.mark.parametrize(
+    ("error", "rung"),
+    [
+        (NoAnswer(2, 3, 1), "silence"),
+        (NoAnswer(2, 3, 1, "only the adapter's echo of it came back"), "echo"),
+        (ChecksumFault(2, 3, 1, received=b"\x02\x03\x02\0"), "checksum"),
+        (ChecksumFault(2, 3, 1, received=b"\x80\0\0\xf8\0"), "wrong-settings"),
+        (WrongReply(2, 3, 1, received=frame(7, b"\x03\x02\0\0")), "other-address"),
+        (WrongReply(2, 3, 1, received=frame(2, b"\x06\0\0\0\0")), "wrong-function"),
+        (DeviceException(2, 3, 1, 2), "exception"),
+        (DeviceException(2, 3, 1, 11), "gateway"),
+        (None, "answers"),
+    ],
+)
+def test_the_ends_of_requests_tell_it_too(error: LineError | None, rung: str) -> None:
+    heard = heard_by_errors([error, error], 2)
+    assert of(Sight(LINK, 2, PROFILE, heard=heard)).rung == rung
+
+
+# What the manual of a family says to look at next
+
+
+def steps_in_silence(family: str, device: int = 2) -> str:
+    link = SerialLink(PORT, 19200, "8E1")
+    found = of(Sight(link, device, library.load(family), heard=Heard(asked=2)))
+    assert found.rung == "silence"
+    return "\n".join(found.steps)
+
+
+@pytest.mark.parametrize(
+    ("family", "says"),
+    [
+        ("atv71", "Address: ADD. At OFF (0) it answers nobody, and so it leaves the factory."),
+        ("atv71", "Keypad port: 8E1 only, whatever the other port has."),
+        ("atv71", "Polarity: D0 is A or A', D(A), RD+/TD+, L+; D1 is B"),
+        ("atv71", "Pins, RJ45, Modbus keypad port (front): 4 D1, 5 D0, 8 Common."),
+        ("atv71", "Polarisation: 450 to 650 ohm"),
+        ("atv71", "Termination: At both ends 120 ohm"),
+        ("atv312", "Polarity: D0 is A or A', D(A), RD+/TD+ or L+; D1 is B"),
+        ("atv312", "Changed settings count after a power cycle."),
+        ("atv31", "Pins, RJ45, seen from the socket: 4 D1, 5 D0, 8 Common."),
+        ("atv21", "Address: F802. At OFF (0) it answers nobody."),
+        ("proxidrive", "leaves the factory with 19200 8N2"),
+        ("proxidrive", "this line has 19200 8E1"),
+        ("varmeca", "RX\\ and TX\\ are the inverted wires"),
+        ("powerdrive", "screw terminals: 1 0 V common, 2 RX\\, 3 RX, 4 TX\\, 5 TX."),
+        ("powerdrive", "not isolated, and shared with the keypad"),
+    ],
+)
+def test_what_the_manual_says_of_silence(family: str, says: str) -> None:
+    assert says in steps_in_silence(family)
+
+
+def test_an_address_that_no_drive_has() -> None:
+    assert "Address 10 calls a group of drives" in steps_in_silence("powerdrive", 10)
+    assert "calls a group" not in steps_in_silence("powerdrive", 11)
+    assert "calls a group" not in steps_in_silence("atv71", 10)
+
+
+def test_a_format_that_the_family_has_not() -> None:
+    link = SerialLink(PORT, 19200, "8O2")
+    found = of(Sight(link, 2, PROFILE, heard=Heard(asked=2)))
+    assert found.steps[0] == "Altivar 71 has no 8O2: it has 8O1, 8E1, 8N1, 8N2."
+
+
+def test_every_rung_was_provoked() -> None:
+    if len(PROVOKED) > 5:  # not where a test is run alone
+        assert {rung.id for rung in LADDER} <= PROVOKED

@@ -1,0 +1,163 @@
+"""Seeing why a drive does not answer: its port, its adapter, and a few reads of the drive.
+
+Nothing is ever written, and the line keeps its baud and its format. The reads go out as an
+operator's, through the one owner of the line; a drive that is left alone on purpose stays so.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import math
+import os
+from collections.abc import Awaitable, Callable, Sequence
+from dataclasses import replace
+
+from tui.bus.api import Frame, LineStatus, ModbusLine, Priority
+from tui.bus.errors import ExchangeError, LineError, LineLost, RequestRefused
+from tui.bus.expectation import IDENTIFY
+from tui.bus.link import Link, SerialLink, TcpLink
+from tui.bus.transport.port_errors import PortErrors
+from tui.bus.transport.port_seen import see_port
+from tui.drive.profile.profile import Profile
+
+from ..clock import REAL_CLOCK
+from ..connect.identify import status_words_without_identification
+from ..connect.known_lines import line_name, load_memory
+from ..connect.limits import limits_of
+from .heard import Heard, heard_by_errors, heard_of
+from .sight import SAME_ADAPTER, AdapterSeen, Sight
+
+ASKED = 5
+"""Reads of a drive that answers: enough to see one damaged answer in five."""
+ASKED_IN_VAIN = 2
+"""Reads of one that does not."""
+SERIAL = "serial:"
+FRAMES_COME_WITHIN = 0.5
+"""Seconds in which the program that owns a shared line has told its frames."""
+Asks = Callable[[], Awaitable[object]]
+
+
+def sight_of_port(link: Link, device: int, trouble: LineError | None = None) -> Sight:
+    """What is seen of a line without asking on it; reads files of the system."""
+    port = see_port(link.path) if isinstance(link, SerialLink) else None
+    return Sight(link, device, trouble=trouble, port=port, adapter=adapter_of(link))
+
+
+def adapter_of(link: Link) -> AdapterSeen:
+    """Whether the adapter that the port's name led to last is somewhere else now."""
+    if not isinstance(link, SerialLink):
+        return SAME_ADAPTER
+    typed = os.path.abspath(link.path)
+    before = load_memory().names.get(typed, "")
+    was = before.removeprefix(SERIAL)
+    if not before.startswith(SERIAL) or line_name(link).key == before:
+        return SAME_ADAPTER
+    if not os.path.exists(was):
+        return AdapterSeen(was)
+    now = os.path.realpath(was)
+    # a name of one adapter that leads nowhere else is the same adapter
+    return SAME_ADAPTER if now == os.path.realpath(typed) else AdapterSeen(was, now)
+
+
+async def sight_of_drive(
+    line: ModbusLine,
+    device: int,
+    profile: Profile | None,
+    *,
+    changed: str = "",
+    neighbours: Sequence[int] = (),
+) -> Sight:
+    """Ask a drive on an open line a few times, and see what becomes of it."""
+    seen = await asyncio.to_thread(sight_of_port, line.link, device)
+    seen = replace(seen, profile=profile, changed=changed, neighbours=tuple(neighbours))
+    if _attached(line) and seen.port is not None:
+        # the program that owns the line has the port, as it should
+        seen = replace(seen, port=replace(seen.port, holder="", others=""))
+    if line.state.status is not LineStatus.CONNECTED:
+        return replace(seen, trouble=LineLost(line.state.reason or "The line is not open yet."))
+    if profile is not None:
+        line.describe(device, limits_of(profile))
+    before, last = _errors_counted(line), _last(line.trace)
+    try:
+        outcomes = await _outcomes(line, device, profile)
+    except RequestRefused as error:
+        return replace(seen, withheld=str(error))
+    except LineError as error:
+        return replace(seen, trouble=error)
+    return replace(
+        seen,
+        heard=await _heard(line, device, last, outcomes),
+        errors=_errors_counted(line).since(before),
+        turnaround=line.device_state(device).usual_turnaround,
+    )
+
+
+async def _outcomes(
+    line: ModbusLine, device: int, profile: Profile | None
+) -> list[LineError | None]:
+    """How the reads ended, None for an answer. Raises what is no end of an exchange."""
+    questions = await asyncio.to_thread(_questions, line, device, profile)
+    outcomes: list[LineError | None] = []
+    for question in questions[:ASKED_IN_VAIN]:
+        outcomes.append(await _outcome(question))
+        if outcomes[-1] is None:
+            outcomes += [await _outcome(question) for _ in range(ASKED - len(outcomes))]
+            break
+    return outcomes
+
+
+async def _outcome(question: Asks) -> LineError | None:
+    try:
+        await question()
+    except ExchangeError as error:
+        return error
+    return None
+
+
+def _questions(line: ModbusLine, device: int, profile: Profile | None) -> list[Asks]:
+    """What a drive is asked: its state by its profile, else who it is, then states of families."""
+
+    def read(address: int, function: int = 3) -> Asks:
+        return lambda: line.read(
+            device, address, 1, priority=Priority.OPERATOR_READ, function=function
+        )
+
+    def identify() -> Awaitable[object]:
+        return line.identify(device, priority=Priority.OPERATOR_READ)
+
+    if profile is None:
+        return [identify, *(read(address) for address in status_words_without_identification())]
+    status = profile.quantity("status_word") or next(iter(profile.parameters))
+    first = read(status.address, status.function)
+    # another shape of request need not wait until a late answer to the first can come no more
+    return [first, identify if profile.function(IDENTIFY) is not None else first]
+
+
+async def _heard(
+    line: ModbusLine, device: int, last: float, outcomes: Sequence[LineError | None]
+) -> Heard:
+    """What came back, by the frames; by the ends of the requests where no frames are told."""
+    tcp = isinstance(line.link, TcpLink)
+    limit = REAL_CLOCK.monotonic() + (FRAMES_COME_WITHIN if _attached(line) else 0.0)
+    while True:
+        frames = [frame for frame in line.trace if frame.time > last]
+        heard = heard_of(frames, device, tcp=tcp)
+        if heard.asked >= len(outcomes):
+            return heard
+        if REAL_CLOCK.monotonic() >= limit:
+            return heard_by_errors(outcomes, device)
+        await REAL_CLOCK.sleep(FRAMES_COME_WITHIN / 10)
+
+
+def _last(frames: Sequence[Frame]) -> float:
+    return max((frame.time for frame in frames), default=-math.inf)
+
+
+def _attached(line: ModbusLine) -> bool:
+    """Whether another program owns the line."""
+    return line.facts.voice is not None and bool(line.facts.others)
+
+
+def _errors_counted(line: ModbusLine) -> PortErrors:
+    counters = line.counters
+    return PortErrors(counters.framing, counters.parity, counters.breaks, counters.overruns)

@@ -1,0 +1,37 @@
+"""Why a drive does not answer, in one sentence, and what to look at next; pure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from .rungs import LADDER
+from .sight import Sight
+
+ANSWERS = "answers"
+"""The rung of a drive that answers, with nothing wrong on the way."""
+
+
+@dataclass(frozen=True, slots=True)
+class Diagnosis:
+    """The rung that fails, with its sentence and the next steps."""
+
+    rung: str
+    text: str
+    steps: tuple[str, ...]
+    sight: Sight
+
+    @property
+    def well(self) -> bool:
+        """Whether the drive answers and nothing is wrong."""
+        return self.rung == ANSWERS
+
+
+def diagnosed(sight: Sight) -> Diagnosis:
+    """The first rung of the ladder that fails."""
+    for rung in LADDER:
+        if rung.fails(sight):
+            return Diagnosis(rung.id, rung.says(sight), tuple(rung.steps(sight)), sight)
+    heard = sight.heard
+    after = f", {sight.turnaround * 1000:.0f} ms after each request" if sight.turnaround else ""
+    text = f"Address {sight.device} answers: {heard.answered} of {heard.asked} requests{after}."
+    return Diagnosis(ANSWERS, text, (), sight)

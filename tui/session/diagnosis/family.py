@@ -1,0 +1,123 @@
+"""What the manuals of a family say to look at where a drive does not answer; from its profile."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from tui.bus.link import SerialLink
+from tui.drive.profile.profile import Profile
+from tui.drive.profile.schema import LinkSetting
+
+from .sight import Sight
+
+WIRED = ("polarisation", "termination")
+NAMED = "names of"
+"""How the rule of a line begins that tells its wires' names."""
+SPEED_ROLES = ("baud", "format", "parity")
+USED_PINS = ("d0", "d1", "common", "rx", "tx", "0 v")
+"""Signals that a cable of the line joins; the two of the pair first."""
+BOTH_WAYS = "Makers call the two wires both ways round: change them over if nothing answers."
+
+
+def speed_hint(sight: Sight) -> str:
+    """A baud or a format of the line that the family does not have; empty where it has them."""
+    link, profile = sight.link, sight.profile
+    if profile is None or not isinstance(link, SerialLink):
+        return ""
+    known = profile.data.link
+    if known.bauds and link.baud not in known.bauds:
+        rates = f"{min(known.bauds)} to {max(known.bauds)}"
+        return f"{link.baud} bit/s does not work on {profile.name}: it has {rates}."
+    if known.formats and link.format not in known.formats:
+        return f"{profile.name} has no {link.format}: it has {', '.join(known.formats)}."
+    return ""
+
+
+def address_hint(sight: Sight) -> str:
+    """What an address may be about: off, that of a group, out of what the family takes."""
+    if sight.profile is None:
+        return ""
+    known, device = sight.profile.data.addresses, sight.device
+    if known.zero_digit_is_group and "0" in str(device):
+        return f"Address {device} calls a group of drives, as it has a digit 0: no drive answers."
+    if not known.first <= device <= known.last:
+        return f"{sight.profile.name} has addresses {known.first} to {known.last}."
+    setting = _code(sight.profile, "address")
+    if known.off is not None:
+        left = ", and so it leaves the factory" if known.factory == known.off else ""
+        return f"Address: {setting}. At OFF ({known.off}) it answers nobody{left}."
+    return f"Address: {setting}; it leaves the factory at {known.factory}."
+
+
+def settings_hints(sight: Sight) -> Iterator[str]:
+    """Baud and format: those that the drive leaves the factory with, beside those of the line."""
+    profile, link = sight.profile, sight.link
+    if profile is None:
+        return
+    known = profile.data.link
+    codes = ", ".join(filter(None, (_code(profile, role) for role in SPEED_ROLES)))
+    leaves = f"{profile.name} leaves the factory with {known.baud} {known.format} ({codes})"
+    if isinstance(link, SerialLink):
+        same = (link.baud, link.format) == (known.baud, known.format)
+        line = "as this line" if same else f"this line has {link.baud} {link.format}"
+        yield f"Baud and format: {leaves}; {line}."
+    else:
+        yield f"Baud and format, which the gateway sets: {leaves}."
+    for setting in known.settings:
+        if setting.role == "format" and len(setting.choices) == 1:
+            port = setting.note.rstrip(".") or setting.parameter
+            yield f"{port}: {setting.choices[0].text} only, whatever the other port has."
+    if known.note:
+        yield known.note
+
+
+def wiring_hints(sight: Sight) -> Iterator[str]:
+    """Polarity, pins, polarisation and termination, as the family's manual names them."""
+    if sight.profile is None:
+        return
+    data = sight.profile.data
+    if polarity := _polarity(sight.profile):
+        yield f"Polarity: {polarity}"
+    for connector in data.connectors:
+        pins = [
+            f"{pin.pin} {pin.signal}"
+            for pin in connector.pins
+            if pin.signal.casefold().startswith(USED_PINS)
+        ]
+        if pins:
+            yield f"Pins, {connector.name}: {', '.join(pins)}."
+    for rule in data.line_rules:
+        subject = rule.subject.casefold()
+        if subject in WIRED or subject.endswith(f", {WIRED[1]}"):
+            yield f"{rule.subject}: {rule.rule}"
+    for rule in data.line_rules:
+        if rule.subject.casefold() == "ports":
+            yield rule.rule
+
+
+def _polarity(profile: Profile) -> str:
+    """What the wires are called elsewhere, and which are the inverted ones."""
+    data = profile.data
+    for rule in data.line_rules:
+        if rule.subject.casefold().startswith(NAMED):
+            return rule.rule
+    named = [
+        f"{one.signal} is {', '.join(one.names.values())}"
+        for one in data.wiring.signals
+        if one.signal.casefold() in USED_PINS[:2]
+    ]
+    if named:
+        return f"{'; '.join(named)}. {BOTH_WAYS}"
+    turned = {
+        pin.signal
+        for connector in data.connectors
+        for pin in connector.pins
+        if pin.note.casefold().startswith("inverted")
+    }
+    return f"{' and '.join(sorted(turned))} are the inverted wires. {BOTH_WAYS}" if turned else ""
+
+
+def _code(profile: Profile, role: str) -> str:
+    """The parameters of the drive that set one side of its line."""
+    found: list[LinkSetting] = [s for s in profile.data.link.settings if s.role == role]
+    return " or ".join(dict.fromkeys(setting.parameter for setting in found))

@@ -1,0 +1,164 @@
+"""What to look at next, a sentence each, for every rung of the ladder; pure."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+
+from tui.bus.errors import PortMissing
+from tui.bus.link import SerialLink
+from tui.bus.transport.ports import USUAL_GROUP
+
+from .family import address_hint, settings_hints, speed_hint, wiring_hints
+from .garbled import likely_baud
+from .sight import Sight
+
+NAME_A_FAMILY = "Name the drive's profile: then what its manual says of all this stands here."
+
+
+def find_adapter(sight: Sight) -> Iterator[str]:
+    """A port whose adapter has another number now."""
+    if sight.adapter.now:
+        yield f"Open {sight.adapter.now}, or {sight.adapter.was}, which no replugging changes."
+    else:
+        yield f"Plug the adapter in again; {sight.adapter.was} leads to it wherever it is."
+    if sight.changed:
+        yield from accept_change(sight)
+
+
+def accept_change(sight: Sight) -> Iterator[str]:
+    """A line that answers, and is not the one that it was."""
+    yield "Nothing but a stop is written meanwhile. If it is right, accept the line as it is now."
+
+
+def plug_in(sight: Sight) -> Iterator[str]:
+    """A port that is not there."""
+    ports = sight.trouble.ports if isinstance(sight.trouble, PortMissing) else ()
+    yield f"Ports here: {', '.join(ports)}." if ports else "No serial port is here."
+    if sight.adapter.was:
+        yield f"It was {sight.adapter.was}: that one is not plugged in."
+    yield "Plug the adapter in; dmesg tells whether the system has seen it."
+
+
+def get_permission(sight: Sight) -> Iterator[str]:
+    """A port that this user may not use."""
+    port = sight.port
+    group, user = (port.group, port.user) if port is not None else ("", "")
+    if port is not None and port.in_group:
+        yield f"Log out and in again: then {user} is in {group}."
+        return
+    yield f"sudo usermod -a -G {group or USUAL_GROUP} {user or '$USER'}, then log in again."
+
+
+def free_port(sight: Sight) -> Iterator[str]:
+    """A port that another program has."""
+    yield "Close that program. Programs of Drive Panel share a line by themselves, others do not."
+
+
+def other_port(sight: Sight) -> Iterator[str]:
+    """A port that cannot be opened as it is to be."""
+    yield "Try another adapter, or another baud and format: serial:PATH,BAUD,FORMAT."
+
+
+def reach_line(sight: Sight) -> Iterator[str]:
+    """A line that was lost, or a host that is not reached."""
+    if isinstance(sight.link, SerialLink):
+        yield "Look at the adapter's plug; the line is opened again by itself."
+        return
+    yield "Look at the gateway's supply and cable, its address, and the port that it listens on."
+
+
+def wait(sight: Sight) -> Iterator[str]:
+    """A drive that is left alone on purpose."""
+    yield "Ask again when that is over."
+
+
+def hurry_adapter(sight: Sight) -> Iterator[str]:
+    """An adapter that keeps bytes back."""
+    name = os.path.basename(os.path.realpath(sight.path))
+    yield f"echo 1 | sudo tee /sys/bus/usb-serial/devices/{name}/latency_timer"
+    yield "Nothing is wrong with the drive; each request costs that much more."
+
+
+def mend_settings(sight: Sight) -> Iterator[str]:
+    """A baud or a format that is not the drive's."""
+    if hint := speed_hint(sight):
+        yield hint
+    if (likely := likely_baud(sight)) and isinstance(sight.link, SerialLink):
+        yield f"Close the line and open serial:{sight.path},{likely},{sight.link.format}."
+    yield from settings_hints(sight)
+    if sight.profile is None:
+        yield NAME_A_FAMILY
+    yield "Bytes without any request: polarisation is missing, or another master talks."
+    yield from wiring_hints(sight)
+
+
+def end_silence(sight: Sight) -> Iterator[str]:
+    """Nobody answers: the drive's address and settings, its port, its wires."""
+    if hint := speed_hint(sight):
+        yield hint
+    if sight.profile is None:
+        yield "Is the drive on, and is this its address? Some leave the factory without one."
+        yield "Are baud and format those of the drive? Some take new ones at power-up only."
+        yield "Are the two wires changed over, the common missing, the ends not terminated?"
+        yield NAME_A_FAMILY
+        return
+    yield address_hint(sight)
+    yield from settings_hints(sight)
+    yield from wiring_hints(sight)
+
+
+def wait_longer(sight: Sight) -> Iterator[str]:
+    """A drive or a gateway that takes longer than is waited."""
+    yield "Write ,timeout=2 behind the line, seconds up to 30; a gateway may add much."
+
+
+def end_echo(sight: Sight) -> Iterator[str]:
+    """An adapter that repeats what is sent, and nobody else."""
+    yield "The adapter is right: it hears its own sending, so the wires up to it are not cut."
+    yield from end_silence(sight)
+
+
+def end_damage(sight: Sight) -> Iterator[str]:
+    """Answers that arrive broken."""
+    if sight.broken:
+        yield "A format that differs by its parity or stop bits breaks some characters only."
+        yield from settings_hints(sight)
+    yield "Look at shield and routing, polarisation, termination at both ends alone, taps."
+    yield "Two drives at one address, or a second master, break answers too."
+    yield from wiring_hints(sight)
+
+
+def sort_addresses(sight: Sight) -> Iterator[str]:
+    """Somebody else answers."""
+    others = ", ".join(map(str, sight.heard.others))
+    yield f"Ask for address {others}; or its answer is late: ,timeout=2 behind the line."
+    yield "A gateway may be set to put another address in place of the one asked."
+    if hint := address_hint(sight):
+        yield hint
+
+
+def find_second_master(sight: Sight) -> Iterator[str]:
+    """The drive answers somebody else's question."""
+    yield "Another master on this line asks the same drive: a line has one."
+    yield "Or two drives have this address: switch one off and ask again."
+
+
+def ask_gateway(sight: Sight) -> Iterator[str]:
+    """A gateway that did not reach the drive."""
+    if 10 in sight.heard.exceptions:
+        yield f"In the gateway: is address {sight.device} routed to its serial side?"
+        return
+    yield "The way to the gateway is right; look at its serial side."
+    yield "Its time-out must be longer than the drive takes; its baud and format the drive's."
+    yield from end_silence(sight)
+
+
+def ask_otherwise(sight: Sight) -> Iterator[str]:
+    """A drive that refuses a read."""
+    yield "Line, baud and format are right: only what was asked is not known there."
+    name = sight.profile.name if sight.profile is not None else ""
+    yield f"Is it of the family {name}?" if name else NAME_A_FAMILY
+    if sight.profile is not None and sight.profile.data.addresses.servers:
+        others = ", ".join(server.name for server in sight.profile.data.addresses.servers)
+        yield f"Other servers in the same drive have addresses of their own: {others}."

@@ -1,0 +1,258 @@
+"""The ladder of what may keep a drive from answering: a test, a sentence and the next step each.
+
+Pure: all is told from what was seen. The first rung whose test holds is the one that fails.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
+
+from . import next_steps as steps
+from .garbled import speed_told
+from .sight import Sight
+
+Steps = Callable[[Sight], Iterable[str]]
+GATEWAY_CODES = {10: "0A, it has no way to the drive", 11: "0B, the drive did not answer it"}
+HELD_BACK = 8
+"""Milliseconds from which an adapter's latency is worth a word."""
+SEEN_OF_IT = 0.75
+"""Share of that time that the answers must be late by, to say that it is the adapter's."""
+
+
+@dataclass(frozen=True, slots=True)
+class Rung:
+    """One thing that may be wrong."""
+
+    id: str
+    fails: Callable[[Sight], bool]
+    says: Callable[[Sight], str]
+    """One sentence."""
+    steps: Steps
+
+
+def _not_there(sight: Sight) -> bool:
+    missing = isinstance(sight.trouble, PortMissing)
+    gone = sight.port is not None and not sight.port.there
+    return missing or (gone and not sight.heard.answered)
+
+
+def _renumbered(sight: Sight) -> bool:
+    return bool(sight.adapter.was) and (bool(sight.adapter.now) or not _not_there(sight))
+
+
+def _says_renumbered(sight: Sight) -> str:
+    now = f"is {sight.adapter.now} now" if sight.adapter.now else "is not plugged in"
+    if _not_there(sight):
+        return f"{sight.path} is not there: the adapter that it was {now}."
+    return f"{sight.path} is another adapter than it was; the one that it was {now}."
+
+
+def _busy(sight: Sight) -> bool:
+    if isinstance(sight.trouble, PortBusy | NotShared):
+        return True
+    port = sight.port
+    if port is None:
+        return False
+    lost = isinstance(sight.trouble, LineLost) and bool(port.holder)
+    return lost or (bool(port.others) and not sight.heard.answered)
+
+
+def _says_busy(sight: Sight) -> str:
+    port = sight.port
+    if isinstance(sight.trouble, PortBusy):
+        by = sight.trouble.holder or (port.holder if port else "") or "another program"
+        return f"{sight.path} is in use by {by}."
+    if isinstance(sight.trouble, NotShared) or port is None:
+        return _sentence(str(sight.trouble))
+    if port.others:
+        return f"{port.others} has {sight.path} open too, and takes what the drive answers."
+    return f"{sight.path} is in use by {port.holder}."
+
+
+def _forbidden(sight: Sight) -> bool:
+    port = sight.port
+    return port is not None and port.there and not port.permitted
+
+
+def _says_forbidden(sight: Sight) -> str:
+    port = sight.port
+    assert port is not None
+    if not port.group:
+        return f"{port.user or 'This user'} may not use {port.path}, and no group of users may."
+    why = "is in it since the next log-in only" if port.in_group else "is not in it"
+    return f"{port.path} may be used by the group {port.group} alone, and {port.user} {why}."
+
+
+def _slow_adapter(sight: Sight) -> bool:
+    held = sight.port.latency if sight.port is not None else None
+    late = sight.turnaround
+    if held is None or late is None or held < HELD_BACK or not sight.heard.answered:
+        return False
+    return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT
+
+
+def _says_slow(sight: Sight) -> str:
+    assert sight.port is not None
+    assert sight.turnaround is not None
+    return (
+        f"The drive answers, {sight.turnaround * 1000:.0f} ms after each request: the adapter keeps"
+        f" bytes back for up to {sight.port.latency} ms (its latency timer)."
+    )
+
+
+def _garbled(sight: Sight) -> bool:
+    heard = sight.heard
+    if heard.answered or heard.others or heard.exceptions or heard.functions or heard.misshapen:
+        return False
+    return bool(heard.garbage) or bool(sight.broken)
+
+
+def _says_garbled(sight: Sight) -> str:
+    errors, told = sight.errors, speed_told(sight)
+    counted = [
+        f"{count} {what}"
+        for count, what in (
+            (errors.framing, "without a stop bit"),
+            (errors.parity, "with a wrong parity"),
+            (errors.breaks, "breaks"),
+        )
+        if count
+    ]
+    if counted:
+        seen = f"the port counted {' and '.join(counted)}"
+        told = f"{seen}; {told}" if told else seen
+    return f"The baud or the format of the line is not that of the drive: {told or _loose(sight)}."
+
+
+def _loose(sight: Sight) -> str:
+    return f"{sight.heard.garbage} bytes came back that are no frame"
+
+
+def _late(sight: Sight) -> bool:
+    return bool(sight.heard.late) and not sight.heard.answered
+
+
+def _silent(sight: Sight) -> bool:
+    heard = sight.heard
+    return not heard.answered and heard.nothing and not heard.echoed
+
+
+def _says_silent(sight: Sight) -> str:
+    if sight.neighbours:
+        others = ", ".join(map(str, sight.neighbours))
+        return f"Nobody answers at address {sight.device}, while {others} on this line does."
+    return f"Nobody answers at address {sight.device}: not one byte came back."
+
+
+def _damaged(sight: Sight) -> bool:
+    heard = sight.heard
+    return bool(heard.damaged) or bool(heard.answered and (heard.garbage or sight.broken))
+
+
+def _says_damaged(sight: Sight) -> str:
+    heard = sight.heard
+    broken = f" ({sight.broken} characters the port itself saw broken)" if sight.broken else ""
+    count = heard.damaged or 1
+    return (
+        f"The drive answers, and {count} of {heard.asked} answers came damaged: the checksum does"
+        f" not fit{broken}."
+    )
+
+
+def _gateway_codes(sight: Sight) -> list[int]:
+    """Codes of a gateway, unless the family means something of its own by them."""
+    own = {e.code for e in sight.profile.data.exceptions} if sight.profile is not None else set()
+    return [code for code in sight.heard.exceptions if code in GATEWAY_CODES and code not in own]
+
+
+def _refused(sight: Sight) -> bool:
+    return bool(sight.heard.exceptions) and not sight.heard.answered and not _gateway_codes(sight)
+
+
+def _says_refused(sight: Sight) -> str:
+    code = sight.heard.exceptions[-1]
+    known = sight.profile.data.exceptions if sight.profile is not None else []
+    meaning = next((e.meaning for e in known if e.code == code), "")
+    why = f": {meaning.rstrip('.')}" if meaning else ""
+    return f"The drive is there, and refuses what is asked with exception {code}{why}."
+
+
+def _sentence(text: str) -> str:
+    """The first sentence of a text."""
+    return text.partition(". ")[0].rstrip(".") + "."
+
+
+LADDER: tuple[Rung, ...] = (
+    Rung("renumbered", _renumbered, _says_renumbered, steps.find_adapter),
+    Rung(
+        "changed",
+        lambda s: bool(s.changed) and bool(s.heard.answered),
+        lambda s: _sentence(s.changed),
+        steps.accept_change,
+    ),
+    Rung("no-port", _not_there, lambda s: f"There is no port {s.path}.", steps.plug_in),
+    Rung("no-permission", _forbidden, _says_forbidden, steps.get_permission),
+    Rung("busy", _busy, _says_busy, steps.free_port),
+    Rung(
+        "port-refused",
+        lambda s: isinstance(s.trouble, PortRefused),
+        lambda s: _sentence(str(s.trouble)),
+        steps.other_port,
+    ),
+    Rung(
+        "line-lost",
+        lambda s: s.trouble is not None,
+        lambda s: _sentence(str(s.trouble)),
+        steps.reach_line,
+    ),
+    Rung("withheld", lambda s: bool(s.withheld), lambda s: _sentence(s.withheld), steps.wait),
+    Rung("slow-adapter", _slow_adapter, _says_slow, steps.hurry_adapter),
+    Rung("wrong-settings", _garbled, _says_garbled, steps.mend_settings),
+    Rung("silence", _silent, _says_silent, steps.end_silence),
+    Rung(
+        "late",
+        _late,
+        lambda s: f"Address {s.device} answers, but after the time that is waited for it.",
+        steps.wait_longer,
+    ),
+    Rung(
+        "echo",
+        lambda s: bool(s.heard.echoed) and not s.heard.answered and s.heard.nothing,
+        lambda s: f"Only the adapter's own echo came back: nobody answers at address {s.device}.",
+        steps.end_echo,
+    ),
+    Rung("checksum", _damaged, _says_damaged, steps.end_damage),
+    Rung(
+        "other-address",
+        lambda s: bool(s.heard.others) and not s.heard.answered,
+        lambda s: (
+            f"Address {', '.join(map(str, s.heard.others))} answers what address {s.device} was"
+            " asked."
+        ),
+        steps.sort_addresses,
+    ),
+    Rung(
+        "wrong-function",
+        lambda s: bool(s.heard.functions or s.heard.misshapen),
+        lambda s: (
+            f"Address {s.device} answers something else than asked: "
+            + (
+                f"function {s.heard.functions[0]}."
+                if s.heard.functions
+                else "not as many registers as were asked for."
+            )
+        ),
+        steps.find_second_master,
+    ),
+    Rung(
+        "gateway",
+        lambda s: bool(_gateway_codes(s)) and not s.heard.answered,
+        lambda s: f"The gateway answers {GATEWAY_CODES[_gateway_codes(s)[-1]]}.",
+        steps.ask_gateway,
+    ),
+    Rung("exception", _refused, _says_refused, steps.ask_otherwise),
+)
+"""Every rung, in the order in which they are tried; each test but the first ones' stands alone."""

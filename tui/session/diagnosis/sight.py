@@ -1,0 +1,63 @@
+"""All that was seen of a line and one drive on it; what the rungs of the ladder are told from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tui.bus.errors import LineError
+from tui.bus.link import Link, SerialLink
+from tui.bus.transport.port_errors import PortErrors
+from tui.bus.transport.port_seen import PortSeen
+from tui.drive.profile.profile import Profile
+
+from .heard import Heard
+
+NO_ERRORS = PortErrors(0, 0, 0, 0)
+NOT_ASKED = Heard()
+
+
+@dataclass(frozen=True, slots=True)
+class AdapterSeen:
+    """Where the adapter is that a port's name led to when the line was used last."""
+
+    was: str = ""
+    """Its lasting name; empty where the name still leads to it, or nothing is remembered."""
+    now: str = ""
+    """The port that it is now; empty where it is not plugged in."""
+
+
+SAME_ADAPTER = AdapterSeen()
+
+
+@dataclass(frozen=True, slots=True)
+class Sight:
+    """What was seen; times in seconds."""
+
+    link: Link
+    device: int
+    profile: Profile | None = None
+    trouble: LineError | None = None
+    """Why the line cannot be used, where it cannot."""
+    port: PortSeen | None = None
+    adapter: AdapterSeen = SAME_ADAPTER
+    changed: str = ""
+    """What of the line is not as it was, for which writes are held."""
+    heard: Heard = NOT_ASKED
+    withheld: str = ""
+    """Why this program sent nothing to the drive."""
+    errors: PortErrors = NO_ERRORS
+    """What the port counted while the drive was asked."""
+    turnaround: float | None = None
+    """The usual time from the end of a request to the start of its answer."""
+    neighbours: tuple[int, ...] = ()
+    """Other addresses of this line that answer."""
+
+    @property
+    def path(self) -> str:
+        """The serial port; empty where the line is none."""
+        return self.link.path if isinstance(self.link, SerialLink) else ""
+
+    @property
+    def broken(self) -> int:
+        """Characters that the port itself saw broken."""
+        return self.errors.framing + self.errors.parity + self.errors.breaks
