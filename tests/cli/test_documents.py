@@ -54,6 +54,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
     "a value": (0, ("read", *DRIVE, "ACC", "ETA"), "ReadTold"),
     "two drives": (3, ("read", *DRIVE, "-d", "9", "ACC"), "ErrorTold"),
+    "why not": (3, ("why", "sim:atv71@2", "-d", "9"), "WhyTold"),
     "who it is": (0, ("identify", *DRIVE), "IdentityTold"),
     "who is there": (0, ("scan", DRIVE[0], "--addresses", "2-3"), "ScanHitTold"),
     "what it does": (0, ("status", *DRIVE), "StatusTold"),

@@ -42,6 +42,7 @@ COMMANDS = {
     "stop": ("stop", "Stop a drive, or every drive of a line."),
     "teach": ("teach", "Teach a raw value's scale from the drive's display."),
     "watch": ("watch", "Watch parameters of drives, cycle by cycle."),
+    "why": ("why", "Tell why a drive does not answer, and what to look at next."),
     "write": ("write", "Write settings of a drive."),
 }
 

@@ -26,6 +26,7 @@ from .of_drives import (
     ScanUnclearTold,
     StatusTold,
     StopTold,
+    WhyTold,
 )
 from .of_listening import HeardExchangeTold, HeardSummaryTold
 from .of_others import (
@@ -61,7 +62,7 @@ DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     CommandTold, StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
     BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
     ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
-    JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold,
+    JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold, WhyTold,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""
 

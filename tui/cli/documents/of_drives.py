@@ -12,6 +12,7 @@ from .parts import (
     ControlTold,
     FaultTold,
     FirstWordTold,
+    HeardTold,
     ModelTold,
     OldTimeoutTold,
     StateTold,
@@ -218,6 +219,18 @@ class ProveTold(OfDriveTold, kw_only=True):
     text: str
     changed: str | None
     reset: bool
+
+
+class WhyTold(OfDriveTold, kw_only=True):
+    """`why`: the rung that fails, `answers` where none does, in a sentence; what to do next."""
+
+    command: Literal["why"]
+    rung: str
+    answers: bool
+    """Whether the drive answers and nothing is wrong: status 0, else 3."""
+    text: str
+    next: list[str]
+    seen: HeardTold
 
 
 class CommandTold(OfDriveTold, kw_only=True):

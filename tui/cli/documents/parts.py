@@ -51,6 +51,28 @@ class TimeoutTold(PartTold):
     begun: bool | None
 
 
+class HeardTold(PartTold):
+    """What was seen while a drive was asked; counts are of requests unless told otherwise."""
+
+    asked: int
+    answered: int
+    late: int
+    echoed: int
+    damaged: int
+    garbage_bytes: int
+    exceptions: list[int]
+    functions: list[int]
+    """Functions that came where another was asked for."""
+    others: list[int]
+    """Addresses that answered in the drive's place."""
+    framing_errors: int
+    parity_errors: int
+    breaks: int
+    turnaround_ms: float | None
+    latency_timer_ms: int | None
+    """Of the adapter; null where it does not tell one."""
+
+
 class FirstWordTold(PartTold):
     """A word that a stop sent before the drive had said what it is."""
 

@@ -18,6 +18,8 @@ from tui.bus.expectation import IDENTIFY
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.port_seen import see_port
+from tui.drive.errors import DriveError
+from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 
 from ..clock import REAL_CLOCK
@@ -84,11 +86,12 @@ async def sight_of_drive(
         return replace(seen, withheld=str(error))
     except LineError as error:
         return replace(seen, trouble=error)
+    state = line.device_state(device)
     return replace(
         seen,
         heard=await _heard(line, device, last, outcomes),
         errors=_errors_counted(line).since(before),
-        turnaround=line.device_state(device).usual_turnaround,
+        turnaround=state.usual_turnaround or state.turnaround,
     )
 
 
@@ -161,3 +164,15 @@ def _attached(line: ModbusLine) -> bool:
 def _errors_counted(line: ModbusLine) -> PortErrors:
     counters = line.counters
     return PortErrors(counters.framing, counters.parity, counters.breaks, counters.overruns)
+
+
+def profile_remembered(link: Link, device: int) -> Profile | None:
+    """The profile by which a drive at this address was taken last; None where nothing is known."""
+    mark = load_memory().lines.get(line_name(link).key)
+    drive = mark.drives.get(device) if mark is not None else None
+    if drive is None or not drive.profile:
+        return None
+    try:
+        return library.load(drive.profile)
+    except DriveError:
+        return None

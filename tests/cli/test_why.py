@@ -1,0 +1,95 @@
+"""`drivepanel why`: its status, its sentence, its JSON; and that it leaves the drive as it was."""
+
+from __future__ import annotations
+
+import json
+import os
+from pathlib import Path
+
+import pytest
+
+from tests.adapters import Adapters
+from tests.adapters import adapters as adapters  # the fixture is for these tests too
+from tests.bus.peer import PtyPeer, TcpPeer, honest, silent, tcp_reply, tcp_request_length
+from tui.bus.fake import FakeLine
+from tui.bus.link import SerialLink, TcpLink
+from tui.session.connect.known_line import KnownLine
+
+from .commands import ended, run, tcp_line
+
+posix = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
+
+
+def test_a_drive_that_answers() -> None:
+    with tcp_line("atv71@2") as line:
+        assert run(0, "why", line, "-d", "2").startswith("Address 2 answers: 5 of 5 requests")
+        told = json.loads(run(0, "why", line, "-d", "2", "--json"))
+    assert (told["rung"], told["answers"], told["next"]) == ("answers", True, [])
+    assert (told["profile"], told["seen"]["answered"]) == ("atv71", 5)
+    assert told["timeout"]["seconds"] == 10.0
+
+
+def test_a_family_that_does_not_say_who_it_is() -> None:
+    with tcp_line("powerdrive@2") as line:
+        assert "Address 2 answers" in run(0, "why", line, "-d", "2")
+        told = json.loads(run(0, "why", line, "-d", "2", "-p", "powerdrive", "--json"))
+    assert (told["rung"], told["profile"]) == ("answers", "powerdrive")
+
+
+@posix
+def test_nobody_answers_and_the_family_says_what_to_look_at() -> None:
+    with PtyPeer(silent) as peer:
+        text = run(3, "why", peer.path, "-d", "2", "-p", "atv71")
+        assert {request[1] for request in peer.requests} <= {3, 43}
+    first, head, *steps = text.splitlines()
+    assert first == "Nobody answers at address 2: not one byte came back."
+    assert head == "Look at next:"
+    assert steps[0] == (
+        "  - Address: ADD. At OFF (0) it answers nobody, and so it leaves the factory."
+    )
+
+
+@posix
+def test_a_drive_that_was_here_before_needs_no_profile() -> None:
+    with PtyPeer(silent) as peer:
+        KnownLine(FakeLine({2: {}}, link=SerialLink(peer.path))).note(None, 2, "atv71")
+        told = json.loads(run(3, "why", peer.path, "-d", "2", "--json"))
+        assert (told["rung"], told["profile"]) == ("silence", "atv71")
+        told = json.loads(run(3, "why", peer.path, "-d", "3", "--json"))
+        assert told["profile"] is None
+
+
+def test_a_port_that_is_not_there(tmp_path: Path) -> None:
+    path = tmp_path / "ttyUSB7"
+    told = json.loads(run(3, "why", f"serial:{path}", "--json"))
+    assert (told["rung"], told["text"]) == ("no-port", f"There is no port {path}.")
+    assert told["seen"]["asked"] == 0
+
+
+@posix
+def test_an_adapter_with_another_number(adapters: Adapters) -> None:
+    with PtyPeer(honest) as peer:
+        pty = Path(peer.path).resolve()
+        port = adapters.plug("ttyUSB0", "1.1", serial="A5", leads_to=pty)
+        ended(0, "why", f"serial:{port}")
+        adapters.unplug("ttyUSB0")
+        adapters.plug("ttyUSB1", "1.1", serial="A5", leads_to=pty)
+        told = json.loads(run(3, "why", f"serial:{port}", "--json"))
+    assert told["rung"] == "renumbered"
+    assert "by-id" in told["next"][0]
+
+
+@posix
+def test_a_gateway() -> None:
+    def script(request: bytes, _count: int) -> list[bytes | float]:
+        return [tcp_reply(request, bytes([request[7] | 0x80, 11]))]
+
+    with TcpPeer(script, length=tcp_request_length) as peer:
+        link = TcpLink("127.0.0.1", peer.port)
+        told = json.loads(run(3, "why", f"tcp:{link.host}:{link.port}", "--json"))
+    assert (told["rung"], told["seen"]["exceptions"][0]) == ("gateway", 11)
+
+
+def test_what_is_no_line_is_a_fault_of_usage() -> None:
+    assert "is not a line" in ended(2, "why", "nosuch").stderr
+    assert "no profile" in ended(2, "why", "sim:atv71", "-p", "nosuch").stderr

@@ -1,0 +1,169 @@
+"""`drivepanel why`: why a drive does not answer, in one sentence, and what to look at next."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..shared.errors import LINE_TROUBLE, told
+from ..shared.line_argument import mind_the_drive
+from ..shared.options import (
+    Target,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+    settings_options,
+)
+from ..shared.say import say
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+    from tui.session.connect.identify import DriveIdentity
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.diagnosis.diagnosis import Diagnosis
+
+
+@click.command()
+@line_argument
+@settings_options
+@read_only_option
+@json_option
+@told
+def why(target: Target, read_only: bool, as_json: bool) -> None:
+    """Tell why a drive does not answer: what fails, in a sentence, and what to look at next.
+
+    Looks at the port and its adapter, then asks the drive a few times. Nothing is written, and no
+    other baud or format is tried. With -p, or a drive that was here before, what the manual of its
+    family says of address, settings, pins and wires stands behind it. Ends with 0 where the drive
+    answers and nothing is wrong, else with 3.
+    """
+    from tui.bus.errors import LineError, LinkSyntaxError
+    from tui.drive.profile import library
+
+    named = library.load(target.profile_id) if target.profile_id else None
+
+    async def work(opened: OpenLine) -> tuple[Diagnosis, dict[str, Any]]:
+        return await _asked(opened, target, named)
+
+    try:
+        found, about = on_line(target, work, read_only=read_only)
+    except LinkSyntaxError:
+        raise
+    except LineError as error:
+        found, about = _unopened(target, named, error), {}
+    _tell(target, found, about, as_json)
+    if not found.well:
+        raise click.exceptions.Exit(LINE_TROUBLE)
+
+
+async def _asked(
+    opened: OpenLine, target: Target, named: Profile | None
+) -> tuple[Diagnosis, dict[str, Any]]:
+    """The diagnosis of a drive on an open line, and how a document about it begins."""
+    from tui.session.diagnosis.asking import profile_remembered, sight_of_drive
+    from tui.session.diagnosis.diagnosis import diagnosed
+
+    line, device = opened.line, target.device
+    profile = named or await asyncio.to_thread(profile_remembered, line.link, device)
+    changed = opened.known.text if opened.known is not None else ""
+    found = diagnosed(await sight_of_drive(line, device, profile, changed=changed))
+    about = await _looked_after(opened, target, profile) if found.sight.heard.answered else {}
+    return found, about
+
+
+async def _looked_after(
+    opened: OpenLine, target: Target, profile: Profile | None
+) -> dict[str, Any]:
+    """Have it told what the drive does that was asked and is asked no more."""
+    from tui.drive.profile import library
+    from tui.session.drive import DriveSession
+
+    from ..shared.left_alone import look_after
+    from ..shared.output import drive_json
+
+    identity: DriveIdentity | None = None
+    if profile is None:
+        identity = await _identity(opened, target.device)
+        if identity is None or identity.profile is None:
+            return {}
+        profile = await asyncio.to_thread(library.load, identity.profile)
+    session = DriveSession(opened.line, target.device, profile, identity)
+    await look_after(opened, session, target.line_text).learn()
+    return drive_json(target.line_text, session)
+
+
+async def _identity(opened: OpenLine, device: int) -> DriveIdentity | None:
+    from tui.bus.errors import LineError
+    from tui.session.connect.identify import identify_drive
+
+    try:
+        found = await identify_drive(opened.line, device)
+    except LineError:
+        return None
+    mind_the_drive(opened, device, found)
+    return found
+
+
+def _unopened(target: Target, named: Profile | None, error: Exception) -> Diagnosis:
+    """The diagnosis of a line that cannot be opened. Raises LinkSyntaxError."""
+    from dataclasses import replace
+
+    from tui.bus.errors import LineError
+    from tui.bus.link import parse_link
+    from tui.session.diagnosis.asking import sight_of_port
+    from tui.session.diagnosis.diagnosis import diagnosed
+
+    assert isinstance(error, LineError)
+    seen = sight_of_port(parse_link(target.line_text), target.device, error)
+    return diagnosed(replace(seen, profile=named))
+
+
+def _tell(target: Target, found: Diagnosis, about: dict[str, Any], as_json: bool) -> None:
+    from ..shared.output import print_json
+
+    if as_json:
+        profile = found.sight.profile
+        drive = {
+            "line": target.line_text,
+            "device": target.device,
+            "profile": profile.id if profile is not None else None,
+            "timeout": None,
+        }
+        print_json({**drive, **about, **why_json(found)})
+        return
+    say(found.text)
+    if found.steps:
+        say("Look at next:")
+    for step in found.steps:
+        say(f"  - {step}", indent=4)
+
+
+def why_json(found: Diagnosis) -> dict[str, Any]:
+    """What was found, for a program."""
+    sight, heard = found.sight, found.sight.heard
+    late = sight.turnaround
+    return {
+        "rung": found.rung,
+        "answers": found.well,
+        "text": found.text,
+        "next": list(found.steps),
+        "seen": {
+            "asked": heard.asked,
+            "answered": heard.answered,
+            "late": heard.late,
+            "echoed": heard.echoed,
+            "damaged": heard.damaged,
+            "garbage_bytes": heard.garbage,
+            "exceptions": list(heard.exceptions),
+            "functions": list(heard.functions),
+            "others": list(heard.others),
+            "framing_errors": sight.errors.framing,
+            "parity_errors": sight.errors.parity,
+            "breaks": sight.errors.breaks,
+            "turnaround_ms": round(late * 1000, 1) if late is not None else None,
+            "latency_timer_ms": sight.port.latency if sight.port is not None else None,
+        },
+    }
