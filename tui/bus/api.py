@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 from .expectation import IDENTIFY
 from .model import (
+    TURNAROUND_EDGES,
+    DeviceCounters,
     DeviceState,
     IdentificationObjects,
     LineCounters,
@@ -30,6 +32,8 @@ if TYPE_CHECKING:
     from .shared_facts import SharedFacts
 
 __all__ = [
+    "TURNAROUND_EDGES",
+    "DeviceCounters",
     "DeviceState",
     "Frame",
     "IdentificationObjects",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum, IntEnum
 
 
@@ -80,6 +80,34 @@ class IdentificationObjects:
     objects: Mapping[int, bytes]
 
 
+TURNAROUND_EDGES = (0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0)
+"""Seconds at which one bar of the histogram of turnarounds ends and the next begins."""
+
+
+@dataclass(frozen=True, slots=True)
+class DeviceCounters:
+    """What was exchanged with one device since the line was opened; device 0 is all of them."""
+
+    requests: int = 0
+    """Frames that were sent to it, repeated ones too."""
+    replies: int = 0
+    """Whole and right replies, refusals among them."""
+    timeouts: int = 0
+    checksum: int = 0
+    """Replies that came damaged."""
+    wrong: int = 0
+    repeats: int = 0
+    """Requests that were sent again."""
+    exceptions: Mapping[int, int] = field(default_factory=dict)
+    """Refusals by their code."""
+    bytes_out: int = 0
+    bytes_in: int = 0
+    """Bytes that came while its reply was due, strange ones too."""
+    busy_seconds: float = 0.0
+    turnarounds: tuple[int, ...] = (0,) * (len(TURNAROUND_EDGES) + 1)
+    """Replies by their turnaround: up to each edge, and beyond the last."""
+
+
 @dataclass(frozen=True, slots=True)
 class LineCounters:
     """What happened on a line since it was opened."""
@@ -105,6 +133,9 @@ class LineCounters:
     parity: int = 0
     breaks: int = 0
     overruns: int = 0
+    repeats: int = 0
+    """Requests that were sent again."""
+    devices: Mapping[int, DeviceCounters] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)

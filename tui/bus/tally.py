@@ -1,15 +1,52 @@
-"""Running counts of a line, and their frozen copy for others."""
+"""Running counts of a line and of each of its devices, and their frozen copies for others."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from bisect import bisect_left
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
-from .model import LineCounters, Priority
+from .model import TURNAROUND_EDGES, DeviceCounters, LineCounters, Priority
+
+OF_DEVICES = "devices"
+_PLAIN = tuple(name for name in LineCounters.__slots__ if name != OF_DEVICES)
+
+
+@dataclass(slots=True)
+class DeviceTally:
+    """Counts of one device that the line's thread adds to; fields as in DeviceCounters."""
+
+    requests: int = 0
+    replies: int = 0
+    timeouts: int = 0
+    checksum: int = 0
+    wrong: int = 0
+    repeats: int = 0
+    exceptions: Mapping[int, int] = field(default_factory=dict)
+    bytes_out: int = 0
+    bytes_in: int = 0
+    busy_seconds: float = 0.0
+    turnarounds: tuple[int, ...] = (0,) * (len(TURNAROUND_EDGES) + 1)
+
+    def count_reply(self, turnaround: float) -> None:
+        """A right reply came, so many seconds after its request."""
+        self.replies += 1
+        bars = list(self.turnarounds)
+        bars[bisect_left(TURNAROUND_EDGES, turnaround)] += 1
+        self.turnarounds = tuple(bars)
+
+    def count_exception(self, code: int) -> None:
+        """That reply was a refusal. The mapping is replaced: others may be reading it."""
+        self.exceptions = {**self.exceptions, code: self.exceptions.get(code, 0) + 1}
+
+    def frozen(self) -> DeviceCounters:
+        """The counts of this moment."""
+        return DeviceCounters(**{n: getattr(self, n) for n in DeviceCounters.__slots__})
 
 
 @dataclass(slots=True)
 class Tally:
-    """Counts that the line's thread adds to; fields as in Counters."""
+    """Counts that the line's thread adds to; fields as in LineCounters."""
 
     requests: int = 0
     replies: int = 0
@@ -27,19 +64,73 @@ class Tally:
     parity: int = 0
     breaks: int = 0
     overruns: int = 0
+    repeats: int = 0
+    devices: dict[int, DeviceTally] = field(default_factory=dict)
 
-    def count_silence(self, priority: Priority, *, known: bool) -> None:
+    def of(self, device: int) -> DeviceTally:
+        """The counts of a device; in the line's thread only."""
+        return self.devices.setdefault(device, DeviceTally())
+
+    def count_sent(self, device: int, size: int) -> None:
+        """A frame of so many bytes has gone out to a device."""
+        one = self.of(device)
+        self.requests += 1
+        self.bytes_out += size
+        one.requests += 1
+        one.bytes_out += size
+
+    def count_end(self, device: int, seconds: float, received: int) -> None:
+        """Its exchange is over; bytes of the line were counted as they came."""
+        one = self.of(device)
+        self.busy_seconds += seconds
+        one.busy_seconds += seconds
+        one.bytes_in += received
+
+    def count_reply(self, device: int, turnaround: float) -> None:
+        """A right reply came, or a refusal."""
+        self.replies += 1
+        self.of(device).count_reply(turnaround)
+
+    def count_exception(self, device: int, code: int) -> None:
+        """That reply was a refusal."""
+        self.exceptions += 1
+        self.of(device).count_exception(code)
+
+    def count_checksum(self, device: int) -> None:
+        """Its reply came damaged."""
+        self.checksum += 1
+        self.of(device).checksum += 1
+
+    def count_wrong(self, device: int) -> None:
+        """Something else came than its reply."""
+        self.wrong += 1
+        self.of(device).wrong += 1
+
+    def count_repeat(self, device: int) -> None:
+        """Its request is sent again."""
+        self.repeats += 1
+        self.of(device).repeats += 1
+
+    def count_silence(self, device: int, priority: Priority, *, known: bool) -> None:
         """No answer came; an empty address that a search has asked is no failure of the line."""
         if priority >= Priority.BACKGROUND and not known:
             self.searched += 1
         else:
             self.timeouts += 1
+        self.of(device).timeouts += 1
 
-    def copy(self, counters: LineCounters) -> None:
-        """Take over the counts of the program that owns the line."""
-        for name in LineCounters.__slots__:
+    def copy(self, counters: LineCounters, devices: Mapping[int, DeviceCounters]) -> None:
+        """Take over the counts of the program that owns the line, of devices those that changed."""
+        for name in _PLAIN:
             setattr(self, name, getattr(counters, name))
+        for device, one in devices.items():
+            self.devices[device] = DeviceTally(
+                **{n: getattr(one, n) for n in DeviceCounters.__slots__}
+            )
 
     def frozen(self) -> LineCounters:
-        """The counts of this moment."""
-        return LineCounters(**{name: getattr(self, name) for name in LineCounters.__slots__})
+        """The counts of this moment, of each device too."""
+        # copy() runs without giving up the interpreter, so no device comes in between
+        each = self.devices.copy()
+        found = {device: one.frozen() for device, one in each.items()}
+        return LineCounters(**{n: getattr(self, n) for n in _PLAIN}, devices=found)

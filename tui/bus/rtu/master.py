@@ -159,8 +159,7 @@ class RtuMaster:
         try:
             sending.look()
             await self._send(data)
-            tally.requests += 1
-            tally.bytes_out += len(data)
+            tally.count_sent(sending.device, len(data))
             self._around.trace.add(begun, "out", data)
             result = await self._result(exchange, sending)
         finally:
@@ -168,7 +167,7 @@ class RtuMaster:
             self._stop_timer()
         self.echo = exchange.echo
         end = clock() if result.kind is ResultKind.NOTHING else self._last
-        tally.busy_seconds += clock() - begun
+        tally.count_end(sending.device, clock() - begun, len(result.received))
         tally.resyncs += result.resynchronised
         if result.kind is not ResultKind.REPLY or result.resynchronised:
             self._count_port_errors()

@@ -5,13 +5,7 @@ from __future__ import annotations
 import asyncio
 from collections.abc import Callable
 
-from ..errors import (
-    LineClosed,
-    LineError,
-    LineLost,
-    NoAnswer,
-    RequestRefused,
-)
+from ..errors import LineClosed, LineError, LineLost, NoAnswer, RequestRefused
 from ..master import Master, MonotonicClock, Sending
 from ..model import Priority, Timing
 from ..requests import Read
@@ -279,9 +273,10 @@ class Dispatcher:
             probe = Read(request.device, request.register, 1)
             await master.quiet()
             time_out = self._devices.time_out(request.device, probe.function, job.priority)
-            await master.exchange(
+            probed = await master.exchange(
                 Sending(request.device, probe.pdu(), probe.expectation(), time_out)
             )
+            self._outcomes.count_beside(request.device, probed)
         if master.echo is False:
             result.kind, result.pdu = ResultKind.REPLY, job.pdu
         else:
@@ -298,6 +293,7 @@ class Dispatcher:
         """The same once more: whichever of its two replies comes first, it is the right one."""
         await master.quiet()
         result = await master.exchange(self._sending(job))
+        self._outcomes.count_beside(job.request.device, doubted)
         if result.pdu != doubted.pdu and job.expectation is not None:
             # it was a copy: one more reply to this request is on its way
             device, now = job.request.device, self._clock()

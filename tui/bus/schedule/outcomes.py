@@ -67,7 +67,7 @@ class Outcomes:
         if result.kind is ResultKind.EXCEPTION and self._is_gateways(job, result.exception):
             result.kind, result.detail = ResultKind.NOTHING, "the gateway heard nothing of it"
         if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
-            self._tally.replies += 1
+            self._tally.count_reply(request.device, result.turnaround)
             exchanged = (job.pdu, result.pdu)
             self._devices.answered(
                 request.device, job.expectation, result.turnaround, now, exchanged
@@ -80,11 +80,16 @@ class Outcomes:
                 self._share(job, result)
                 job.finish(result.pdu, result.end)
             case ResultKind.EXCEPTION:
-                self._tally.exceptions += 1
+                self._tally.count_exception(request.device, result.exception)
                 job.fail(self._exception(job, result.exception))
             case _:
                 return self._failed(job, result, now)
         return False
+
+    def count_beside(self, device: int, result: ExchangeResult) -> None:
+        """Count the reply to a request that was sent beside the one that was asked for."""
+        if result.kind in (ResultKind.REPLY, ResultKind.EXCEPTION):
+            self._tally.count_reply(device, result.turnaround)
 
     def _share(self, job: Job, result: ExchangeResult) -> None:
         """Keep what was read, while there is another program that may want it."""
@@ -98,22 +103,23 @@ class Outcomes:
         error: LineError
         match result.kind:
             case ResultKind.DAMAGED:
-                self._tally.checksum += 1
+                self._tally.count_checksum(request.device)
                 if not result.recognised:
                     self._devices.may_come(request.device, expectation, result.sent, now)
                 error = ChecksumFault(*place, received=result.received)
             case ResultKind.WRONG:
-                self._tally.wrong += 1
+                self._tally.count_wrong(request.device)
                 self._devices.may_come(request.device, expectation, result.sent, now)
                 error = WrongReply(*place, result.detail, result.received)
             case _:
                 # who says how long is waited looks whether anybody answers that at all
                 known = job.within is None and self._devices[request.device].ever_answered
-                self._tally.count_silence(job.priority, known=known)
+                self._tally.count_silence(request.device, job.priority, known=known)
                 self._devices.silent(request.device, expectation, result.sent, now)
                 error = NoAnswer(*place, self._no_answer(job, result.detail))
         if self._is_repeated(job, result.kind):
             job.repeats += 1
+            self._tally.count_repeat(request.device)
             return True
         job.fail(error)
         return False

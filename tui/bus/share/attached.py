@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from collections.abc import Mapping
 from concurrent.futures import Future
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from ..errors import RequestRefused
 from ..limits import CAUTIOUS, Limits
-from ..model import DeviceState, Reply
+from ..model import DeviceCounters, DeviceState, Reply
 from ..program import Program
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
@@ -50,6 +51,7 @@ class Client:
     limits: dict[int, Limits] = field(default_factory=dict)
     asked: dict[int, Job] = field(default_factory=dict)
     known: dict[int, DeviceState] = field(default_factory=dict)
+    counted: Mapping[int, DeviceCounters] = field(default_factory=dict)
     present: int = 0
     """The last roll call that it has answered."""
     heard: float = 0.0
@@ -135,4 +137,8 @@ class Client:
             last = inside.around.trace.frames()[-new:] if new else ()
             frames = tuple((one.time, one.direction, one.data, one.note) for one in last)
         self.frames = count
-        return News(inside.state(), inside.around.tally.frozen(), changed, shares, frames)
+        counters = inside.around.tally.frozen()
+        counted = {d: one for d, one in counters.devices.items() if self.counted.get(d) != one}
+        self.counted = counters.devices
+        plain = replace(counters, devices={})
+        return News(inside.state(), plain, changed, shares, frames, counted)

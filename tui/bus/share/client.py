@@ -286,7 +286,7 @@ class ShareClient:
         inside = self._inside
         for device, state in news.devices.items():
             inside.devices.copy(device, state)
-        inside.around.tally.copy(news.counters)
+        inside.around.tally.copy(news.counters, news.counted)
         inside.pace.others = news.shares
         for time, direction, data, note in news.frames:
             inside.around.trace.append(

@@ -12,7 +12,7 @@ from typing import Any
 import msgspec
 
 from ..limits import Limits
-from ..model import DeviceState, LineCounters, LineState, Priority
+from ..model import DeviceCounters, DeviceState, LineCounters, LineState, Priority
 from ..program import Program
 from ..requests import (
     Diagnose,
@@ -217,6 +217,8 @@ class News(Message, frozen=True):
     shares: dict[int, float]
     """The share of the line's time that all other programs' polls take, by device."""
     frames: tuple[tuple[float, str, bytes, str], ...] = ()
+    counted: dict[int, DeviceCounters] = {}
+    """Counts of the devices whose counts have changed."""
 
 
 class Goodbye(Message, frozen=True):

@@ -113,14 +113,13 @@ class TcpMaster:
         try:
             sending.look()
             await self._send(data)
-            tally.requests += 1
-            tally.bytes_out += len(data)
+            tally.count_sent(sending.device, len(data))
             self._around.trace.add(begun, "out", data)
             result = await self._result(sending)
         finally:
             self._sending = self._done = None
         end = clock() if result.kind is ResultKind.NOTHING else self._last
-        tally.busy_seconds += clock() - begun
+        tally.count_end(sending.device, clock() - begun, len(result.received))
         if result.kind is ResultKind.NOTHING and self._buffer:
             # half a reply, or a length that is wrong: what follows could not be told apart
             self._reset("a reply broke off")
