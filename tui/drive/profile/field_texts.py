@@ -161,6 +161,11 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "past_limit_exception": "Exception code of such a request.",
         "subfunctions": "Sub-functions of function 8 that the drive has.",
     },
+    "PortCounters": {
+        "name": "The port, as a person calls it.",
+        "frames": "Parameter that counts frames to the drive, modulo 65536.",
+        "checksum_errors": "Parameter that counts those with a wrong checksum, up to 65535.",
+    },
     "ExceptionCode": {
         "code": "The exception code.",
         "meaning": "What it means on this family.",
@@ -249,6 +254,7 @@ OWN: Mapping[str, Mapping[str, str]] = {
         "link": "The line from the factory, and the parameters behind it.",
         "addresses": "Slave addresses.",
         "functions": "Modbus functions and their limits.",
+        "port_counters": "Parameters in which the drive counts frames, by port.",
         "reading": "Which reads the drive answers.",
         "blocks": "Indirect blocks and communication scanners.",
         "exceptions": "What exception codes mean.",

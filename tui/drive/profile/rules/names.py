@@ -56,6 +56,7 @@ def named_parameters(data: ProfileData) -> Iterator[NamedPlace]:
     yield from _of_channels(data)
     yield from _of_monitoring(data)
     yield from _of_faults(data)
+    yield from _of_port_counters(data)
     yield from _of_tables(data)
 
 
@@ -116,6 +117,12 @@ def _of_faults(data: ProfileData) -> Iterator[NamedPlace]:
             yield ("faults", "stored", place, inner), code
     if ready := data.faults.reset_ready:
         yield ("faults", "reset_ready"), ready.parameter
+
+
+def _of_port_counters(data: ProfileData) -> Iterator[NamedPlace]:
+    for index, port in enumerate(data.port_counters):
+        yield ("port_counters", index, "frames"), port.frames
+        yield ("port_counters", index, "checksum_errors"), port.checksum_errors
 
 
 def _of_tables(data: ProfileData) -> Iterator[NamedPlace]:

@@ -69,6 +69,7 @@ from .link import (
     LinkSettings,
     PastLimit,
     Pin,
+    PortCounters,
     ReadShapes,
 )
 from .memory import MemoryOrder, MemoryOrders
@@ -161,6 +162,7 @@ __all__ = [
     "ParameterGroup",
     "PastLimit",
     "Pin",
+    "PortCounters",
     "ProfileData",
     "ProfileHead",
     "Quantity",

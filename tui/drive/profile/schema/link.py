@@ -86,6 +86,17 @@ class Function(Table, frozen=True, kw_only=True):
     source: str = ""
 
 
+class PortCounters(Table, frozen=True, kw_only=True):
+    """What the drive counts of the frames to it at one of its ports, in parameters of its own."""
+
+    name: str
+    frames: str
+    """Frames to the drive's address, right and damaged ones, modulo 65536."""
+    checksum_errors: str
+    """Those with a wrong checksum; stays at 65535."""
+    source: str = ""
+
+
 class ReadShapes(Table, frozen=True, kw_only=True):
     """Which shapes of a read the drive answers."""
 

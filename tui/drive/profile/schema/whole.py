@@ -8,7 +8,16 @@ from .channel import Channels
 from .chart import Chart, CommandExample, ReferenceWay, TeachableReference
 from .control_source import ControlSource
 from .identification import Erratum, Identification, ProfileHead, Source
-from .link import Addresses, Connector, ExceptionCode, Function, LineRule, LinkSettings, ReadShapes
+from .link import (
+    Addresses,
+    Connector,
+    ExceptionCode,
+    Function,
+    LineRule,
+    LinkSettings,
+    PortCounters,
+    ReadShapes,
+)
 from .memory import MemoryOrders
 from .monitoring import CommunicationFault, Faults, Monitoring
 from .parameter import Enumeration, Parameter, ParameterGroup
@@ -26,6 +35,7 @@ class ProfileData(Table, frozen=True, kw_only=True):
     link: LinkSettings
     addresses: Addresses = Addresses()
     functions: list[Function]
+    port_counters: list[PortCounters] = []
     reading: ReadShapes = ReadShapes()
     blocks: list[Block] = []
     exceptions: list[ExceptionCode] = []
