@@ -21,6 +21,7 @@ from .teaching.teacher import Teacher
 
 if TYPE_CHECKING:
     from .blocks.editor import BlockEditor
+    from .counters.watch import CounterWatch
     from .settings.editor import Editor
 
 
@@ -67,6 +68,13 @@ class DriveConsole:
         from .blocks.editor import BlockEditor
 
         return BlockEditor(self.session, self.monitor, self.journal)
+
+    @cached_property
+    def counters(self) -> CounterWatch:
+        """What was exchanged with the drive, as counted here and by the drive."""
+        from .counters.watch import CounterWatch
+
+        return CounterWatch(self.session)
 
     @property
     def begun_editor(self) -> Editor | None:

@@ -1,0 +1,216 @@
+"""What a drive counted against what was sent to it: roll-over, saturation, differences in words.
+
+Pure. Counts are taken at two looks and subtracted. While other frames go over the line, how many
+were sent by the moment at which the drive looked at its counter is known within bounds only; a
+difference is told as far as it is certain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, fields
+from typing import Literal
+
+from tui.bus.api import DeviceCounters, LineCounters
+
+MODULO = 0x10000
+MOST = 0xFFFF
+"""Where a count of checksum errors stays."""
+STRANGE = 0x8000
+"""Frames more than were sent from here, from which on a count that fell was begun anew."""
+
+COUNTED_ANEW = (
+    "The drive has begun to count anew: it was switched off, or somebody reset its counters. It is"
+    " compared from there on."
+)
+
+DifferenceKind = Literal[
+    "never-arrived", "not-answered", "damaged-there", "not-from-here", "damaged-here",
+    "no-answer", "counted-anew", "another-port",
+]  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """A number that is between two others, both possible."""
+
+    low: int
+    high: int
+
+    def since(self, before: Bounds) -> Bounds:
+        """How much it grew since an earlier moment."""
+        return Bounds(max(0, self.low - before.high), max(0, self.high - before.low))
+
+
+@dataclass(frozen=True, slots=True)
+class DriveCount:
+    """What the drive told of one pair of its counters, and what we had counted by then."""
+
+    frames: int
+    """Frames to its address, right and damaged ones, modulo 65536."""
+    damaged: int
+    """Those with a wrong checksum, up to 65535."""
+    sent: Bounds
+    """Frames that were sent to it from here, the one that asked among them."""
+    answered: Bounds
+    """Those that were answered."""
+
+    @property
+    def saturated(self) -> bool:
+        """Whether it has stopped counting checksum errors."""
+        return self.damaged >= MOST
+
+
+@dataclass(frozen=True, slots=True)
+class Comparison:
+    """A pair of a drive's counters over several looks, the roll-overs between them undone."""
+
+    first: DriveCount
+    last: DriveCount
+    frames: int = 0
+    """Frames that it counted since the first look."""
+    damaged: int = 0
+    anew: bool = False
+    """Whether it began to count anew just before the first look."""
+
+    def with_look(self, now: DriveCount) -> Comparison:
+        """With one look more; begun again where either side counts anew."""
+        sent = now.sent.since(self.last.sent)
+        frames = frames_since(self.last.frames, now.frames, sent)
+        if now.sent.high < self.last.sent.low:
+            return Comparison(now, now)  # another program owns the line, and counts for itself
+        if frames is None or now.damaged < self.last.damaged:
+            return Comparison(now, now, anew=True)
+        damaged = self.damaged + now.damaged - self.last.damaged
+        return Comparison(self.first, now, self.frames + frames, damaged, self.anew)
+
+    @property
+    def sent(self) -> Bounds:
+        """Frames that were sent from here since the first look."""
+        return self.last.sent.since(self.first.sent)
+
+    @property
+    def answered(self) -> Bounds:
+        """Those that were answered."""
+        return self.last.answered.since(self.first.answered)
+
+    @property
+    def counts_this_line(self) -> bool | None:
+        """Whether it counts the frames of this line; None where that is not known yet."""
+        if not self.answered.low:
+            return None
+        return self.frames >= self.answered.low
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """Something that the counters show, in a sentence; `count` frames at least."""
+
+    kind: DifferenceKind
+    count: int
+    text: str
+
+
+def frames_since(before: int, now: int, sent: Bounds) -> int | None:
+    """Frames between two counts modulo 65536; None where the drive began to count anew.
+
+    Of the numbers that the counts allow, the one nearest to what was sent from here.
+    """
+    found = (now - before) % MODULO
+    turns = round((sent.low - found) / MODULO)
+    found += max(0, turns) * MODULO
+    return None if now < before and found >= sent.high + STRANGE else found
+
+
+def differences(found: Comparison) -> list[Difference]:
+    """What the drive's counters show, the certain part of it; empty if all agrees."""
+    told = [Difference("counted-anew", 0, COUNTED_ANEW)] if found.anew else []
+    if found.counts_this_line is False:
+        text = (
+            f"{_frames(found.answered.low)} were answered and {found.frames} counted: these"
+            " counters are those of another port than this line leads to, or were reset."
+        )
+        return [*told, Difference("another-port", found.answered.low - found.frames, text)]
+    return [*told, *_differences(found)]
+
+
+def _differences(found: Comparison) -> Iterator[Difference]:
+    frames, damaged = found.frames, found.damaged
+    if (lost := found.sent.low - frames) > 0:
+        yield Difference(
+            "never-arrived",
+            lost,
+            f"{_frames(lost)} went out that the drive never counted: lost on the way to it, or"
+            " damaged so that it did not see its address. Look at its connector, the polarity, the"
+            " termination.",
+        )
+    if damaged > 0:
+        yield Difference(
+            "damaged-there",
+            damaged,
+            f"{_frames(damaged)} reached the drive damaged: noise on the way to it. Look at the"
+            " shield, the termination, the polarisation, the motor cable beside it.",
+        )
+    # of foreign frames nobody knows whether they were answered
+    missed = min(frames, found.sent.low) - damaged - found.answered.high
+    if missed > 0:
+        yield Difference(
+            "not-answered",
+            missed,
+            f"The drive saw {_frames(missed)} whose answer we did not get: lost or damaged on the"
+            " way back, or later than we waited.",
+        )
+    if (foreign := frames - found.sent.high) > 0:
+        yield Difference(
+            "not-from-here",
+            foreign,
+            f"The drive counted {_frames(foreign)} more than were sent from here: another master"
+            " asks it, or a gateway repeats.",
+        )
+
+
+def own_differences(ours: DeviceCounters) -> list[Difference]:
+    """What our own counts show of a drive that counts nothing itself, or cannot be asked."""
+    found = []
+    if ours.checksum:
+        text = (
+            f"{_frames(ours.checksum)} came back damaged: noise, two devices that answer at once,"
+            " or a wrong format."
+        )
+        found.append(Difference("damaged-here", ours.checksum, text))
+    if ours.timeouts:
+        text = (
+            f"{_frames(ours.timeouts)} went unanswered. Whether they were lost on the way to the"
+            " drive or on the way back only counters of the drive would tell."
+        )
+        found.append(Difference("no-answer", ours.timeouts, text))
+    return found
+
+
+def _frames(count: int) -> str:
+    return f"{count} frame{'' if count == 1 else 's'}"
+
+
+def device_since(now: DeviceCounters, before: DeviceCounters) -> DeviceCounters:
+    """What was counted here since; all of it where another program has begun to count."""
+    if now.requests < before.requests or now.replies < before.replies:
+        return now
+    plain = {
+        one.name: getattr(now, one.name) - getattr(before, one.name)
+        for one in fields(DeviceCounters)
+        if one.name not in ("exceptions", "turnarounds")
+    }
+    bars = tuple(a - b for a, b in zip(now.turnarounds, before.turnarounds, strict=True))
+    refused = _grown(now.exceptions, before.exceptions)
+    return DeviceCounters(**plain, exceptions=refused, turnarounds=bars)
+
+
+def _grown(now: Mapping[int, int], before: Mapping[int, int]) -> dict[int, int]:
+    grown = {code: count - before.get(code, 0) for code, count in sorted(now.items())}
+    return {code: count for code, count in grown.items() if count}
+
+
+def load_of(now: LineCounters, before: LineCounters, seconds: float) -> float | None:
+    """The share of the time in which the line was busy, 0 to 1; None where it is not known."""
+    busy = now.busy_seconds - before.busy_seconds
+    return min(1.0, busy / seconds) if seconds > 0 and busy >= 0 else None

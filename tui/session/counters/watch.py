@@ -1,0 +1,231 @@
+"""The counters of one drive, ours beside its own: looked at again and again, reset on asking."""
+
+from __future__ import annotations
+
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from functools import partial
+
+from tui.bus.api import DeviceCounters, LineCounters, Priority
+from tui.bus.errors import LineError, RequestRefused
+from tui.drive.chart import watched_codes
+from tui.drive.profile.schema import PortCounters
+
+from ..drive import DriveSession
+from ..read.reader import Reader
+from .compare import (
+    Bounds,
+    Comparison,
+    Difference,
+    DriveCount,
+    device_since,
+    differences,
+    load_of,
+    own_differences,
+)
+
+DIAGNOSTICS = 8
+ECHO, RESET, DAMAGED, FRAMES = 0x00, 0x0A, 0x0C, 0x0E
+"""Sub-functions of function 8."""
+ECHOED = 0xA55A
+"""The word that is sent and must come back: as many ones as zeros."""
+THIS_PORT = "function 8"
+TOLD_BY_THEN = 0.5
+"""Seconds in which the owner of the line has told its counts to this program."""
+
+
+PairAsked = Callable[[], Awaitable[tuple[int, int] | None]]
+"""Reads a pair of counters; None where the drive refuses them."""
+
+
+@dataclass(frozen=True, slots=True)
+class CountersNow:
+    """What was counted up to now, for a person."""
+
+    total: DeviceCounters
+    """Ours, since the line was opened."""
+    since: DeviceCounters
+    """Ours, since the counters were looked at first or reset."""
+    seconds: float
+    """How long ago that was."""
+    line_load: float | None
+    """The share of that time in which the line was busy, 0 to 1."""
+    device_load: float | None
+    """The same with this drive alone."""
+    counted_by: str
+    """Who counts ours: the program that owns the line; empty where it is this one."""
+    drive: tuple[tuple[str, Comparison], ...]
+    """The drive's own, by the name of what counts."""
+    differences: tuple[Difference, ...]
+    trouble: str
+    """Why the drive's own were not read; empty where they were, or where it has none."""
+
+    @property
+    def agree(self) -> bool:
+        """Whether every frame was counted and answered."""
+        return not self.differences
+
+
+@dataclass(slots=True, eq=False)
+class CounterWatch:
+    """Looks at both sides; what is ours is reset for this watch alone. In one loop only."""
+
+    session: DriveSession
+    trouble: str = ""
+    _line: LineCounters = field(init=False)
+    """The line when it was begun."""
+    _begun: float = field(init=False)
+    _drive: dict[str, Comparison] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.reset_ours()
+
+    @property
+    def has_diagnostics(self) -> bool:
+        """Whether the drive tells its counters by function 8."""
+        return self._has(DAMAGED) and self._has(FRAMES)
+
+    @property
+    def has_own(self) -> bool:
+        """Whether the drive counts anything that it tells."""
+        return self.has_diagnostics or bool(self.session.profile.data.port_counters)
+
+    @property
+    def can_reset_drive(self) -> bool:
+        """Whether the drive's own counters can be reset from here."""
+        return self._has(RESET) and not self.session.line.read_only
+
+    def _has(self, subfunction: int) -> bool:
+        function = self.session.profile.function(DIAGNOSTICS)
+        return function is not None and subfunction in function.subfunctions
+
+    @property
+    def _ours(self) -> DeviceCounters:
+        return self.session.line.counters.devices.get(self.session.device, DeviceCounters())
+
+    @property
+    def counted_by(self) -> str:
+        """The program that owns the line, and so counts; empty where it is this one."""
+        facts = self.session.line.facts
+        owner = facts.programs[0] if facts.programs else facts.me
+        return "" if owner.id == facts.me.id else owner.text
+
+    def reset_ours(self) -> None:
+        """Count from now on; the line's own counts, which others look at, stay."""
+        self._line = self.session.line.counters
+        self._begun = self.session.clock.monotonic()
+        self._drive = {name: Comparison(one.last, one.last) for name, one in self._drive.items()}
+
+    async def reset_drive(self) -> None:
+        """Set the drive's counters to 0 (sub-function 0A). Raises the line's errors.
+
+        By the manual that resets what monitors the exchanges, and nothing else.
+        """
+        if why := self.session.contradiction:
+            raise RequestRefused(f"Not reset: {why}")
+        device, line = self.session.device, self.session.line
+        await line.diagnose(device, RESET, priority=Priority.OPERATOR_WRITE)
+        self._drive = {}
+        self.reset_ours()
+        await self.look()
+
+    async def look(self) -> None:
+        """Read the drive's own; what keeps that from being done is in `trouble`."""
+        self.trouble = ""
+        try:
+            if self.has_diagnostics:
+                await self._look_by_diagnostics()
+            for port in self.session.profile.data.port_counters:
+                await self._take(port.name, partial(self._of_port, port))
+        except LineError as error:
+            self.trouble = str(error)
+
+    async def _look_by_diagnostics(self) -> None:
+        line, device = self.session.line, self.session.device
+        damaged = await line.diagnose(device, DAMAGED)
+
+        async def pair() -> tuple[int, int]:
+            return await line.diagnose(device, FRAMES), damaged
+
+        # what was sent is counted around the one request that brings the count of frames
+        await self._take(THIS_PORT, pair)
+
+    async def _of_port(self, port: PortCounters) -> tuple[int, int] | None:
+        found = await Reader(self.session).read([port.frames, port.checksum_errors])
+        frames, damaged = found[port.frames].raw, found[port.checksum_errors].raw
+        return None if frames is None or damaged is None else (frames, damaged)
+
+    async def _take(self, name: str, ask: PairAsked) -> None:
+        """Read a pair, and how much was sent and answered by then."""
+        before = self._ours
+        found = await ask()
+        if self.counted_by:
+            await self.session.clock.sleep(TOLD_BY_THEN)
+        after = self._ours
+        if found is None:
+            return
+        now = DriveCount(
+            *found,
+            Bounds(before.requests + 1, max(before.requests + 1, after.requests)),
+            Bounds(before.replies + 1, max(before.replies + 1, after.replies)),
+        )
+        known = self._drive.get(name)
+        self._drive[name] = known.with_look(now) if known else Comparison(now, now)
+
+    async def echo(self, times: int) -> int:
+        """Send frames that change nothing; how many were answered.
+
+        Echoes of function 8, or reads of the word that tells the state where the drive has none.
+        """
+        answered = 0
+        for _ in range(times):
+            try:
+                await self._one_echo()
+            except LineError:
+                continue
+            answered += 1
+        return answered
+
+    async def _one_echo(self) -> None:
+        line, device = self.session.line, self.session.device
+        if self._has(ECHO):
+            await line.diagnose(device, ECHO, ECHOED)
+            return
+        profile = self.session.profile
+        codes = watched_codes(profile) or [one.parameter for one in profile.data.monitoring.values]
+        word = profile[codes[0]]
+        await line.read(
+            device, word.address, function=word.function, priority=Priority.OPERATOR_READ
+        )
+
+    def now(self) -> CountersNow:
+        """What was counted up to now."""
+        line, ours = self.session.line.counters, self._ours
+        seconds = self.session.clock.monotonic() - self._begun
+        before = self._line.devices.get(self.session.device, DeviceCounters())
+        since = device_since(ours, before)
+        only = LineCounters(busy_seconds=since.busy_seconds)
+        return CountersNow(
+            ours,
+            since,
+            seconds,
+            load_of(line, self._line, seconds),
+            load_of(only, LineCounters(), seconds),
+            self.counted_by,
+            tuple(self._drive.items()),
+            self._differences(since),
+            self.trouble,
+        )
+
+    def _differences(self, since: DeviceCounters) -> tuple[Difference, ...]:
+        """By the counters of this port; by ours alone where there are none."""
+        mine = self._drive.get(THIS_PORT)
+        if mine is None:
+            mine = next((one for one in self._drive.values() if one.counts_this_line), None)
+        told = differences(mine) if mine is not None else []
+        if mine is not None and any(one.kind == "not-answered" for one in told):
+            return tuple(told)
+        more = own_differences(since)
+        if mine is not None:
+            more = [one for one in more if one.kind == "damaged-here"]
+        return (*told, *more)
