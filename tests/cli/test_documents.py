@@ -58,6 +58,7 @@ RUNS: dict[str, tuple[int, tuple[str, ...], str]] = {
     "who it is": (0, ("identify", *DRIVE), "IdentityTold"),
     "who is there": (0, ("scan", DRIVE[0], "--addresses", "2-3"), "ScanHitTold"),
     "what it does": (0, ("status", *DRIVE), "StatusTold"),
+    "its counters": (0, ("counters", *DRIVE, "--frames", "5"), "CountersTold"),
     "cycles": (0, ("watch", *DRIVE, "--every", "0.1", "--count", "2"), "CycleTold"),
     "a reference": (0, ("reference", *DRIVE, "20", "--arm"), "CommandTold"),
     "stops": (0, ("stop", DRIVE[0], "--all"), "StopTold"),

@@ -21,6 +21,7 @@ COMMANDS = {
     "backup": ("backup", "Write the settings of a drive to a file."),
     "block": ("block", "Show or change a drive's blocks or scanner."),
     "compare": ("compare", "Compare the settings of files, drives, or the factory."),
+    "counters": ("counters", "Count the frames to a drive, and ask for its own counts."),
     "demo": ("panel", "Open the panel on five simulated drives that run."),
     "hold": ("hold", "Ask drives on, against their communication time-out."),
     "identify": ("identify", "Ask a drive who it is."),
@@ -61,7 +62,7 @@ Left out, it is that of DRIVEPANEL_LINE.
 \b
 Exit status:
     0  done
-    1  different: compare, block verify, a contradicting teach
+    1  different: compare, block verify, counters, a contradicting teach
     2  usage: options, files, codes, profiles
     3  no answer, or trouble on the line
     4  the drive refused

@@ -13,6 +13,7 @@ import msgspec
 
 from .of_drives import (
     CommandTold,
+    CountersTold,
     CycleTold,
     ErrorTold,
     HoldTold,
@@ -62,7 +63,7 @@ DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     CommandTold, StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
     BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
     ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
-    JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold, WhyTold,
+    JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold, WhyTold, CountersTold,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""
 

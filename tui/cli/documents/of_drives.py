@@ -7,6 +7,13 @@ from typing import Literal
 import msgspec
 from msgspec import UNSET, UnsetType
 
+from .counter_parts import (
+    CountingTestTold,
+    DifferenceTold,
+    DriveCountersTold,
+    LoadTold,
+    OurCountersTold,
+)
 from .parts import (
     AlarmTold,
     ControlTold,
@@ -231,6 +238,23 @@ class WhyTold(OfDriveTold, kw_only=True):
     text: str
     next: list[str]
     seen: HeardTold
+
+
+class CountersTold(OfDriveTold, kw_only=True):
+    """`counters`: what was exchanged with a drive, as counted here and by the drive."""
+
+    command: Literal["counters"]
+    counted_by: str | None
+    seconds: float
+    ours: OurCountersTold
+    since_opened: OurCountersTold
+    load: LoadTold
+    drive: list[DriveCountersTold]
+    differences: list[DifferenceTold]
+    agree: bool
+    trouble: str | None
+    test: CountingTestTold
+    reset: bool
 
 
 class CommandTold(OfDriveTold, kw_only=True):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 
 from tui.bus.api import DeviceCounters, LineCounters, Priority
@@ -56,14 +56,30 @@ class CountersNow:
     """Who counts ours: the program that owns the line; empty where it is this one."""
     drive: tuple[tuple[str, Comparison], ...]
     """The drive's own, by the name of what counts."""
-    differences: tuple[Difference, ...]
     trouble: str
     """Why the drive's own were not read; empty where they were, or where it has none."""
+    differences: tuple[Difference, ...] = ()
 
     @property
     def agree(self) -> bool:
         """Whether every frame was counted and answered."""
         return not self.differences
+
+    @property
+    def compared(self) -> Comparison | None:
+        """The counters of the drive that count the frames of this line; None where none does."""
+        return dict(self.drive).get(THIS_PORT) or next(
+            (one for _, one in self.drive if one.counts_this_line), None
+        )
+
+    @property
+    def agreeing(self) -> str:
+        """That nothing differs, in a sentence."""
+        one = self.compared
+        if one is None:
+            rest = "" if self.drive else " The drive tells no counters of its own."
+            return f"Frames sent: {self.since.requests}; none was lost.{rest}"
+        return f"Frames the drive counted: {one.frames}; each was sent from here and answered."
 
 
 @dataclass(slots=True, eq=False)
@@ -205,7 +221,7 @@ class CounterWatch:
         before = self._line.devices.get(self.session.device, DeviceCounters())
         since = device_since(ours, before)
         only = LineCounters(busy_seconds=since.busy_seconds)
-        return CountersNow(
+        found = CountersNow(
             ours,
             since,
             seconds,
@@ -213,19 +229,17 @@ class CounterWatch:
             load_of(only, LineCounters(), seconds),
             self.counted_by,
             tuple(self._drive.items()),
-            self._differences(since),
             self.trouble,
         )
+        return replace(found, differences=_told(found.compared, since))
 
-    def _differences(self, since: DeviceCounters) -> tuple[Difference, ...]:
-        """By the counters of this port; by ours alone where there are none."""
-        mine = self._drive.get(THIS_PORT)
-        if mine is None:
-            mine = next((one for one in self._drive.values() if one.counts_this_line), None)
-        told = differences(mine) if mine is not None else []
-        if mine is not None and any(one.kind == "not-answered" for one in told):
-            return tuple(told)
-        more = own_differences(since)
-        if mine is not None:
-            more = [one for one in more if one.kind == "damaged-here"]
-        return (*told, *more)
+
+def _told(mine: Comparison | None, since: DeviceCounters) -> tuple[Difference, ...]:
+    """By the counters of this port; by ours alone where there are none."""
+    told = differences(mine) if mine is not None else []
+    if any(one.kind == "not-answered" for one in told):
+        return tuple(told)
+    more = own_differences(since)
+    if mine is not None:
+        more = [one for one in more if one.kind == "damaged-here"]
+    return (*told, *more)

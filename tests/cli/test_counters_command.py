@@ -1,0 +1,52 @@
+"""`drivepanel counters`: what it prints, its status, and what it does not do."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from .commands import ended, tcp_line
+
+
+def counted(status: int, *words: str) -> Any:
+    return json.loads(ended(status, "counters", *words, "--json").stdout)
+
+
+def test_a_good_line_ends_with_0() -> None:
+    told = counted(0, "sim:atv71", "--frames", "7")
+    assert told["test"] == {"frames": 7, "answered": 7}
+    assert told["agree"] is True
+    assert told["differences"] == []
+    names = {one["name"]: one for one in told["drive"]}
+    assert names["function 8"]["counts_this_line"] is True
+    assert names["Modbus network"]["counts_this_line"] is True
+    assert names["Keypad port"]["frames"] == 0
+    assert sum(one["count"] for one in told["ours"]["turnarounds"]) == told["ours"]["replies"]
+    assert told["since_opened"]["frames"] > told["ours"]["frames"]
+
+
+def test_lost_answers_end_with_1_and_are_told() -> None:
+    with tcp_line("atv71@2", "--line-fault", "lost=0.2", "--seed", "3") as line:
+        told = counted(1, line, "-d", "2", "--frames", "10")
+        (found,) = told["differences"]
+        assert found["kind"] == "not-answered"
+        assert found["count"] >= 1
+        assert found["text"].startswith("The drive saw ")
+
+
+def test_a_drive_without_counters_is_compared_with_nothing() -> None:
+    done = ended(0, "counters", "sim:atv312", "--frames", "3")
+    assert "tells no counters of its own" in done.stdout
+
+
+def test_the_drives_counters_are_reset_armed_only_and_where_it_has_them() -> None:
+    with tcp_line("atv71@2") as line:
+        assert "Not armed" in ended(5, "counters", line, "-d", "2", "--reset-drive").stderr
+        before = counted(0, line, "-d", "2")["drive"][0]["frames"]
+        after = counted(0, line, "-d", "2", "--reset-drive", "--arm", "--frames", "0")
+        assert after["drive"][0]["frames"] < before
+        assert after["reset"] is True
+        refused = ended(5, "counters", line, "-d", "2", "--reset-drive", "--arm", "--read-only")
+        assert "read-only" in refused.stderr
+    lacking = ended(5, "counters", "sim:atv312", "--reset-drive", "--arm")
+    assert "no such command" in lacking.stderr

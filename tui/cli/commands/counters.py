@@ -1,0 +1,194 @@
+"""`drivepanel counters`: what was exchanged with a drive, as counted here and by the drive."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Iterator
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from ..shared.errors import DIFFERENT, REFUSED_HERE, Failure, told
+from ..shared.options import (
+    Target,
+    connect_drive,
+    drive_options,
+    force_profile_option,
+    json_option,
+    line_argument,
+    on_line,
+    read_only_option,
+)
+from ..shared.output import drive_json, print_json
+from ..shared.say import say, say_row
+from .orders import arm_option, need_arming
+
+if TYPE_CHECKING:
+    from tui.bus.api import DeviceCounters
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.counters.watch import CountersNow, CounterWatch
+
+FRAMES_SENT = 20
+"""Frames that are sent to be counted, unless told."""
+MOST_FRAMES = 10_000
+COUNTER_LOOKS = 3
+COUNTER_TITLES = 18
+"""Width of the column of titles, with its gap."""
+
+
+@click.command()
+@line_argument
+@drive_options
+@force_profile_option
+@click.option(
+    "--frames",
+    type=click.IntRange(0, MOST_FRAMES),
+    default=FRAMES_SENT,
+    show_default=True,
+    help="Frames that are sent to be counted; they change nothing.",
+)
+@click.option(
+    "--for",
+    "seconds",
+    type=click.FloatRange(min=0.0),
+    default=0.0,
+    metavar="SECONDS",
+    help="Count for so long, too: what other programs on the line send.",
+)
+@click.option("--reset-drive", is_flag=True, help="Set the drive's own counters to 0 before.")
+@arm_option
+@read_only_option
+@json_option
+@told
+def counters(
+    target: Target,
+    frames: int,
+    seconds: float,
+    reset_drive: bool,
+    arm: bool,
+    read_only: bool,
+    as_json: bool,
+) -> None:
+    """Count the frames to a drive, and compare with what the drive itself counts.
+
+    Ends with 1 where frames were lost or damaged, or another master asks the drive.
+    """
+    from tui.session.counters.watch import CounterWatch
+
+    if reset_drive:
+        need_arming(arm, "--reset-drive sets the drive's own counters to 0")
+
+    async def work(opened: OpenLine) -> bool:
+        session = await connect_drive(opened, target)
+        watch = CounterWatch(session)
+        if reset_drive:
+            await _reset(watch)
+        await _look(watch)
+        answered = await watch.echo(frames)
+        await asyncio.sleep(seconds)
+        await _look(watch)
+        found = watch.now()
+        if as_json:
+            sent = {"frames": frames, "answered": answered}
+            about = drive_json(target.line_text, session)
+            print_json({**about, **counters_json(found), "test": sent, "reset": reset_drive})
+        else:
+            for title, text in _rows(found):
+                say_row(title, text, COUNTER_TITLES)
+            for one in found.differences:
+                say(one.text)
+            if found.agree and not found.trouble:
+                say(found.agreeing)
+        return found.agree and not found.trouble
+
+    if not on_line(target, work, read_only=read_only):
+        raise click.exceptions.Exit(DIFFERENT)
+
+
+async def _look(watch: CounterWatch) -> None:
+    """Look, again where a reply was lost: on such a line the counters are wanted."""
+    for _ in range(COUNTER_LOOKS):
+        await watch.look()
+        if not watch.trouble:
+            return
+
+
+async def _reset(watch: CounterWatch) -> None:
+    if not watch.can_reset_drive:
+        why = "the line is read-only" if watch.session.line.read_only else "it has no such command"
+        told = f"The counters of device {watch.session.device} are not reset: {why}."
+        raise Failure(told, REFUSED_HERE)
+    await watch.reset_drive()
+
+
+def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:
+    """What was counted, as titles with their texts."""
+    from tui.session.counters.turnarounds import bars
+
+    ours = found.since
+    by = f"{found.counted_by}, which owns the line" if found.counted_by else "this program"
+    yield "Counted by", f"{by}; for {found.seconds:.1f} s"
+    yield "Sent", f"{ours.requests} frames, {ours.bytes_out} bytes, {ours.repeats} of them repeats"
+    yield "Answered", f"{ours.replies}, {ours.bytes_in} bytes"
+    lost = f"{ours.timeouts} time-outs, {ours.checksum} damaged, {ours.wrong} strange"
+    yield "Not answered", lost
+    yield "Refused", ", ".join(f"exception {c}: {n}" for c, n in ours.exceptions.items()) or "0"
+    if found.line_load is not None and found.device_load is not None:
+        share = f"{found.device_load:.0%} with this drive"
+        yield "Load of the line", f"{found.line_load:.0%}, {share}"
+    seen = [f"{bar.label}: {bar.count}" for bar in bars(ours.turnarounds) if bar.count]
+    yield "Turnaround", ", ".join(seen) or "-----"
+    for name, one in found.drive:
+        errors = f"{one.last.damaged}{' or more' if one.last.saturated else ''}"
+        told = f"{one.last.frames} frames, {errors} with a wrong checksum"
+        meanwhile = f"{one.frames} and {one.damaged} since the first look"
+        yield name.capitalize(), f"{told}; {meanwhile}"
+    if found.trouble:
+        yield "Drive", found.trouble
+
+
+def counters_json(found: CountersNow) -> dict[str, Any]:
+    """The same as an object."""
+    return {
+        "counted_by": found.counted_by or None,
+        "seconds": round(found.seconds, 3),
+        "ours": _ours_json(found.since),
+        "since_opened": _ours_json(found.total),
+        "load": {"line": found.line_load, "device": found.device_load},
+        "drive": [
+            {
+                "name": name,
+                "frames": one.last.frames,
+                "checksum_errors": one.last.damaged,
+                "saturated": one.last.saturated,
+                "frames_since": one.frames,
+                "checksum_errors_since": one.damaged,
+                "counts_this_line": one.counts_this_line,
+            }
+            for name, one in found.drive
+        ],
+        "differences": [
+            {"kind": one.kind, "count": one.count, "text": one.text} for one in found.differences
+        ],
+        "agree": found.agree,
+        "trouble": found.trouble or None,
+    }
+
+
+def _ours_json(ours: DeviceCounters) -> dict[str, Any]:
+    from tui.session.counters.turnarounds import bars
+
+    return {
+        "frames": ours.requests,
+        "replies": ours.replies,
+        "timeouts": ours.timeouts,
+        "checksum": ours.checksum,
+        "wrong": ours.wrong,
+        "repeats": ours.repeats,
+        "exceptions": {str(code): count for code, count in sorted(ours.exceptions.items())},
+        "bytes_out": ours.bytes_out,
+        "bytes_in": ours.bytes_in,
+        "busy_seconds": round(ours.busy_seconds, 4),
+        "turnarounds": [asdict(bar) for bar in bars(ours.turnarounds)],
+    }

@@ -1,0 +1,62 @@
+"""Objects inside the document of `counters`."""
+
+from __future__ import annotations
+
+from .parts import PartTold
+
+
+class TurnaroundTold(PartTold):
+    """Replies with a turnaround up to so many ms and beyond the one before; null: any longer."""
+
+    up_to_ms: int | None
+    count: int
+
+
+class OurCountersTold(PartTold):
+    """What was counted here; `exceptions` by their code, `turnarounds` as a histogram."""
+
+    frames: int
+    replies: int
+    timeouts: int
+    checksum: int
+    wrong: int
+    repeats: int
+    exceptions: dict[str, int]
+    bytes_out: int
+    bytes_in: int
+    busy_seconds: float
+    turnarounds: list[TurnaroundTold]
+
+
+class LoadTold(PartTold):
+    """Shares of the time, 0 to 1, in which the line was busy: at all, and with this drive."""
+
+    line: float | None
+    device: float | None
+
+
+class DriveCountersTold(PartTold):
+    """A pair of the drive's counters as it tells them, and what it counted since the first look."""
+
+    name: str
+    frames: int
+    checksum_errors: int
+    saturated: bool
+    frames_since: int
+    checksum_errors_since: int
+    counts_this_line: bool | None
+
+
+class DifferenceTold(PartTold):
+    """Something that the counters show; `count` frames at least."""
+
+    kind: str
+    count: int
+    text: str
+
+
+class CountingTestTold(PartTold):
+    """Frames that were sent to be counted."""
+
+    frames: int
+    answered: int
