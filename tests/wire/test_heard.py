@@ -5,7 +5,7 @@ from __future__ import annotations
 import random
 
 import pytest
-from hypothesis import assume, given
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.simulator.manual import FRAMES, Frame
@@ -33,11 +33,14 @@ def write_one(device: int, address: int, word: int) -> bytes:
 
 def split(*readings: bytes, every: float = 0.01, pause: bool = True) -> list[HeardFrame]:
     """Frames of readings that come at an even pace."""
-    splitter = FrameSplitter(CHARACTER)
+    pairing = Pairing()
+    splitter = FrameSplitter(CHARACTER, pairing.is_due)
     found = []
     for number, data in enumerate(readings):
-        found += splitter.take(data, number * every)
-    return found + (splitter.pause() if pause else [])
+        for one in splitter.take(data, number * every):
+            pairing.take(one)
+            found.append(one)
+    return found + (list(splitter.pause()) if pause else [])
 
 
 def heard(*readings: bytes, every: float = 0.01, until: float = 10.0) -> list[HeardExchange]:
@@ -73,7 +76,6 @@ def test_reads_are_found_however_they_were_read(
         for device, address, words in reads
         for one in (read_frame(device, address, len(words)), reply_words(device, *words))
     ]
-    assume(not any(whole_length(one[:8]) for one in frames if len(one) > 8))
     data = b"".join(frames)
     cuts = sorted(chance.randrange(len(data) + 1) for _ in range(chance.randrange(8)))
     readings = [data[a:b] for a, b in zip([0, *cuts], [*cuts, len(data)], strict=True)]
@@ -83,9 +85,22 @@ def test_reads_are_found_however_they_were_read(
 
 
 def test_a_reply_that_is_whole_without_its_last_byte_is_found_with_it() -> None:
-    reply = reply_words(160, 1040, 1040)
+    request, reply = read_frame(160, 7, 2), reply_words(160, 1040, 1040)
     assert is_whole(reply[:-1])
-    assert [one.data for one in split(reply + READ)] == [reply, READ]
+    assert [one.data for one in split(request, reply + READ)] == [request, reply, READ]
+    assert [one.data for one in split(request, reply[:-1], reply[-1:])] == [request, reply]
+
+
+def test_a_request_that_is_a_whole_reply_without_its_last_byte_is_found_with_it() -> None:
+    request, reply = read_frame(70, 531, 1), reply_words(70, 0)
+    assert is_whole(request[:-1])
+    dribbled = [bytes([byte]) for byte in request + reply]
+    assert [one.data for one in split(*dribbled, every=CHARACTER)] == [request, reply]
+
+
+def test_a_request_that_is_sent_again_is_found_while_its_reply_is_due() -> None:
+    found = split(READ, READ, WORDS, pause=False, every=0.2)
+    assert [one.data for one in found] == [READ, READ, WORDS]
 
 
 @pytest.mark.parametrize("example", FRAMES, ids=lambda f: f"{f.family}-{f.number}")
@@ -143,12 +158,12 @@ def test_what_never_becomes_a_frame_is_given_up() -> None:
 
 def test_pauses_are_measured_where_readings_tell_them() -> None:
     splitter = FrameSplitter(CHARACTER)
-    (request,) = splitter.take(READ, 1.0)
+    (request,) = list(splitter.take(READ, 1.0))
     assert request.begun == pytest.approx(1.0 - 8 * CHARACTER)
     reply = [*splitter.take(WORDS[:4], 1.010), *splitter.take(WORDS[4:], 1.020)]
     assert reply[0].pause == pytest.approx(0.010 - 4 * CHARACTER)
     assert reply[0].gap == pytest.approx(0.010 - 5 * CHARACTER)
-    together = splitter.take(READ + WORDS, 2.0)
+    together = list(splitter.take(READ + WORDS, 2.0))
     assert [one.pause is None for one in together] == [False, True]
 
 
@@ -215,5 +230,5 @@ def test_noise_costs_no_more_the_more_of_it_comes(monkeypatch: pytest.MonkeyPatc
     monkeypatch.setattr("tui.wire.heard.splitting.whole_length", counted)
     splitter, chance, noise = FrameSplitter(CHARACTER), random.Random(1), 2000
     for number in range(noise):
-        splitter.take(chance.randbytes(1), number * CHARACTER)
+        list(splitter.take(chance.randbytes(1), number * CHARACTER))
     assert len(looked) < 4 * noise

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from tui.drive.profile.profile import Profile
@@ -60,8 +60,8 @@ class LineListener:
         self.pause = max(SHORTEST_PAUSE, silence + BESIDE_SILENCE)
         """Seconds without a byte after which `idle` is to be called."""
         self._heard = frame_heard
-        self._splitter = FrameSplitter(character)
         self._pairing = Pairing()
+        self._splitter = FrameSplitter(character, self._pairing.is_due)
 
     def take(self, data: bytes, time: float) -> list[ToldExchange]:
         """Bytes that were read at a time; the exchanges that are known by now."""
@@ -77,7 +77,7 @@ class LineListener:
         found = self._told(self._splitter.pause())
         return found + [self._tell(one) for one in self._pairing.wait(now, LONG_FOR_AN_ANSWER)]
 
-    def _told(self, frames: list[HeardFrame]) -> list[ToldExchange]:
+    def _told(self, frames: Iterable[HeardFrame]) -> list[ToldExchange]:
         found = []
         for frame in frames:
             self.tally.take_frame(frame, self.silence if self.character else 0.0)

@@ -73,10 +73,26 @@ def whole_length(data: bytes | bytearray) -> int:
     """Bytes of the whole frame that the data begins with, as its function has it; else 0."""
     found = {*(request_lengths(data) or ()), *(reply_lengths(data) or ())}
     # a frame whose checksum ends with a zero may be whole without that, too
-    for length in sorted(found, reverse=True):
-        if MIN_FRAME <= length <= min(len(data), MAX_FRAME) and is_whole(data[:length]):
-            return length
-    return 0
+    return _whole(data, tuple(sorted(found, reverse=True)))
+
+
+def due_length(data: bytes | bytearray, *, reply: bool) -> int:
+    """The same where it is known whether a reply is due, or else a request.
+
+    A frame of the other kind is none as long as one that is due may still come of it: a frame that
+    ends with a zero is whole without that, too, and one may be the beginning of the other.
+    """
+    due, other = reply_lengths(data), request_lengths(data)
+    if not reply:
+        due, other = other, due
+    if (length := _whole(data, due)) or due is None or any(n > len(data) for n in due):
+        return length
+    return _whole(data, other)
+
+
+def _whole(data: bytes | bytearray, lengths: Lengths) -> int:
+    fits = (n for n in lengths or () if MIN_FRAME <= n <= min(len(data), MAX_FRAME))
+    return next((n for n in fits if is_whole(data[:n])), 0)
 
 
 def may_grow(data: bytes | bytearray) -> bool:

@@ -66,6 +66,11 @@ class Pairing:
         self._reply = b""
         """The last reply as it was on the line."""
 
+    def is_due(self, device: int, function: int) -> bool:
+        """Whether a reply of a device to a function is due."""
+        asked = self._asked.frame if self._asked is not None else None
+        return asked is not None and (asked.device, asked.function) == (device, function)
+
     def take(self, frame: HeardFrame) -> tuple[list[HeardExchange], bool | None]:
         """A frame; what is known by it, and whether it is a request (None of noise)."""
         if not frame.whole:

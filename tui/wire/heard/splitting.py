@@ -6,10 +6,11 @@ nowhere (noise, a cut frame, a function that is not known here), the next frame 
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from ..frames import MAX_FRAME, MIN_FRAME, is_whole
-from .lengths import may_grow, whole_length
+from .lengths import REFUSAL, due_length, may_grow, whole_length
 
 LONGEST_HEAP = 4 * MAX_FRAME
 """Bytes without a frame that are kept at most, waiting for a pause."""
@@ -70,15 +71,21 @@ class _Chunk:
 class FrameSplitter:
     """Takes readings of a line, gives frames; `character` is what a byte takes, in seconds.
 
-    With a `character` of 0 all bytes of a reading count as of one moment.
+    With a `character` of 0 all bytes of a reading count as of one moment. `reply_due` tells of a
+    device and a function whether a reply is due, by the frames that were given until then.
     """
 
-    def __init__(self, character: float = 0.0) -> None:
+    def __init__(
+        self, character: float = 0.0, reply_due: Callable[[int, int], bool] = lambda _d, _f: False
+    ) -> None:
         self._character = character
+        self._reply_due = reply_due
         self._data = bytearray()
         self._chunks: list[_Chunk] = []
         self._dead = 0
         """Bytes at the beginning with none of which a frame can begin."""
+        self._complete = False
+        """Whether the last byte that was read is known to end a frame."""
         self._ended = float("-inf")
         """When the last byte that was read had ended."""
         self._given: float | None = None
@@ -89,42 +96,52 @@ class FrameSplitter:
         """Whether there are bytes that form no frame yet."""
         return bool(self._data)
 
-    def take(self, data: bytes, time: float) -> list[HeardFrame]:
-        """Bytes that were read at a time; the frames that are whole by now."""
+    def take(self, data: bytes, time: float) -> Iterator[HeardFrame]:
+        """Bytes that were read at a time; the frames that are whole by now, each to be taken."""
+        self._complete = False
         if data:
             self._data += data
             begun = min(time, max(self._ended, time - len(data) * self._character))
             apart = begun - self._ended > SILENT_BEFORE
             self._chunks.append(_Chunk(len(data), begun, time, apart))
             self._ended = time
-        return self._frames(final=False)
+        yield from self._frames(final=False)
 
-    def pause(self) -> list[HeardFrame]:
+    def pause(self) -> Iterator[HeardFrame]:
         """The line has been silent for long: no frame goes on, so all that is left is given."""
         return self._frames(final=True)
 
-    def _frames(self, *, final: bool) -> list[HeardFrame]:
-        found = []
+    def _frames(self, *, final: bool) -> Iterator[HeardFrame]:
         while self._data:
             whole, length = self._last() if final else self._next()
             if not length:
                 break
-            found.append(self._cut(length, whole=whole))
-        return found
+            yield self._cut(length, whole=whole)
 
     def _next(self) -> tuple[bool, int]:
         """Whether a frame or noise is at the beginning, and how much; 0 where it is not known."""
         while self._dead < len(self._data):
             rest = self._data[self._dead : self._dead + MAX_FRAME]
-            if length := whole_length(rest):
+            if length := self._length(rest):
                 return not self._dead, self._dead or length
             if may_grow(rest):
                 break
             self._dead += 1
         if self._frame_of_its_own():
-            # what it proves is that nothing goes on; there may be whole frames before it
-            return False, self._frame_behind()
+            # it proves that nothing before it goes on, nor it itself; that may be whole frames
+            self._complete = True
+            length = whole_length(self._data)
+            return bool(length), length or self._frame_behind()
         return False, self._dead if self._dead > LONGEST_HEAP else 0
+
+    def _length(self, data: bytearray) -> int:
+        """Bytes of the frame at the beginning; 0 where it is none yet."""
+        if len(data) < MIN_FRAME:
+            return 0
+        if self._complete:
+            return whole_length(data)
+        device, function = data[0], data[1] & ~REFUSAL
+        return due_length(data, reply=self._reply_due(device, function))
 
     def _last(self) -> tuple[bool, int]:
         """The same where nothing more comes."""
