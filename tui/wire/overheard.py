@@ -4,9 +4,12 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+from .heard.lengths import fits_reply, fits_request
+
 READS = {1: "coils", 2: "inputs", 3: "register", 4: "input register"}
 WRITES = {5: "coil", 6: "register", 15: "coils", 16: "register"}
-REPORT_ID, READ_WRITE, DIAGNOSE, IDENTIFY = 17, 23, 8, 43
+COILS, ONE = (1, 2), (5, 6)
+REPORT_ID, READ_WRITE, IDENTIFY = 17, 23, 43
 _HEAD = 6
 """Bytes of device, function, first register and count or value."""
 
@@ -37,22 +40,12 @@ def overheard_request(frame: bytes) -> OverheardRequest | None:
 
     What a request and its reply have in common, as for function 6, counts as a request.
     """
-    size = len(frame)
     device, function = frame[0], frame[1]
-    register = int.from_bytes(frame[2:4], "big")
-    number = int.from_bytes(frame[4:_HEAD], "big")
-    if function in READS:
-        # a reply of the same size holds three bytes: coils may, registers do not
-        is_request = size == 8 and (function > 2 or frame[2] != 3)
-        return OverheardRequest(device, function, register, number) if is_request else None
-    if function in (5, 6) and size == 8:
-        return OverheardRequest(device, function, register, 1)
-    if function in (15, 16):
-        whole = size > 9 and size == 9 + frame[6]
-        return OverheardRequest(device, function, register, number) if whole else None
-    if function == READ_WRITE:
-        whole = size > 13 and size == 13 + frame[10]
-        return OverheardRequest(device, function, register, number) if whole else None
-    if (function, size) in ((REPORT_ID, 4), (DIAGNOSE, 8), (IDENTIFY, 7)):
+    # a reply of three bytes has the length of a request: coils may, registers do not
+    if not fits_request(frame) or (function in COILS and fits_reply(frame)):
+        return None
+    if function not in {*READS, *WRITES, READ_WRITE}:
         return OverheardRequest(device, function)
-    return None
+    register = int.from_bytes(frame[2:4], "big")
+    number = 1 if function in ONE else int.from_bytes(frame[4:_HEAD], "big")
+    return OverheardRequest(device, function, register, number)
