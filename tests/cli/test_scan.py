@@ -146,6 +146,24 @@ def test_another_master_ends_it_before_anything_is_sent(options: tuple[str, ...]
     assert "Nothing was sent." in done.stderr
 
 
+def test_a_master_that_begins_later_ends_it_too_and_what_was_found_stays() -> None:
+    simulation = Simulation([DriveSpec("atv71", 2)], any_settings=True)
+
+    def script(request: bytes, _count: int) -> Sequence[Step]:
+        reply = simulation.line.receive(request)
+        if request[0] == 5:
+            return [read_frame(40, 3201, 4)]
+        return [reply.data] if reply is not None else []
+
+    with simulation, PtyPeer(script) as peer:
+        done = invoked("scan", peer.path, "--addresses", "1-20", "--json")
+    assert done.exit_code == 3
+    assert "Address 40: read of register 3201 on, 4 words" in done.stderr
+    (end,) = events(done.stdout, "ended")
+    assert (end["done"], end["found"]) == (False, 1)
+    assert max(request[0] for request in peer.requests) < 20
+
+
 def test_two_drives_at_one_address_are_told_as_unclear() -> None:
     def script(request: bytes, _count: int) -> Sequence[Step]:
         return [frame(3, bytes.fromhex("03 02 0001"))[:-1] + b"\0"] if request[0] == 3 else []

@@ -78,10 +78,10 @@ def scan(
         on_line(line_text, work, read_only=read_only)
     except KeyboardInterrupt:
         raise Failure(f"Ended by Ctrl-C. {_end(scans, addresses)}", INTERRUPTED) from None
-    except Failure:
+    except click.ClickException:
         raise  # nothing was sent
     except Exception:
-        _end(scans, addresses)
+        tell.note(_end(scans, addresses))
         raise
     text = _end(scans, addresses)
     if not scans[0].hits:

@@ -61,12 +61,12 @@ class Scan:
         self.tell.families(watching_families(await asyncio.to_thread(known_profiles)))
         await asyncio.to_thread(_ready_for_hits)
         await self._listen()
-        goes_on = await self._at_this_setting(last=len(self.settings) < 2)
-        for number, setting in enumerate(self.settings[1:], start=2):
-            if not goes_on:
-                break
+        later = self.settings[1:]
+        goes_on = await self._at_this_setting(last=not later)
+        while later and goes_on:
+            setting = later.pop(0)
             if await self._reopened(setting):
-                goes_on = await self._at_this_setting(last=number == len(self.settings))
+                goes_on = await self._at_this_setting(last=not later)
         self.done = True
 
     async def _listen(self) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Sequence
+from dataclasses import replace
 from functools import partial
 
 from tui.bus.api import IdentificationObjects, ModbusLine, Priority, Reply
@@ -18,6 +19,9 @@ REST = 2.0
 """A search beside regular polls rests so many times as long as it waited in vain."""
 SECOND_WAIT = 0.1
 """Seconds in which a reply begins at the latest when silent addresses are asked once more."""
+LATE_WAIT = 0.3
+"""Seconds behind the last request in which late replies are heard: there are drives that may be
+set to answer 250 ms after a request."""
 
 Rests = Callable[[float], Awaitable[None]]
 Found = Callable[[ScanResult], Awaitable[None]]
@@ -93,11 +97,13 @@ class Search:
             first = partial(self._round, line, how, found)
             silent = await first(self.devices, Priority.BACKGROUND, how.within)
             if silent and how.within is not None:
-                await self._rests(SECOND_WAIT)  # the last ones may be late as well
+                await self._rests(LATE_WAIT)  # the last ones may be late as well
             late = [device for device in silent if line.device_state(device).answers]
             self.again = bool(silent)
             if late:
-                await first(late, Priority.PATIENT, None)
+                longest = line.timing.patient_timeout
+                slow = replace(how, patience=longest)
+                await self._round(line, slow, found, late, Priority.PATIENT, longest)
             if not self._once and (rest := [one for one in silent if one not in late]):
                 within = None if how.within is None else max(SECOND_WAIT, how.within)
                 await first(rest, Priority.PATIENT, within)
