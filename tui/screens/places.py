@@ -144,6 +144,12 @@ class Places(Panel):
 
         self.push_screen(WiringScreen(console))
 
+    def action_why(self) -> None:
+        """Why the drive that is meant does not answer."""
+        from .why import ask_why
+
+        ask_why(self)
+
     def action_save_shown(self) -> None:
         """Save what the screen shows to a file."""
         self._ask_screen("action_save_file", "There is nothing to save on this screen.")

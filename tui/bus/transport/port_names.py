@@ -96,13 +96,15 @@ def _usb_device(port: Path) -> _UsbDevice | None:
     """The USB device behind a port; None for one that is not on USB."""
     place = os.path.realpath(port / "device")
     for _ in range(4):  # the port, its interface, the device
-        if (vendor := _line(place, "idVendor")) and (product := _line(place, "idProduct")):
-            return _UsbDevice(place, vendor, product, _line(place, "serial"))
+        if (vendor := first_line(place, "idVendor")) and (
+            product := first_line(place, "idProduct")
+        ):
+            return _UsbDevice(place, vendor, product, first_line(place, "serial"))
         place = os.path.dirname(place)
     return None
 
 
-def _line(folder: str, name: str) -> str:
+def first_line(folder: str, name: str) -> str:
     """The first line of a file of the system; empty where it is not there."""
     try:
         with open(os.path.join(folder, name), encoding="utf-8", errors="replace") as file:

@@ -56,9 +56,9 @@ def see_port(path: str) -> PortSeen:
 def latency_of(path: str) -> int | None:
     """The latency timer of an adapter in ms, where its driver has one."""
     name = os.path.basename(os.path.realpath(path))
-    with suppress(OSError, ValueError):
-        place = port_names.SYSTEM_PORTS / name / "device" / "latency_timer"
-        return int(place.read_text("ascii"))
+    with suppress(ValueError):
+        place = port_names.SYSTEM_PORTS / name / "device"
+        return int(port_names.first_line(str(place), "latency_timer"))
     return None
 
 

@@ -24,6 +24,8 @@ class LineKeys(Scanning):
 
     _opening = ""
     """The line that is being opened, or nothing."""
+    refused: tuple[str, LineError] | None = None
+    """The line that could not be opened when that was tried last, and why."""
 
     def action_refresh_lines(self) -> None:
         """Look for serial ports and recent lines."""
@@ -162,11 +164,13 @@ class LineKeys(Scanning):
             self.fail(error)
             return False
         except (LineError, DriveError) as error:
+            self.refused = (text, error) if isinstance(error, LineError) else None
             self.fail(error)
             self._point_at(text)
             return False
         finally:
             self._opening = ""
+        self.refused = None
         self._led = False
         self.action_refresh_lines()
         chosen = self.lines.chosen

@@ -119,7 +119,7 @@ class Scanning(LineView):
         if not self.found:
             self.say(
                 f"No drive answered at address {addresses_text(devices)}, asked twice.",
-                "Check the wiring; c changes the addresses, s searches again, Ctrl+P at other baud"
+                "N says why; c changes the addresses, s searches again, Ctrl+P at other baud"
                 " rates.",
                 ALARM_KIND,
             )

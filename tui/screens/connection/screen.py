@@ -8,12 +8,13 @@ from textual.widgets import Input, OptionList
 
 from ..keys.table import CONNECTION, bindings
 from .other_settings import OtherSettings
+from .why_meant import WhyMeant
 
 if TYPE_CHECKING:
     from tui.session.console import DriveConsole
 
 
-class ConnectionScreen(OtherSettings):
+class ConnectionScreen(WhyMeant, OtherSettings):
     """What the cursor and Enter do in the two lists."""
 
     CSS_PATH = "connection.tcss"

@@ -48,6 +48,7 @@ OPEN = "Open a file: compare with it and stage what it has otherwise, or propose
 FIND = "Find a parameter by code, name, address or value, from anywhere."
 WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
 SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks."
+WHY = "Why no answer? Tell what fails at a drive that is silent, and what to look at next."
 ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
@@ -129,6 +130,7 @@ ACTIONS: tuple[Action, ...] = (
     of_app("find", "/", "", FIND),
     of_app("messages", "m", "", "Messages: everything that was said, with its time."),
     of_app("wiring", "I", "", WIRING_HELP),
+    of_app("why", "N", "", WHY),
     of_app("save_shown", "ctrl+s", "", SAVE),
     of_app("open_file", "ctrl+o", "", OPEN),
     of_app("eeprom", "S", "", EEPROM),

@@ -36,6 +36,8 @@ HEADS = {
     Phase.STOPPED: ("STOPPED", STRONG),
     Phase.FAILED: (" NOT STOPPED ", FAULT_BLOCK),
 }
+SAYS_WHY = "N says why"
+"""Told where there is room for it."""
 
 
 def state_lines(view: View, width: int) -> list[Text]:
@@ -85,7 +87,9 @@ def _lost(view: View, words: str, width: int) -> tuple[Text, list[Text]]:
     """Nothing here is the present: since when, what it was, and what the drive does about it."""
     age = age_text(view.age or 0.0)
     was = view.was or (view.snapshot.state.headline if view.snapshot else "")
-    lines = [Text(short(f"NOT KNOWN NOW for {age}", width), ALARM)]
+    known = f"NOT KNOWN NOW for {age}"
+    told = f"{known}, {SAYS_WHY}"
+    lines = [Text(short(told if len(told) <= width else known, width), ALARM)]
     lines.append(Text(short(f"was {was}" if was else "", width), FAINT))
     lines += [Text(line, ALARM) for line in wrapped(countdown(view), width, 2)]
     return Text(f" {words} ", FAULT_BLOCK), lines

@@ -10,6 +10,10 @@ from .sight import Sight
 ANSWERS = "answers"
 """The rung of a drive that answers, with nothing wrong on the way."""
 
+UNOPENED = "not-open"
+NOTHING_SEEN = "Nothing is wrong with this line as far as it is seen while it is not open."
+OPEN_IT = "Open it, then ask again: the drive is asked only on an open line."
+
 
 @dataclass(frozen=True, slots=True)
 class Diagnosis:
@@ -32,6 +36,8 @@ def diagnosed(sight: Sight) -> Diagnosis:
         if rung.fails(sight):
             return Diagnosis(rung.id, rung.says(sight), tuple(rung.steps(sight)), sight)
     heard = sight.heard
+    if not heard.asked:
+        return Diagnosis(UNOPENED, NOTHING_SEEN, (OPEN_IT,), sight)
     after = f", {sight.turnaround * 1000:.0f} ms after each request" if sight.turnaround else ""
     text = f"Address {sight.device} answers: {heard.answered} of {heard.asked} requests{after}."
     return Diagnosis(ANSWERS, text, (), sight)

@@ -67,8 +67,6 @@ def settings_hints(sight: Sight) -> Iterator[str]:
         if setting.role == "format" and len(setting.choices) == 1:
             port = setting.note.rstrip(".") or setting.parameter
             yield f"{port}: {setting.choices[0].text} only, whatever the other port has."
-    if known.note:
-        yield known.note
 
 
 def wiring_hints(sight: Sight) -> Iterator[str]:
@@ -93,6 +91,8 @@ def wiring_hints(sight: Sight) -> Iterator[str]:
     for rule in data.line_rules:
         if rule.subject.casefold() == "ports":
             yield rule.rule
+    if data.link.note:
+        yield data.link.note
 
 
 def _polarity(profile: Profile) -> str:

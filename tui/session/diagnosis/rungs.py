@@ -137,7 +137,7 @@ def _late(sight: Sight) -> bool:
 
 def _silent(sight: Sight) -> bool:
     heard = sight.heard
-    return not heard.answered and heard.nothing and not heard.echoed
+    return bool(heard.asked) and heard.nothing and not heard.echoed
 
 
 def _says_silent(sight: Sight) -> str:

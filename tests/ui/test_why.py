@@ -1,0 +1,116 @@
+"""N: why a drive does not answer, on Line and on Monitor; a stop works there."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from pathlib import Path
+
+import pytest
+from textual.pilot import Pilot
+
+from tests.bus.peer import PtyPeer, silent
+from tui.app import DrivePanelApp
+from tui.bus.link import SerialLink
+from tui.drive.profile import library
+from tui.screens.dialogs.why import WhyScreen, reason_lines
+from tui.screens.keys.finding import find
+from tui.session.connect.open_line import open_line
+from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
+from tui.session.diagnosis.heard import Heard
+from tui.session.diagnosis.sight import Sight
+
+from .test_flows import shown, until
+from .test_frame import no_ports as no_ports  # the fixture is for these tests too
+from .test_frame import panel
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
+
+
+@pytest.fixture
+def nobody() -> Iterator[PtyPeer]:
+    """A line on which nobody answers."""
+    with PtyPeer(silent) as peer:
+        yield peer
+
+
+@asynccontextmanager
+async def on_line(path: str) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]]:
+    app = DrivePanelApp(start=path, open_line=open_line)
+    async with app.run_test(size=(80, 24)) as pilot:
+        yield app, pilot
+
+
+async def told(app: DrivePanelApp, pilot: Pilot[None], words: str) -> str:
+    """Ask, and wait for what is found."""
+    await pilot.press("N")
+    await until(pilot, lambda: isinstance(app.screen, WhyScreen))
+    await until(pilot, lambda: words in shown(app, "reasons"))
+    return shown(app, "reasons")
+
+
+async def test_on_line_it_is_asked_by_the_address_and_the_profile_of_the_form(
+    nobody: PtyPeer,
+) -> None:
+    async with on_line(nobody.path) as (app, pilot):
+        await until(pilot, lambda: app.opened is not None)
+        await pilot.press("escape")
+        app.connection.form._fields["profile"].value = "atv71"
+        app.connection.form._fields["addresses"].value = "7-9"
+        text = await told(app, pilot, "Nobody answers at address 7")
+        assert "Address: ADD. At OFF (0)" in text
+        assert "Address 7 on" in shown(app, "asked")
+        assert {request[1] for request in nobody.requests} <= {3, 43}
+        # it is kept among the messages, and asked anew by the same key
+        assert "Nobody answers at address 7" in app.events.events[-1].text
+        await pilot.press("N")
+        await until(pilot, lambda: len(app.events.events) > 1)
+        await pilot.press("escape")
+        await until(pilot, lambda: app.screen is app.connection)
+
+
+async def test_a_line_that_could_not_be_opened_tells_why(tmp_path: Path) -> None:
+    path = str(tmp_path / "ttyUSB4")
+    async with on_line(f"serial:{path}") as (app, pilot):
+        await until(pilot, lambda: app.connection.refused is not None)
+        text = await told(app, pilot, "There is no port")
+        assert path in "".join(text.split())
+        assert "dmesg" in text
+
+
+async def test_a_line_that_is_not_open_is_not_opened_for_it(nobody: PtyPeer) -> None:
+    app = DrivePanelApp(open_line=open_line)
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.connection.lines.offer(nobody.path)
+        app.connection.lines.focus()
+        await pilot.pause()
+        await told(app, pilot, "Nothing is wrong with this line as far as it is seen")
+        assert app.opened is None
+        assert nobody.requests == []
+
+
+async def test_on_monitor_it_is_the_open_drive() -> None:
+    async with panel() as made:
+        await told(made.app, made.pilot, "Address 1 answers")
+        await made.pilot.press("space")
+        await made.until(lambda: "STOPPING" in made.shown("strip"))
+
+
+def silence(family: str) -> Diagnosis:
+    heard = Heard(asked=2)
+    return diagnosed(Sight(SerialLink("/dev/ttyUSB0"), 2, library.load(family), heard=heard))
+
+
+@pytest.mark.parametrize("width", [40, 70])
+@pytest.mark.parametrize("family", [listing.id for listing in library.listings()])
+def test_every_line_fits(family: str, width: int) -> None:
+    lines = list(reason_lines(silence(family), width))
+    assert max(line.cell_len for line in lines) <= width
+    joined = " ".join(" ".join(line.plain.split()) for line in lines)
+    assert all(step.rstrip(".").split()[-1] in joined for step in silence(family).steps)
+
+
+def test_it_is_found_by_its_words() -> None:
+    for query in ("why", "no answer", "silent"):
+        assert "why" in [one.action.id for one in find(query, "line")][:2], query

@@ -1,0 +1,84 @@
+"""The key that tells why a drive does not answer: which drive is meant, and looking at it."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING
+
+from tui.bus.errors import LinkSyntaxError
+from tui.bus.link import parse_link
+
+from .dialogs.why_target import WhyTarget
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+    from tui.session.diagnosis.diagnosis import Diagnosis
+
+    from .app_port import Panel
+
+
+def ask_why(app: Panel) -> None:
+    """Look at the drive that is meant on Line, else at the open one, and show what fails."""
+    meant = getattr(app.screen, "why_meant", None)
+    target: WhyTarget | None = meant() if meant is not None else _open_drive(app)
+    if target is None:
+        app.tell("No drive is meant yet: choose a line, or a drive, on Line.")
+        return
+    if target.opened is None:
+        try:
+            parse_link(target.text)
+        except LinkSyntaxError:
+            app.tell("This line is not open: Enter opens it, then N tells what does not answer.")
+            return
+    from .dialogs.why import WhyScreen
+
+    label = target.opened.label if target.opened is not None else target.text
+    about = f"Why no answer? Address {target.device} on {label}"
+    app.push_screen(WhyScreen(about, partial(_looked, target)))
+
+
+def _open_drive(app: Panel) -> WhyTarget | None:
+    """The drive that is open."""
+    console = app.chosen
+    if console is None or app.opened is None:
+        return None
+    session, found = console.session, app.fleet.found if app.fleet is not None else {}
+    return WhyTarget(
+        app.opened.text,
+        session.device,
+        app.opened,
+        session.profile.id,
+        tuple(one for one in found if one != session.device),
+    )
+
+
+async def _looked(target: WhyTarget) -> Diagnosis:
+    """What is seen, and which rung of the ladder fails."""
+    from tui.session.diagnosis.asking import profile_remembered, sight_of_drive, sight_of_port
+    from tui.session.diagnosis.diagnosis import diagnosed
+
+    opened = target.opened
+    link = opened.line.link if opened is not None else parse_link(target.text)
+    profile = await asyncio.to_thread(_profile, target)
+    profile = profile or await asyncio.to_thread(profile_remembered, link, target.device)
+    if opened is None:
+        seen = await asyncio.to_thread(sight_of_port, link, target.device, target.trouble)
+        return diagnosed(replace(seen, profile=profile))
+    line = opened.line
+    answer = [one for one in target.neighbours if line.device_state(one).answers]
+    changed = opened.known.text if opened.known is not None else ""
+    return diagnosed(
+        await sight_of_drive(line, target.device, profile, changed=changed, neighbours=answer)
+    )
+
+
+def _profile(target: WhyTarget) -> Profile | None:
+    from tui.drive.errors import DriveError
+    from tui.drive.profile import library
+
+    try:
+        return library.load(target.profile) if target.profile else None
+    except DriveError:
+        return None  # told where it was typed
