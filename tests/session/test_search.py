@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import cast
 
 import pytest
 
+from tests.bus.peer import PtyPeer, Step
 from tui.bus.api import DeviceState, IdentificationObjects, ModbusLine, Priority
 from tui.bus.errors import (
     ChecksumFault,
@@ -21,7 +22,7 @@ from tui.bus.errors import (
     Superseded,
     WrongReply,
 )
-from tui.bus.line import Timing
+from tui.bus.line import Line, Timing
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.schedule.pace import Pace
 from tui.drive.profile import library
@@ -30,6 +31,7 @@ from tui.session.connect.open_line import demo_line, open_line
 from tui.session.connect.search import REST, Search
 from tui.session.connect.strangers import JITTER
 from tui.session.drive import DriveSession
+from tui.simulator import DriveSpec, Simulation
 
 
 @dataclass
@@ -144,7 +146,24 @@ async def test_who_answers_too_late_is_heard_and_asked_again() -> None:
     line = Replies({1}, late={3}, heard_late={3})
     assert devices(await searched(Search(range(1, 5), line.no_time, once=True), line)) == [1, 3]
     assert (line.background(), line.patiently()) == ([1, 2, 3, 4], [3])
-    assert line.waits[-1] is not None
+
+
+async def test_a_drive_with_a_long_response_delay_is_found() -> None:
+    simulation = Simulation([DriveSpec("powerdrive", 3), DriveSpec("atv71", 5)], any_settings=True)
+
+    def script(request: bytes, _count: int) -> Sequence[Step]:
+        reply = simulation.line.receive(request)
+        return [0.1, reply.data] if reply is not None else []
+
+    with simulation, PtyPeer(script) as peer:
+        line = Line(SerialLink(peer.path))
+        line.open(wait=10.0)
+        try:
+            results = await searched(Search(range(1, 12), once=True), line)
+        finally:
+            line.close()
+    assert devices(results) == [3, 5]
+    assert [one.by for one in results] == ["read of register 1039", "function 43"]
 
 
 async def test_what_is_called_between_two_addresses_may_end_the_search() -> None:
