@@ -5,10 +5,27 @@ from __future__ import annotations
 from .defect import Defect
 
 STOPS = "tests/bus/test_share_stops.py"
+GATEWAYS = "tests/bus/test_share_gateways.py"
 FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
 
 DEFECTS = (
+    Defect(
+        "no-way-past-not-told",
+        "tui/bus/share/direct.py",
+        "            self._dispatcher.fail_all(self.trouble, LineLost)",
+        "            pass",
+        "A stop past a frozen owner waits for ever on a gateway that takes one connection.",
+        (GATEWAYS,),
+    ),
+    Defect(
+        "silent-gateway-not-told",
+        "tui/bus/share/direct.py",
+        "elif isinstance(error, NoAnswer) and not isinstance(self._inside.link, SerialLink):",
+        "elif False:",
+        "A drive is called silent whose gateway serves nobody but a frozen program.",
+        (f"{GATEWAYS}::test_a_gateway_with_one_connection_is_told_of_with_what_to_do",),
+    ),
     Defect(
         "frozen-client-kept",
         "tui/bus/share/signs.py",

@@ -78,7 +78,7 @@ class ShareClient:
         self._note = ""
         self._wish: tuple[dict[int, float], bool] = ({}, False)
         self._past = past
-        self._gone = False
+        self._gone, self._told = False, ""
         self.again = False
         """Whether this program was attached to the line before."""
         self.heard = inside.clock()
@@ -216,27 +216,23 @@ class ShareClient:
             heard = self.heard
             silent = inside.clock() - heard
             if not self.frozen and silent > SILENT_OWNER and looks >= SILENT_OWNER / WATCH_INTERVAL:
-                self._freeze()
+                log.error("%s owns the line and does not answer", self._owner.program.text)
+                self._past.begin()
             if self.frozen:
                 self._help_stops(silent)
-
-    def _freeze(self) -> None:
-        self._past.begin()
-        who = self._owner.program.text
-        log.error("%s owns the line and does not answer", who)
-        self._say(
-            LineStatus.LOST,
-            f"{who} owns the line and does not answer. Stops go out past it; all else waits.",
-        )
 
     def _hear_life(self) -> None:
         self.heard = self._inside.clock()
         if self.frozen:
             self._past.leave()
+            self._told = ""
             self._tell_state()
 
     def _help_stops(self, silent: float) -> None:
         """Send stops past the frozen owner; tell others that they wait in vain."""
+        if (told := self._past.told) != self._told:
+            self._told = told
+            self._say(LineStatus.LOST, told)
         self._asked.send_past()
         for job in self._inside.dispatcher.take_all():
             self._asked.send(job)

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import asyncio
 import logging
+from concurrent.futures import Future
 from contextlib import suppress
 
-from ..errors import LineError
-from ..link import TcpLink
-from ..model import Priority
+from ..errors import LineError, LineLost, NoAnswer
+from ..link import RtuTcpLink, SerialLink, TcpLink
+from ..model import Priority, Reply
+from ..program import Program
 from ..requests import BROADCAST
 from ..schedule.connection import open_master
 from ..schedule.dispatcher import Dispatcher
@@ -19,12 +21,19 @@ from .turn import Turn
 log = logging.getLogger(__name__)
 
 PORT_AGAIN = 0.5
+GATEWAY_HELD = " A gateway that takes one connection only is held by it."
+GIVEN_UP = 3.0
+"""Seconds after which a stop that finds no way past the owner is told so, and fails."""
 
 
 class DirectStops:
     """Sends the stops of this program, and the reads that see their motors stop."""
 
-    def __init__(self, inside: LineInside, turn: Turn) -> None:
+    def __init__(self, inside: LineInside, turn: Turn, owner: Program) -> None:
+        self.trouble = ""
+        """Why no stop gets past the owner, and what to do; empty while nothing is known of it."""
+        self._failing_since: float | None = None
+        self._owner = owner
         self._inside = inside
         self._turn = turn
         self._echo: bool | None = None
@@ -54,6 +63,7 @@ class DirectStops:
             or (device not in self._stops and BROADCAST not in self._stops)
         ):
             return False
+        job.answer.add_done_callback(self._note_end)
         self._dispatcher.submit(job)
         if self._task is None:
             self._task = asyncio.get_running_loop().create_task(self._serve(), name="direct stops")
@@ -71,10 +81,29 @@ class DirectStops:
                     pause = await self._serve_some()
             except LineError as error:
                 log.error("a stop past the owner: %s", error)
+                self._note_failure(error)
                 pause = PORT_AGAIN
             if self._dispatcher.left:
                 return
             await asyncio.sleep(pause)
+
+    def _note_failure(self, error: LineError) -> None:
+        """There is no way past the owner just now: say so, and after a while fail what waits."""
+        now = self._inside.clock()
+        self._failing_since = self._failing_since or now
+        self.trouble = no_way_past(self._owner, self._inside.link, str(error))
+        if now - self._failing_since > GIVEN_UP:
+            self._dispatcher.fail_all(self.trouble, LineLost)
+
+    def _note_end(self, answer: Future[Reply]) -> None:
+        """What became of a request; over a network the gateway may be silent, not the drive."""
+        if answer.cancelled():
+            return
+        error = answer.exception()
+        if not isinstance(error, LineError):
+            self.trouble, self._failing_since = "", None
+        elif isinstance(error, NoAnswer) and not isinstance(self._inside.link, SerialLink):
+            self.trouble = no_way_past(self._owner, self._inside.link, str(error))
 
     async def _serve_some(self) -> float:
         inside = self._inside
@@ -104,3 +133,12 @@ class DirectStops:
                 self._inside.dispatcher.submit(again)
         for job in self._dispatcher.take_all():
             self._inside.dispatcher.put_back(job)
+
+
+def no_way_past(owner: Program, link: SerialLink | TcpLink | RtuTcpLink, why: str) -> str:
+    """That stops do not get past an owner which is frozen, and what to do, for a person."""
+    gateway = "" if isinstance(link, SerialLink) else GATEWAY_HELD
+    return (
+        f"No stop gets past {owner.text}, which owns the line and does not answer: {why}{gateway}"
+        f" End that program (kill -9 {owner.pid}): then stops go out."
+    )

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 
 from ..model import Priority
+from ..program import Program
 from ..requests import BROADCAST
 from ..schedule.inside import LineInside
 from ..schedule.queue import Job
@@ -19,15 +20,26 @@ from .turn import Turn
 class PastOwner:
     """The stops of one client past one owner; lives in the line's loop."""
 
-    def __init__(self, inside: LineInside, stops_past: StopsPast, turn: Turn) -> None:
+    def __init__(
+        self, inside: LineInside, stops_past: StopsPast, turn: Turn, owner: Program
+    ) -> None:
         self.at_work = False
         """Whether the owner is frozen."""
         self._inside = inside
         self._stops_past = stops_past
         self._turn = turn
+        self._owner = owner
         self._direct: DirectStops | None = None
         self._ending: asyncio.Task[None] | None = None
         self._noted: dict[int, tuple[int, ...]] = {}
+
+    @property
+    def told(self) -> str:
+        """What becomes of the line while its owner is frozen, for a person."""
+        if self._direct is not None and self._direct.trouble:
+            return self._direct.trouble
+        who = self._owner.text
+        return f"{who} owns the line and does not answer. Stops go out past it; all else waits."
 
     def begin(self) -> None:
         """The owner does not answer: take stops from now on."""
@@ -61,7 +73,7 @@ class PastOwner:
         if self._direct is None:
             if job.priority is not Priority.STOP:
                 return False
-            self._direct = DirectStops(self._inside, self._turn)
+            self._direct = DirectStops(self._inside, self._turn, self._owner)
         if job.priority is Priority.STOP and job.request.changes:
             self._note(job.request.device)
         return self._direct.take(job)

@@ -84,8 +84,9 @@ class Sharing:
 
     async def _attend(self, owner: Owner, say: Say) -> None:
         """Be a client of an owner until it ends."""
-        past = PastOwner(self._inside, StopsPast(self._place), Turn(self._place))
-        self._client = client = ShareClient(self._inside, owner, say, past)
+        inside, place = self._inside, self._place
+        past = PastOwner(inside, StopsPast(place), Turn(place), owner.program)
+        self._client = client = ShareClient(inside, owner, say, past)
         client.again, self._attached = self._attached, True
         try:
             await client.serve()

@@ -21,7 +21,7 @@ from ..shared.options import (
     read_only_option,
 )
 from ..shared.output import print_json
-from .orders import close_journal, told_journal
+from .orders import close_journal, complain, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -76,13 +76,18 @@ def stop(
         raise click.UsageError("--give-back is for one drive, not for several.")
     if read_only:
         raise Failure("The line is read-only: nothing is written, a stop neither.", REFUSED_HERE)
+    from tui.bus.api import LineStatus
+
     order: OrderId = "quick-stop" if quick else "freewheel" if freewheel else "stop"
     devices = _devices(addresses) if every else [one.device for one in target.each()]
     telling = StopTelling(target.line_text, as_json=as_json)
 
     async def work(opened: OpenLine) -> int:
         if every or target.others:
-            return await _stop_all(opened, devices, order, target.profile_id, telling)
+            status = await _stop_all(opened, devices, order, target.profile_id, telling)
+            if status and opened.line.state.status is LineStatus.LOST:
+                complain(opened.line.state.reason)
+            return status
         status, session = await _stop_one(opened, target, order, telling)
         if give_back and not status:
             from ..running.giving_back import give_control_back
@@ -129,11 +134,15 @@ async def _stop_one(
     Returns the exit status, and the session with it. Raises UsageError where it is not known what
     stops it, NoAnswer where it is not there.
     """
+    from tui.bus.errors import LineLost
     from tui.session.command.stop import Stopper
 
     journal = told_journal()
     try:
-        found = await first_stopped(opened, target, order, journal, telling)
+        try:
+            found = await first_stopped(opened, target, order, journal, telling)
+        except LineLost as lost:
+            raise LineLost(f"NOT STOPPED: {lost} Stop it at the machine.") from lost
         look_after(opened, found.session, target.line_text)
         stopper = Stopper(opened.line, journal)
         return await _seen_through(stopper, found, order, telling), found.session

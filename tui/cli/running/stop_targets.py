@@ -42,7 +42,7 @@ async def first_stopped(
     opened: OpenLine, target: Target, order: OrderId, journal: Journal, telling: StopTelling
 ) -> StoppableDrive:
     """Send the first word, then find out what the drive is; both are told."""
-    from tui.bus.api import Priority
+    from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import ExchangeError, NoAnswer
     from tui.drive.profile import library
     from tui.drive.profile.stop_facts import stop_facts
@@ -70,7 +70,10 @@ async def first_stopped(
     telling.sent_first(device, first.sent, says)
     if silent is not None and not first.answered:
         hint = "" if typed else " -p sends a stop word blind."
-        text = f"NOT STOPPED: Device {device} did not answer. Stop it at the machine.{hint}"
+        # past a frozen owner of the line: what keeps the stop from the drive
+        away = opened.line.state.status is LineStatus.LOST
+        why = f" {opened.line.state.reason}" if away else ""
+        text = f"NOT STOPPED: Device {device} did not answer. Stop it at the machine.{hint}{why}"
         raise NoAnswer(device, silent.function, silent.address, text)
     found = await asyncio.to_thread(_by_what_is_known, opened, identity, typed, named, first)
     if found is None and first.sent:
