@@ -28,6 +28,7 @@ from threading import Lock
 from tests.defects import (
     bus,
     commanding,
+    diagnosis,
     drive,
     finding,
     identity,
@@ -55,6 +56,7 @@ DEFECTS: tuple[Defect, ...] = (
     *lines.DEFECTS,
     *listening.DEFECTS,
     *finding.DEFECTS,
+    *diagnosis.DEFECTS,
     *teaching.DEFECTS,
     *terminal.DEFECTS,
     *sharing.DEFECTS,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -11,6 +12,7 @@ import pytest
 from tests.adapters import Adapters
 from tests.adapters import adapters as adapters  # the fixture is for these tests too
 from tests.bus.peer import PtyPeer, TcpPeer, honest, silent, tcp_reply, tcp_request_length
+from tests.programs import DRIVEPANEL, served
 from tui.bus.fake import FakeLine
 from tui.bus.link import SerialLink, TcpLink
 from tui.session.connect.known_line import KnownLine
@@ -93,3 +95,24 @@ def test_a_gateway() -> None:
 def test_what_is_no_line_is_a_fault_of_usage() -> None:
     assert "is not a line" in ended(2, "why", "nosuch").stderr
     assert "no profile" in ended(2, "why", "sim:atv71", "-p", "nosuch").stderr
+
+
+def test_what_the_drive_does_that_is_asked_no_more_is_told() -> None:
+    with tcp_line("atv21@1", "--set", "F803=30") as line:
+        assert "F803" in ended(0, "why", line).stderr
+
+
+@posix
+def test_beside_a_program_that_owns_the_line(tmp_path: Path) -> None:
+    """Its frames are told with a delay; it has the port, and that is no trouble."""
+
+    def script(request: bytes, count: int) -> Sequence[bytes | float]:
+        return honest(request, count) if request[0] == 1 else []
+
+    with PtyPeer(script) as peer:
+        owner = [*DRIVEPANEL, "watch", peer.path, "-p", "atv71", "--every", "0.2", "ETA"]
+        with served(owner, ready="ETA"):
+            told = json.loads(run(0, "why", peer.path, "-p", "atv71", "--json"))
+            assert (told["rung"], told["seen"]["answered"] >= 5) == ("answers", True)
+            told = json.loads(run(3, "why", peer.path, "-p", "atv71", "-d", "3", "--json"))
+            assert told["rung"] == "silence"

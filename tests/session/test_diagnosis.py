@@ -9,6 +9,8 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from tests.adapters import Adapters
 from tests.adapters import adapters as adapters  # the fixture is for these tests too
@@ -24,12 +26,13 @@ from tests.bus.peer import (
     tcp_request_length,
 )
 from tests.misheard import misheard
-from tui.bus.api import ModbusLine
+from tui.bus.api import ModbusLine, Priority, Reply
 from tui.bus.errors import (
     ChecksumFault,
     DeviceException,
     ExchangeError,
     LineError,
+    LineLost,
     NoAnswer,
     NotShared,
     PortBusy,
@@ -44,12 +47,13 @@ from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.port_seen import PortSeen
 from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
 from tui.session.connect.known_line import KnownLine
 from tui.session.diagnosis.asking import sight_of_drive, sight_of_port
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
 from tui.session.diagnosis.heard import Heard, heard_by_errors
 from tui.session.diagnosis.rungs import LADDER
-from tui.session.diagnosis.sight import Sight
+from tui.session.diagnosis.sight import AdapterSeen, Sight
 from tui.wire.frames import frame
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="no pseudo-terminals here")
@@ -57,8 +61,6 @@ PROFILE = library.load("atv71")
 SHORT = Timing(first_timeout=0.3, min_timeout=0.3, late_reply=0.4, retries=0)
 PORT = "/dev/ttyUSB0"
 LINK = SerialLink(PORT)
-PROVOKED: set[str] = set()
-"""Rungs that a test has seen to fail."""
 
 OpenedLine = Callable[[Link | str], Line]
 
@@ -87,7 +89,6 @@ async def why(line: ModbusLine, device: int = 2, family: str | None = "atv71") -
 
 def told(found: Diagnosis) -> Diagnosis:
     """The same, after a look at its form: one sentence, and steps that are sentences."""
-    PROVOKED.add(found.rung)
     assert found.text.endswith(".")
     assert ". " not in found.text
     assert found.well is (not found.steps)
@@ -425,6 +426,23 @@ async def test_nothing_is_ever_written(line: OpenedLine) -> None:
                 assert {request[1] for request in peer.requests} <= {3, 4, 43}, family
 
 
+async def test_it_asks_as_an_operator_does() -> None:
+    seen: list[Priority] = []
+
+    class Listening(FakeLine):
+        async def read(
+            self, device: int, address: int, count: int = 1, *,
+            priority: Priority = Priority.POLL, function: int = 3, max_age: float = 0.0,
+            within: float | None = None,
+        ) -> Reply:  # fmt: skip
+            seen.append(priority)
+            return await super().read(device, address, count, priority=priority)
+
+    made = Listening({2: {PROFILE["ETA"].address: 0x0237}}, link=TcpLink("gateway"))
+    assert (await why(made)).well
+    assert seen == [Priority.OPERATOR_READ] * 5
+
+
 # Where no frames are at hand: a line that another program owns tells errors alone
 
 
@@ -493,6 +511,58 @@ def test_a_format_that_the_family_has_not() -> None:
     assert found.steps[0] == "Altivar 71 has no 8O2: it has 8O1, 8E1, 8N1, 8N2."
 
 
-def test_every_rung_was_provoked() -> None:
-    if len(PROVOKED) > 5:  # not where a test is run alone
-        assert {rung.id for rung in LADDER} <= PROVOKED
+# The ladder as a whole
+
+ASKED = Sight(LINK, 2, PROFILE, port=PortSeen(PORT))
+EXAMPLES = {
+    "renumbered": replace(ASKED, adapter=AdapterSeen("/dev/serial/by-id/a", "/dev/ttyUSB1")),
+    "changed": replace(ASKED, changed="It was a pump.", heard=Heard(asked=5, answered=5)),
+    "no-port": replace(ASKED, trouble=PortMissing(PORT)),
+    "no-permission": replace(ASKED, port=PortSeen(PORT, permitted=False)),
+    "busy": replace(ASKED, trouble=PortBusy(PORT)),
+    "port-refused": replace(ASKED, trouble=PortRefused(PORT, "it does not take 8E1.")),
+    "line-lost": replace(ASKED, trouble=LineLost("The port went away.")),
+    "withheld": replace(ASKED, withheld="A proof is going on."),
+    "slow-adapter": replace(
+        ASKED, port=PortSeen(PORT, latency=16), heard=Heard(asked=5, answered=5), turnaround=0.02
+    ),
+    "wrong-settings": replace(ASKED, heard=Heard(asked=2, garbage=9)),
+    "silence": replace(ASKED, heard=Heard(asked=2)),
+    "late": replace(ASKED, heard=Heard(asked=2, late=1)),
+    "echo": replace(ASKED, heard=Heard(asked=2, echoed=2)),
+    "checksum": replace(ASKED, heard=Heard(asked=5, answered=3, damaged=2)),
+    "other-address": replace(ASKED, heard=Heard(asked=2, others=(7,))),
+    "wrong-function": replace(ASKED, heard=Heard(asked=2, functions=(4,))),
+    "gateway": replace(ASKED, heard=Heard(asked=2, exceptions=(11, 11))),
+    "exception": replace(ASKED, heard=Heard(asked=2, exceptions=(2, 2))),
+    "answers": replace(ASKED, heard=Heard(asked=5, answered=5)),
+    "not-open": ASKED,
+}
+
+
+@pytest.mark.parametrize("rung", EXAMPLES)
+def test_what_is_seen_leads_to_its_rung(rung: str) -> None:
+    assert of(EXAMPLES[rung]).rung == rung
+
+
+def test_every_rung_has_an_example() -> None:
+    assert {rung.id for rung in LADDER} | {"answers", "not-open"} == set(EXAMPLES)
+
+
+FEW = st.integers(0, 3)
+CODES = st.lists(st.sampled_from([1, 2, 10, 11]), max_size=2).map(tuple)
+
+
+@given(
+    st.builds(
+        Heard, asked=st.integers(1, 5), late=FEW, echoed=FEW, exceptions=CODES,
+        functions=CODES, misshapen=FEW, others=CODES, damaged=FEW, garbage=FEW,
+    ),
+    st.sampled_from([*map(library.load, ("atv71", "powerdrive")), None]),
+)  # fmt: skip
+def test_a_drive_that_has_not_answered_is_never_said_to_be_well(
+    heard: Heard, profile: Profile | None
+) -> None:
+    found = of(Sight(LINK, 2, profile, heard=heard))
+    assert found.rung not in ("answers", "not-open")
+    assert found.steps

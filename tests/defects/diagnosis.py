@@ -1,0 +1,76 @@
+"""Defects of why a drive does not answer: the wrong rung is told, or the drive is disturbed."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+LADDER = "tests/session/test_diagnosis.py"
+COMMAND = "tests/cli/test_why.py"
+PORTS = "tests/bus/test_port_errors.py"
+
+DEFECTS = (
+    Defect(
+        "silent-drive-said-to-be-well",
+        "tui/session/diagnosis/rungs.py",
+        "return bool(heard.asked) and heard.nothing and not heard.echoed",
+        "return bool(heard.asked) and heard.nothing and bool(sight.neighbours)",
+        "A script takes a line on which nobody answers for a good one.",
+        (f"{LADDER}::test_a_drive_that_has_not_answered_is_never_said_to_be_well",),
+    ),
+    Defect(
+        "echo-taken-for-an-answer",
+        "tui/session/diagnosis/heard.py",
+        "        if not tcp and data == request:\n",
+        "        if not tcp and data == asked:\n",
+        "An adapter that repeats what is sent is taken for the drive.",
+        (f"{LADDER}::test_only_the_echo_comes_back",),
+    ),
+    Defect(
+        "other-speed-told-the-wrong-way-round",
+        "tui/session/diagnosis/garbled.py",
+        "wanted = sight.link.baud * due / came",
+        "wanted = sight.link.baud * came / due",
+        "A person is sent to a baud on which the drive is heard even less.",
+        (f"{LADDER}::test_bytes_that_came_at_another_baud_tell_which",),
+    ),
+    Defect(
+        "families-own-exception-taken-for-a-gateways",
+        "tui/session/diagnosis/rungs.py",
+        "if code in GATEWAY_CODES and code not in own]",
+        "if code in own]",
+        "A gateway that does not reach the drive is looked for in the drive.",
+        (f"{LADDER}::test_a_gateway_answers_in_the_drives_place",),
+    ),
+    Defect(
+        "latency-told-unmeasured",
+        "tui/session/diagnosis/rungs.py",
+        "return not sight.heard.damaged and late * 1000 >= held * SEEN_OF_IT",
+        "return not sight.heard.damaged",
+        "An adapter that holds nothing back is blamed.",
+        (f"{LADDER}::test_latency_is_told_where_it_is_set_and_measured",),
+    ),
+    Defect(
+        "old-counts-taken-for-new",
+        "tui/bus/transport/port_errors.py",
+        "grown = [now - then for now, then in zip(self, before, strict=True)]",
+        "grown = [now + 0 * then for now, then in zip(self, before, strict=True)]",
+        "What the port counted last week is taken for a wrong baud today.",
+        (f"{PORTS}::test_what_was_added_is_counted_where_an_answer_fails",),
+    ),
+    Defect(
+        "asked-at-a-stops-priority",
+        "tui/session/diagnosis/asking.py",
+        "device, address, 1, priority=Priority.OPERATOR_READ, function=function",
+        "device, address, 1, priority=Priority.FEED, function=function",
+        "Asking why goes before the commands of an operator.",
+        (f"{LADDER}::test_it_asks_as_an_operator_does",),
+    ),
+    Defect(
+        "why-ends-well-for-a-script",
+        "tui/cli/commands/why.py",
+        "    if not found.well:\n        raise click.exceptions.Exit(LINE_TROUBLE)\n",
+        "",
+        "A script goes on with a drive that does not answer.",
+        (f"{COMMAND}::test_a_port_that_is_not_there",),
+    ),
+)
