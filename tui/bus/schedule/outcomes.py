@@ -92,8 +92,11 @@ class Outcomes:
             self._tally.count_reply(device, result.turnaround)
 
     def _share(self, job: Job, result: ExchangeResult) -> None:
-        """Keep what was read, while there is another program that may want it."""
-        if len(self._facts.programs) > 1:
+        """Keep what was read, while somebody else may want it.
+
+        Another program, or another client of this one: a gateway takes what was read before.
+        """
+        if len(self._facts.programs) > 1 or job.max_age:
             self.values.note(job.request, job.request.words(result.pdu), result.end)
 
     def _failed(self, job: Job, result: ExchangeResult, now: float) -> bool:

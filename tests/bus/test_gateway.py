@@ -1,0 +1,148 @@
+"""Modbus TCP for others: requests taken apart strictly, and answers that keep their transaction."""
+
+from __future__ import annotations
+
+import asyncio
+import struct
+from contextlib import suppress
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from tui.bus.gateway.pdu import (
+    IdentifyAsked,
+    ReadAsked,
+    Unanswerable,
+    WriteAsked,
+    exception_pdu,
+    gateway_asked,
+    identified_pdu,
+    words_pdu,
+    written_pdu,
+)
+from tui.bus.gateway.server import HEADER, TcpClient, TcpGateway
+
+
+def test_what_each_function_asks() -> None:
+    assert gateway_asked(bytes.fromhex("03 0C81 0002")) == ReadAsked(3, 3201, 2)
+    assert gateway_asked(bytes.fromhex("04 0000 007D")) == ReadAsked(4, 0, 125)
+    assert gateway_asked(bytes.fromhex("06 2135 0007")) == WriteAsked(6, 8501, (7,))
+    many = gateway_asked(bytes.fromhex("10 2135 0002 04 000F 01F4"))
+    assert many == WriteAsked(16, 8501, (15, 500))
+    assert isinstance(many, WriteAsked)
+    assert many.words == {8501: 15, 8502: 500}
+    both = gateway_asked(bytes.fromhex("17 0C81 0001 2135 0001 02 0007"))
+    assert both == WriteAsked(23, 8501, (7,), 3201, 1)
+    assert gateway_asked(bytes.fromhex("2B 0E 01 00")) == IdentifyAsked(1, 0)
+
+
+@pytest.mark.parametrize(
+    ("pdu", "code"),
+    [
+        ("01 0000 0001", 1),
+        ("05 0000 FF00", 1),
+        ("0F 0000 0001 01 01", 1),
+        ("16 0000 00F2 0025", 1),
+        ("2B 0D 01 00", 1),
+        ("03 0000 007E", 3),
+        ("03 0000 0000", 3),
+        ("03 FFFF 0002", 2),
+        ("03 0000", 3),
+        ("06 2135 0007 00", 3),
+        ("10 2135 0002 02 000F", 3),
+        ("10 2135 0001 04 000F 01F4", 3),
+        ("10 2135 0001 02 00", 3),
+        ("17 0C81 0001 2135 0002 02 0007", 3),
+        ("2B 0E 05 00", 3),
+    ],
+)
+def test_what_is_not_exactly_a_request_is_refused(pdu: str, code: int) -> None:
+    with pytest.raises(Unanswerable) as refused:
+        gateway_asked(bytes.fromhex(pdu))
+    assert refused.value.code == code
+
+
+@given(st.binary(min_size=1, max_size=253))
+def test_no_bytes_break_it(pdu: bytes) -> None:
+    with suppress(Unanswerable):
+        gateway_asked(pdu)
+
+
+def test_answers_as_bytes() -> None:
+    assert words_pdu(3, [0x0237, 0]) == bytes.fromhex("03 04 0237 0000")
+    assert written_pdu(WriteAsked(6, 8501, (7,))) == bytes.fromhex("06 2135 0007")
+    assert written_pdu(WriteAsked(16, 8501, (7, 8))) == bytes.fromhex("10 2135 0002")
+    assert exception_pdu(16, 11) == bytes.fromhex("90 0B")
+
+
+def test_an_identification_that_is_too_long_goes_on_at_its_next_object() -> None:
+    objects = {0: b"T" * 100, 1: b"A" * 100, 2: b"V" * 100}
+    first = identified_pdu(IdentifyAsked(1, 0), 0x81, objects)
+    assert first[:7] == bytes.fromhex("2B 0E 01 81 FF 02 02")
+    rest = identified_pdu(IdentifyAsked(1, 2), 0x81, objects)
+    assert rest == bytes.fromhex("2B 0E 01 81 00 00 01 02 64") + b"V" * 100
+    with pytest.raises(Unanswerable):
+        identified_pdu(IdentifyAsked(4, 9), 0x81, objects)
+
+
+# The server
+
+
+async def _asked(writer: asyncio.StreamWriter, transaction: int, unit: int, pdu: bytes) -> None:
+    writer.write(HEADER.pack(transaction, 0, len(pdu) + 1, unit) + pdu)
+    await writer.drain()
+
+
+async def _answer(reader: asyncio.StreamReader) -> tuple[int, int, bytes]:
+    transaction, _, length, unit = HEADER.unpack(await reader.readexactly(HEADER.size))
+    return transaction, unit, await reader.readexactly(length - 1)
+
+
+async def test_requests_that_pile_up_get_the_answers_of_their_own_transactions() -> None:
+    """The first answer is awaited for long; the second request comes in meanwhile."""
+    free = asyncio.Event()
+
+    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
+        if unit == 1:
+            await free.wait()
+        return bytes([3, 2, 0, unit])
+
+    gateway = TcpGateway(answer)
+    reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
+    read = struct.pack(">BHH", 3, 0, 1)
+    await _asked(writer, 7, 1, read)
+    await _asked(writer, 8, 2, read)
+    await asyncio.sleep(0.05)
+    free.set()
+    assert await _answer(reader) == (7, 1, bytes([3, 2, 0, 1]))
+    assert await _answer(reader) == (8, 2, bytes([3, 2, 0, 2]))
+    writer.close()
+    await gateway.close()
+
+
+async def test_one_client_that_waits_holds_up_no_other() -> None:
+    gone: list[str] = []
+
+    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
+        if unit == 1:
+            await asyncio.Event().wait()
+        if unit == 2:
+            raise KeyError("a fault of the program")
+        return bytes([3, 2, 0, unit])
+
+    gateway = TcpGateway(answer, lambda client: gone.append(client.peer))
+    place = await gateway.listen("127.0.0.1", 0)
+    _, stuck = await asyncio.open_connection(*place)
+    await _asked(stuck, 1, 1, bytes([3, 0, 0, 0, 1]))
+    reader, writer = await asyncio.open_connection(*place)
+    await _asked(writer, 2, 2, bytes([3, 0, 0, 0, 1]))
+    assert await _answer(reader) == (2, 2, bytes([0x83, 4]))
+    await _asked(writer, 3, 3, bytes([3, 0, 0, 0, 1]))
+    assert await _answer(reader) == (3, 3, bytes([3, 2, 0, 3]))
+    writer.write(b"GET / HTTP/1.1\r\n\r\n")
+    assert await reader.read() == b""
+    await gateway.close()
+    assert len(gone) == 2
+    stuck.close()
+    writer.close()

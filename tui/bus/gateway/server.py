@@ -1,0 +1,120 @@
+"""A Modbus TCP server that hands each request to somebody who answers in his own time.
+
+pymodbus' server keeps one request of a connection at hand: an answer that is awaited would leave
+with the transaction id of whatever came meanwhile, so frames are taken apart and put together
+here. Requests of one connection are answered in their order, those of several beside each other.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import struct
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from dataclasses import dataclass
+
+from .pdu import DEVICE_FAILURE, exception_pdu
+
+log = logging.getLogger(__name__)
+
+HEADER = struct.Struct(">HHHB")
+LONGEST_PDU = 253
+MOST_CLIENTS = 64
+"""Connections at a time; one more is closed at once."""
+IDLE_CLIENT_ENDS_AFTER = 600.0
+"""Seconds after which a connection that asks nothing, or takes no answer, is closed."""
+
+
+@dataclass(frozen=True, slots=True)
+class TcpClient:
+    """One connection, for as long as it lasts."""
+
+    number: int
+    peer: str
+    """Host and port that it comes from."""
+
+
+TcpAnswer = Callable[[TcpClient, int, bytes], Awaitable[bytes]]
+"""Is given the client, the unit id and the bytes of a request; gives the bytes of the answer."""
+
+
+class TcpGateway:
+    """Listens, and answers until it is closed; lives in one loop."""
+
+    def __init__(
+        self, answer: TcpAnswer, gone: Callable[[TcpClient], None] = lambda _: None
+    ) -> None:
+        self._answer = answer
+        self._gone = gone
+        self._server: asyncio.Server | None = None
+        self._tasks: set[asyncio.Task[None]] = set()
+        self._count = 0
+
+    async def listen(self, host: str, port: int) -> tuple[str, int]:
+        """Listen at an address; returns it with the port that was found for 0. Raises OSError."""
+        self._server = await asyncio.start_server(self._serve, host, port)
+        found = self._server.sockets[0].getsockname()
+        return found[0], found[1]
+
+    async def close(self) -> None:
+        """Take no more connections, and end those that are."""
+        if self._server is not None:
+            self._server.close()
+        tasks = tuple(self._tasks)
+        for task in tasks:
+            task.cancel()
+        await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+        task = asyncio.current_task()
+        assert task is not None
+        if len(self._tasks) >= MOST_CLIENTS:
+            log.warning("a further Modbus TCP client was turned away: %d are here", MOST_CLIENTS)
+            writer.close()
+            return
+        self._tasks.add(task)
+        self._count += 1
+        client = TcpClient(self._count, peer_text(writer.get_extra_info("peername")))
+        try:
+            await self._converse(client, reader, writer)
+        except (OSError, EOFError, TimeoutError) as error:
+            log.info("Modbus TCP client %s has gone: %s", client.peer, error or "idle")
+        except asyncio.CancelledError:
+            # closing the gateway is no error of this connection
+            return
+        finally:
+            self._tasks.discard(task)
+            self._gone(client)
+            with suppress(OSError, RuntimeError):
+                writer.close()
+
+    async def _converse(
+        self, client: TcpClient, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+    ) -> None:
+        while True:
+            async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
+                head = await reader.readexactly(HEADER.size)
+            transaction, protocol, length, unit = HEADER.unpack(head)
+            if protocol != 0 or not 2 <= length <= LONGEST_PDU + 1:
+                log.warning("what %s sends is no Modbus TCP; it is let go", client.peer)
+                return
+            async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
+                pdu = await reader.readexactly(length - 1)
+            try:
+                reply = await self._answer(client, unit, pdu)
+            except Exception:
+                # one request that nobody foresaw ends no connection
+                log.exception("a request of %s: %s", client.peer, pdu.hex())
+                reply = exception_pdu(pdu[0], DEVICE_FAILURE)
+            writer.write(HEADER.pack(transaction, 0, len(reply) + 1, unit) + reply)
+            async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
+                await writer.drain()
+
+
+def peer_text(peer: object) -> str:
+    """Where a connection comes from, as a person writes it."""
+    if not isinstance(peer, tuple) or len(peer) < 2:
+        return "somewhere"
+    host, port = str(peer[0]), peer[1]
+    return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
