@@ -1,0 +1,123 @@
+"""What a word of somebody else's program does to a drive, by its profile alone."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.drive.foreign_write import (
+    ALL,
+    WordKind,
+    foreign_words,
+    setting_refusal,
+    stop_deciding_codes,
+    value_refusal,
+)
+from tui.drive.profile import library
+from tui.drive.profile.profile import Profile
+
+ATV71, ATV31, ATV21 = library.load("atv71"), library.load("atv31"), library.load("atv21")
+POWERDRIVE = library.load("powerdrive")
+DRIVECOM, IO, SERIES_8 = {"CHCF": 1}, {"CHCF": 3, "TCC": 0}, {"CHCF": 0}
+
+
+def kind(profile: Profile, code: str, word: int, **raws: int) -> WordKind:
+    (found,) = foreign_words(profile, {profile[code].address: word}, raws)
+    return found.kind
+
+
+@pytest.mark.parametrize(
+    ("profile", "code", "word", "raws"),
+    [
+        (ATV71, "CMD", 0x0000, {}),
+        (ATV71, "CMD", 0x0007, DRIVECOM),
+        (ATV71, "CMD", 0x0002, DRIVECOM),
+        (ATV71, "CMD", 0x010F, {**DRIVECOM, "DOTD": 0, "ETA": 0x0237}),
+        (ATV71, "CMD", 0x0000, IO),
+        (ATV31, "CMD", 0x0007, {}),
+        (ATV21, "FA00", 0xC000, {}),
+        (ATV21, "FA00", 0xD000, {}),
+        (ATV21, "FA00", 0xC003, {"FA00": 0xC403}),
+        (POWERDRIVE, "6.42", 0x0000, {}),
+    ],
+)
+def test_words_that_can_only_stop(
+    profile: Profile, code: str, word: int, raws: dict[str, int]
+) -> None:
+    assert kind(profile, code, word, **raws) is WordKind.STOP
+
+
+@pytest.mark.parametrize(
+    ("profile", "code", "word", "raws"),
+    [
+        # what stops in one profile of the drive runs the motor in the other
+        (ATV71, "CMD", 0x0007, {}),
+        (ATV71, "CMD", 0x0007, IO),
+        (ATV71, "CMD", 0x0002, IO),
+        (ATV71, "CMD", 0x0000, SERIES_8),
+        (ATV71, "CMD", 0x010F, DRIVECOM),
+        (ATV71, "CMD", 0x010F, {**DRIVECOM, "DOTD": 1, "ETA": 0x0237}),
+        (ATV71, "CMD", 0x010F, {**DRIVECOM, "DOTD": 0, "ETA": 0x0233}),
+        (ATV71, "CMD", 0x000F, DRIVECOM),
+        (ATV71, "CMI", 0x0000, DRIVECOM),
+        (ATV71, "LFR", 0, DRIVECOM),
+        (ATV21, "FA00", 0x0000, {}),
+        (ATV21, "FA00", 0xC400, {}),
+        (ATV21, "FA00", 0xC003, {}),
+        (POWERDRIVE, "6.42", 0x0001, {}),
+        (POWERDRIVE, "6.43", 0x0000, {}),
+    ],
+)
+def test_words_that_may_do_something_else_are_commands(
+    profile: Profile, code: str, word: int, raws: dict[str, int]
+) -> None:
+    assert kind(profile, code, word, **raws) is WordKind.COMMAND
+
+
+@pytest.mark.parametrize("profile", [ATV71, ATV31, ATV21, POWERDRIVE])
+def test_no_run_word_passes_as_a_stop(profile: Profile) -> None:
+    for chart in profile.data.charts:
+        for order in chart.orders:
+            if order.id in ("forward", "reverse"):
+                place = order.parameter or chart.command
+                for word in order.words:
+                    if word not in (0xC000, 0x0001):
+                        assert kind(profile, place, word) is WordKind.COMMAND, (order.id, word)
+
+
+def test_a_scanner_word_that_passes_a_command_on_is_a_command() -> None:
+    codes = [code for block in ATV71.data.blocks for code in block.values]
+    assert codes
+    written = [code for code in codes if ATV71[code].access != "r"]
+    for code in written:
+        assert kind(ATV71, code, 15) is WordKind.COMMAND
+
+
+def test_a_setting_is_told_from_what_nobody_knows() -> None:
+    assert kind(ATV71, "ACC", 30) is WordKind.SETTING
+    assert kind(ATV71, "RFR", 30) is WordKind.UNKNOWN
+    (found,) = foreign_words(ATV71, {64000: 1}, {})
+    assert found.kind is WordKind.UNKNOWN
+
+
+def test_all_leaves_out_who_commands_and_what_cuts_the_line() -> None:
+    def refusal(code: str, *allowed: str) -> str:
+        (found,) = foreign_words(ATV71, {ATV71[code].address: 1}, {})
+        assert found.kind is WordKind.SETTING
+        return setting_refusal(ATV71, found, allowed)
+
+    assert refusal("ACC", ALL) == ""
+    assert refusal("ACC", "ACC", "DEC") == ""
+    assert "not allowed" in refusal("ACC", "DEC")
+    assert "not allowed" in refusal("ACC")
+    assert "by its name only" in refusal("CHCF", ALL)
+    assert refusal("CHCF", "CHCF") == ""
+
+
+def test_a_value_past_its_limits_is_refused() -> None:
+    acc = ATV71["ACC"]
+    assert value_refusal(ATV71, acc, {acc.address: 30}) == ""
+    assert value_refusal(ATV71, acc, {acc.address: 60000})
+
+
+def test_what_decides_about_a_stop_can_be_read() -> None:
+    assert set(stop_deciding_codes(ATV71)) >= {"CHCF", "ETA", "CMD", "DOTD"}

@@ -1,0 +1,172 @@
+"""What a write from a program that is not ours would do to a drive; pure functions of a profile.
+
+A SCADA knows registers, not what they mean: each word is told apart here into settings, commands,
+and words that can do nothing but stop the motor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from functools import lru_cache
+
+from .channel import channel_codes
+from .chart import state_of
+from .errors import DriveError
+from .orders import WAYS_TO_STOP, deciding_codes, order_target, with_options
+from .profile.profile import Profile, is_verified
+from .profile.schema import Chart, Order, Parameter
+from .settings.writable import cuts_line, is_order, is_setting, never_set
+from .values import check_raw, from_words, is_field, word_count
+
+ALL = "all"
+"""In place of codes: every setting that may be written without being named."""
+
+
+class WordKind(Enum):
+    """What a word does."""
+
+    SETTING = "setting"
+    COMMAND = "command"
+    STOP = "stop"
+    UNKNOWN = "unknown"
+    """The profile has no such register, or nothing may write it."""
+
+
+@dataclass(frozen=True, slots=True)
+class ForeignWord:
+    """One word of a write, and the parameters at its place."""
+
+    address: int
+    word: int
+    kind: WordKind
+    parameters: tuple[Parameter, ...] = ()
+
+
+@lru_cache(maxsize=32)
+def _places(profile: Profile) -> Mapping[int, tuple[Parameter, ...]]:
+    """The parameters at each address, those of two words at both of theirs."""
+    places: dict[int, list[Parameter]] = {}
+    for parameter in profile.parameters:
+        if parameter.function == 3:
+            for offset in range(word_count(parameter)):
+                places.setdefault(parameter.address + offset, []).append(parameter)
+    return {address: tuple(found) for address, found in places.items()}
+
+
+def foreign_words(
+    profile: Profile, words: Mapping[int, int], raws: Mapping[str, int]
+) -> list[ForeignWord]:
+    """What each word of a write does, given what was surely read of the drive just now."""
+    return [_word(profile, address, word, raws) for address, word in words.items()]
+
+
+def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) -> ForeignWord:
+    found = _places(profile).get(address, ())
+    if any(is_order(profile, one) or one.code in _ordered(profile) for one in found):
+        stops = any(only_stops(profile, one, word, raws) for one in found)
+        return ForeignWord(address, word, WordKind.STOP if stops else WordKind.COMMAND, found)
+    if found and all(is_setting(profile, one) for one in found):
+        return ForeignWord(address, word, WordKind.SETTING, found)
+    return ForeignWord(address, word, WordKind.UNKNOWN, found)
+
+
+@lru_cache(maxsize=32)
+def _ordered(profile: Profile) -> frozenset[str]:
+    """Words that orders write, a setting that takes the control among them."""
+    orders = (order for chart in profile.data.charts for order in chart.orders)
+    return frozenset(order.parameter for order in orders if order.parameter)
+
+
+def only_stops(profile: Profile, parameter: Parameter, word: int, raws: Mapping[str, int]) -> bool:
+    """Whether a word stops the motor in every chart that may be in force, and in its state.
+
+    A stop of one chart runs the motor in another: what is not known lets no word pass.
+    """
+    charts = [
+        chart
+        for chart in profile.data.charts
+        if chart.orders and (chart.when is None or chart.when.holds(raws) is not False)
+    ]
+    return bool(charts) and all(
+        any(_is_stop(profile, chart, order, parameter, word, raws) for order in chart.orders)
+        for chart in charts
+    )
+
+
+def _is_stop(
+    profile: Profile,
+    chart: Chart,
+    order: Order,
+    parameter: Parameter,
+    word: int,
+    raws: Mapping[str, int],
+) -> bool:
+    if order.id not in WAYS_TO_STOP or len(order.words) != 1:
+        return False
+    if order_target(profile, chart, order).address != parameter.address or is_field(parameter):
+        return False
+    if not all(when.holds(raws) for when in order.when):
+        return False
+    if order.states:
+        status = raws.get(chart.status)
+        if status is None or state_of(chart, status).id not in order.states:
+            return False
+    return word in (order.words[0] & 0xFFFF, *with_options(chart, order, raws))
+
+
+def stop_deciding_codes(profile: Profile) -> list[str]:
+    """Codes of the words by which a stop is told from a run command."""
+    charts = [chart for chart in profile.data.charts if chart.orders]
+    own = (code for chart in charts for code in (chart.status, chart.command) if code)
+    return [
+        code
+        for code in dict.fromkeys((*own, *deciding_codes(profile)))
+        if (one := profile.get(code)) is not None and one.access != "w"
+    ]
+
+
+def setting_refusal(profile: Profile, found: ForeignWord, allowed: Collection[str]) -> str:
+    """Why a setting is not written for a program that is not ours; empty where it may be.
+
+    `allowed` are codes, or `ALL`: that leaves out what decides who commands the drive, what cuts
+    the line, and what no document confirms. These are written where they are named.
+    """
+    for one in found.parameters:
+        if one.forbidden:
+            return f"{one.code} is not written from here: {one.forbidden}"
+        if one.code in allowed:
+            continue
+        if ALL not in allowed:
+            return f"{one.code} is not allowed: --allow-writes {one.code} allows it."
+        if one.code in _named_only(profile) or not is_verified(one):
+            return f"{one.code} is allowed by its name only: --allow-writes {one.code}."
+    return ""
+
+
+@lru_cache(maxsize=32)
+def _named_only(profile: Profile) -> frozenset[str]:
+    """Settings that decide who commands or gives the reference, and those that cut the line."""
+    cutting = {one.code for one in profile.parameters if cuts_line(profile, one)}
+    channels = {
+        one.code
+        for one in profile.parameters
+        if one.quantity in ("command_channel", "reference_channel")
+    }
+    return frozenset({*cutting, *channels, *channel_codes(profile)})
+
+
+def value_refusal(profile: Profile, parameter: Parameter, words: Mapping[int, int]) -> str:
+    """Why a value is never written, or not both of its words are; empty where it may be."""
+    own = [parameter.address + offset for offset in range(word_count(parameter))]
+    if any(address not in words for address in own):
+        return f"{parameter.code} has two words: both are written, or none."
+    raw = from_words(parameter, [words[address] for address in own])
+    if why := never_set(profile, parameter, raw):
+        return why
+    try:
+        check_raw(parameter, raw, profile.names(parameter), None)
+    except DriveError as error:
+        return str(error)
+    return ""
