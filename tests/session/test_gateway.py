@@ -1,0 +1,284 @@
+"""The gateway on simulated drives: what reaches them, what is refused, and who stops whom."""
+
+from __future__ import annotations
+
+import struct
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import pytest
+
+from tui.bus.gateway.server import TcpClient
+from tui.bus.line import Line
+from tui.bus.program import Program
+from tui.drive.profile import library
+from tui.session.gateway.gateway import Gateway, GatewayLine
+from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
+from tui.session.journal import Journal
+from tui.simulator import DriveSpec, Simulation
+
+from .test_stop import Start, journal, start, wait_for
+
+__all__ = ["journal", "start"]
+
+ATV71 = library.load("atv71")
+CMD, LFR, ETA, ACC = 8501, 8502, 3201, 9001
+PANEL = Program("panel's id", "panel", 4711)
+
+
+@dataclass(slots=True)
+class Bench:
+    """A gateway on one line, asked by one client."""
+
+    simulation: Simulation
+    line: Line
+    gateway: Gateway
+    journal: Journal
+    client: TcpClient
+
+    async def ask(self, pdu: bytes, unit: int = 1) -> bytes:
+        return await self.gateway.answer(self.client, unit, pdu)
+
+    async def read(self, address: int, count: int = 1, unit: int = 1) -> tuple[int, ...] | int:
+        """The words, or the number of the exception."""
+        answer = await self.ask(struct.pack(">BHH", 3, address, count), unit)
+        if answer[0] & 0x80:
+            return answer[1]
+        return struct.unpack(f">{count}H", answer[2:])
+
+    async def write(self, address: int, *words: int, unit: int = 1) -> int:
+        """The number of the exception, 0 where it was written."""
+        if len(words) == 1:
+            pdu = struct.pack(">BHH", 6, address, words[0])
+        else:
+            data = struct.pack(f">{len(words)}H", *words)
+            pdu = struct.pack(">BHHB", 16, address, len(words), len(data)) + data
+        answer = await self.ask(pdu, unit)
+        assert answer[0] & 0x7F == pdu[0]
+        return answer[1] if answer[0] & 0x80 else 0
+
+    def written(self) -> list[tuple[int, int]]:
+        """What went out to any drive: register and first word."""
+        found = []
+        for frame in self.line.trace:
+            if frame.direction == "out" and frame.data[1] in (6, 16, 23):
+                at = 2 if frame.data[1] != 23 else 6
+                (address,) = struct.unpack(">H", frame.data[at : at + 2])
+                word = frame.data[4:6] if frame.data[1] == 6 else frame.data[7:9]
+                found.append((address, int.from_bytes(word, "big")))
+        return found
+
+
+Make = Callable[..., Bench]
+
+
+@pytest.fixture
+def bench(start: Start, journal: Journal) -> Iterator[Make]:
+    """A gateway with these rules, on an Altivar 71 at address 1 unless told otherwise."""
+    gateways: list[Gateway] = []
+
+    def make(*specs: DriveSpec, **rules: object) -> Bench:
+        simulation, line = start(*(specs or [DriveSpec("atv71", 1, sets={"CHCF": 1})]))
+        kept = GatewayRules(**rules)  # type: ignore[arg-type]
+        gateways.append(Gateway([GatewayLine(line)], unit_map(1, ()), kept, journal))
+        return Bench(simulation, line, gateways[-1], journal, TcpClient(1, "10.0.0.9:5000"))
+
+    yield make
+    for gateway in gateways:
+        gateway.close()
+
+
+async def test_reads_pass_and_a_drive_that_is_not_there_is_exception_11(bench: Make) -> None:
+    made = bench()
+    drive = made.simulation.drive(1)
+    assert await made.read(ACC, 2) == (drive.raw("ACC"), drive.raw("DEC"))
+    assert await made.read(64000) == 2  # the drive's own exception
+    assert await made.read(ACC, unit=9) == 11
+    assert await made.read(ACC, unit=250) == 10
+    assert made.written() == []
+
+
+async def test_nothing_is_written_unless_it_was_allowed(bench: Make) -> None:
+    made = bench()
+    before = made.simulation.drive(1).raw("ACC")
+    assert await made.write(ACC, before + 5) == 1
+    assert await made.write(CMD, 0x000F) == 1
+    assert await made.write(LFR, 300) == 1
+    assert await made.write(ACC, before + 5, before + 5) == 1
+    assert made.written() == []
+    assert made.simulation.drive(1).raw("ACC") == before
+    assert made.journal.recent == ()
+
+
+async def test_a_setting_that_is_allowed_is_written_and_in_the_journal(bench: Make) -> None:
+    made = bench(writes=allowed_codes("ACC"))
+    before = made.simulation.drive(1).raw("ACC")
+    assert await made.write(ACC, 57) == 0
+    assert made.simulation.drive(1).raw("ACC") == 57
+    (entry,) = made.journal.recent
+    assert (entry.code, entry.old_raw, entry.new_raw, entry.new) == ("ACC", before, 57, "5.7 s")
+    assert entry.why == "write of Modbus TCP client 10.0.0.9:5000"
+    assert await made.write(ACC + 1, 57) == 1  # DEC is another
+    assert await made.write(ACC, 60000) == 3
+    assert made.written() == [(ACC, 57)]
+
+
+async def test_all_is_no_command(bench: Make) -> None:
+    made = bench(writes=allowed_codes("all"))
+    assert await made.write(CMD, 0x000F) == 1
+    assert await made.write(LFR, 300) == 1
+    assert await made.write(ATV71["CMI"].address, 0x0400) == 1
+    assert await made.write(ATV71["CHCF"].address, 2) == 1
+    assert made.written() == []
+
+
+async def test_a_stop_word_passes_without_any_leave_and_voids_what_waits(bench: Make) -> None:
+    made = bench()
+    made.simulation.drive(1).run(30.0)
+    stops = made.line.facts.stops.stamp(1)
+    assert await made.write(CMD, 0x0007) == 0
+    assert made.written() == [(CMD, 0x0007)]
+    assert made.line.facts.stops.stamp(1) > stops
+    assert "Modbus TCP client 10.0.0.9:5000" in made.line.facts.stops.by[1]
+    (entry,) = made.journal.recent
+    assert entry.why.startswith("stop of Modbus TCP")
+
+
+async def test_a_stop_word_passes_while_a_panel_commands_and_a_run_word_does_not(
+    bench: Make,
+) -> None:
+    made = bench(commands=True)
+    facts = made.line.facts
+    facts.set_programs((facts.me, PANEL))
+    facts.note_commander(1, PANEL.id)
+    assert await made.write(CMD, 0x000F) == 6
+    assert await made.write(LFR, 300) == 6
+    assert made.written() == []
+    assert await made.write(CMD, 0x0007) == 0
+    assert made.written() == [(CMD, 0x0007)]
+
+
+async def test_a_stop_among_words_that_are_not_allowed_goes_out_alone(bench: Make) -> None:
+    """Controllers write command and reference together."""
+    made = bench()
+    assert await made.write(CMD, 0x0007, 0) == 1
+    assert made.written() == [(CMD, 0x0007)]
+
+
+async def test_in_the_io_profile_the_stop_word_of_the_other_does_not_pass(bench: Make) -> None:
+    made = bench(DriveSpec("atv71", 1, sets={"CHCF": 3, "TCC": 0}))
+    assert await made.write(CMD, 0x0007) == 1
+    assert made.written() == []
+    assert await made.write(CMD, 0x0000) == 0
+
+
+async def test_commands_that_are_allowed_run_the_motor_and_claim_it(bench: Make) -> None:
+    made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600}), commands=True)
+    drive = made.simulation.drive(1)
+    facts = made.line.facts
+    assert await made.write(LFR, 300) == 0
+    for word in (0x0006, 0x0007, 0x000F):
+        assert await made.write(CMD, word) == 0
+    await wait_for(lambda: drive.motor.frequency > 3)
+    assert facts.commanders.get(1) == facts.me.id
+    assert await made.write(CMD, 0x0007) == 0
+    assert 1 not in facts.commanders
+    await wait_for(lambda: drive.motor.frequency == 0)
+
+
+async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Make) -> None:
+    """A controller that writes its word every second would start the motor again."""
+    made = bench(commands=True)
+    assert await made.write(LFR, 300) == 0
+    facts = made.line.facts
+    facts.hear_stop((1,), "the stop key", PANEL)
+    assert 1 not in facts.commanders
+    sent = len(made.written())
+    assert await made.write(CMD, 0x000F) == 6
+    assert len(made.written()) == sent
+    assert await made.write(CMD, 0x0007) == 0  # it has seen the stop
+    assert await made.write(LFR, 100) == 0
+
+
+async def test_a_client_that_is_gone_commands_nothing_and_all_are_told(bench: Make) -> None:
+    made = bench(commands=True)
+    said: list[str] = []
+    made.line.facts.on_text(lambda _, text: said.append(text))
+    assert await made.write(LFR, 300) == 0
+    made.gateway.gone(made.client)
+    assert 1 not in made.line.facts.commanders
+    assert "10.0.0.9:5000, which commanded this drive, has gone" in said[0]
+
+
+async def test_a_drive_without_a_profile_is_only_read(bench: Make) -> None:
+    leroy = DriveSpec("powerdrive", 1)
+    made = bench(leroy, writes=allowed_codes("all"), commands=True)
+    assert isinstance(await made.read(library.load("powerdrive")["10.40"].address), tuple)
+    assert await made.write(641, 3) == 1
+    assert made.written() == []
+
+
+async def test_a_profile_that_a_person_has_named_lets_its_stop_pass(bench: Make) -> None:
+    made = bench(DriveSpec("powerdrive", 1), profiles={1: "powerdrive"})
+    assert await made.write(641, 3) == 1
+    assert await made.write(641, 0) == 0
+    assert made.written() == [(641, 0)]
+
+
+async def test_a_profile_that_the_drive_contradicts_writes_nothing(bench: Make) -> None:
+    made = bench(writes=allowed_codes("all"), commands=True, profiles={1: "atv31"})
+    assert await made.write(ACC, 57) == 1
+    assert made.written() == []
+
+
+async def test_what_was_read_just_now_is_not_read_again(bench: Make) -> None:
+    made = bench(fresh=30.0)
+    first = await made.read(ETA, 2)
+    count = len(made.line.trace)
+    assert await made.read(ETA, 2) == first
+    assert await made.read(ETA + 1, 1) == first[1:]  # type: ignore[index]
+    # beside these only who the drive is is asked
+    assert not [frame for frame in made.line.trace[count:] if frame.data[1] == 3]
+
+
+async def test_identification_and_functions_that_no_drive_has(bench: Make) -> None:
+    made = bench(writes=allowed_codes("all"))
+    answer = await made.ask(bytes.fromhex("2B0E0100"))
+    assert answer[:2] == b"\x2b\x0e"
+    assert b"ATV71" in answer
+    for function in (1, 2, 5, 15, 22, 17):
+        assert await made.ask(bytes([function, 0, 0, 0, 1])) == bytes([function | 0x80, 1])
+    assert made.written() == []
+
+
+# Ids and codes
+
+
+def test_ids_of_several_lines() -> None:
+    units = unit_map(2, ["1-31=1", "101-131=2@1", "200=2@40"])
+    assert units[1] == (0, 1)
+    assert units[31] == (0, 31)
+    assert units[101] == (1, 1)
+    assert units[131] == (1, 31)
+    assert units[200] == (1, 40)
+    assert 32 not in units
+    assert unit_map(1, ())[247] == (0, 247)
+
+
+@pytest.mark.parametrize(
+    ("lines", "texts"),
+    [
+        (2, []),
+        (1, ["1=2"]),
+        (1, ["5-4=1"]),
+        (1, ["1-3=1", "3=1@9"]),
+        (1, ["1-300=1"]),
+        (1, ["240-250=1@240"]),
+        (1, ["one=1"]),
+    ],
+)
+def test_ids_that_make_no_sense_are_refused(lines: int, texts: list[str]) -> None:
+    with pytest.raises(RulesError):
+        unit_map(lines, texts)
+    with pytest.raises(RulesError):
+        allowed_codes(" , ")

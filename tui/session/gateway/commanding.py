@@ -1,0 +1,114 @@
+"""Who commands a drive through a gateway, and what a stop from elsewhere means for its clients."""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Callable, Coroutine, Iterable
+from contextlib import suppress
+from typing import Any
+
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineClosed
+from tui.bus.program import Program
+
+log = logging.getLogger(__name__)
+
+STOPPED_ELSEWHERE = (
+    "was stopped from elsewhere: a client commands it again once it has sent a stop itself"
+)
+
+
+class GatewayCommanding:
+    """The drives of one line that clients command; for any thread.
+
+    A client that repeats its words would start a motor again that a person has just stopped: after
+    such a stop its commands are refused until a client has sent a stop word, as a controller does
+    that has seen the motor stand.
+    """
+
+    def __init__(
+        self, line: ModbusLine, stands: Callable[[int], Coroutine[Any, Any, bool]]
+    ) -> None:
+        self._line = line
+        self._stands = stands
+        self._lock = threading.Lock()
+        self._by: dict[int, str] = {}
+        """The client that commands, by device."""
+        self._stopped: dict[int, str] = {}
+        """Devices that were stopped from elsewhere since a client's last stop: by whom."""
+        facts = line.facts
+        self._leave = (
+            facts.on_stop(self._stopped_elsewhere),
+            facts.on_question(self._asked),
+            facts.on_denied(self._denied),
+        )
+
+    def close(self) -> None:
+        """Command nothing any more."""
+        for leave in self._leave:
+            leave()
+        with self._lock:
+            devices = list(self._by)
+        for device in devices:
+            self._release(device)
+
+    def claim(self, device: int, client: str) -> str:
+        """Command a drive for a client; returns why not, or nothing."""
+        with self._lock:
+            by = self._stopped.get(device)
+        if by is not None:
+            return f"Drive {device} {STOPPED_ELSEWHERE} ({by})."
+        if why := self._line.facts.claim(device):
+            return why
+        with self._lock:
+            self._by[device] = client
+        return ""
+
+    def stop(self, device: int, client: str) -> None:
+        """A client stops a drive: what was meant for it before is void, and nobody commands it."""
+        self._line.facts.give_stop([device], f"Modbus TCP client {client}")
+        with self._lock:
+            self._stopped.pop(device, None)
+        self._release(device)
+
+    def gone(self, client: str) -> None:
+        """A client has closed its connection."""
+        with self._lock:
+            left = [device for device, by in self._by.items() if by == client]
+        for device in left:
+            self._release(device)
+            text = (
+                f"Modbus TCP client {client}, which commanded this drive, has gone: its motor does"
+                " what it was told last."
+            )
+            log.warning("drive %s: %s", device, text)
+            self._line.facts.tell_all(device, text)
+
+    def _release(self, device: int) -> None:
+        with self._lock:
+            self._by.pop(device, None)
+        self._line.facts.release(device)
+
+    def _stopped_elsewhere(self, devices: Iterable[int], by: str, program: Program) -> None:
+        for device in devices:
+            with self._lock:
+                self._stopped[device] = f"{by}, {program.text}"
+            self._release(device)
+
+    def _denied(self, device: int, why: str) -> None:
+        log.warning("%s", why)
+        with self._lock:
+            self._by.pop(device, None)
+
+    def _asked(self, device: int, program: Program) -> None:
+        """A program wants a drive, which it gets where the motor stands; in the line's thread."""
+        with suppress(LineClosed):
+            self._line.spawn(lambda: self._decide(device, program), f"question about {device}")
+
+    async def _decide(self, device: int, program: Program) -> None:
+        yes = await self._stands(device)
+        if yes:
+            with self._lock:
+                self._by.pop(device, None)
+        self._line.facts.answer(device, program.id, yes=yes)

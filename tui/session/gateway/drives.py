@@ -1,0 +1,144 @@
+"""Which drive stands behind each device of a line, found out when a client first asks for it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+
+from tui.bus.api import LineState, LineStatus, ModbusLine, Priority
+from tui.bus.limits import MAX_READ, Limits
+from tui.drive.profile import library
+
+from ..connect.contradiction import own_words
+from ..connect.identify import DriveIdentity, identify_drive
+from ..connect.known_lines import line_name, load_memory
+from ..drive import DriveSession
+
+log = logging.getLogger(__name__)
+
+READ_THROUGH = Limits(
+    functions=frozenset({3, 4, 43}),
+    max_read=MAX_READ,
+    max_read_4=MAX_READ,
+    max_write=0,
+    max_read_23=0,
+    max_write_23=0,
+)
+"""For what no profile fits: it may be no drive at all, and is read as its client asks."""
+WHO_AGAIN_AFTER = 30.0
+"""Seconds after which a drive that did not say who it is is asked again."""
+
+Note = Callable[[int, DriveIdentity | None, str], None]
+"""Is given a device, what it says of itself, and the profile it is taken by."""
+
+
+class GatewayDrives:
+    """The drives of one line, for one loop; a line that was lost may have others afterwards."""
+
+    def __init__(self, line: ModbusLine, note: Note = lambda *_: None) -> None:
+        self.line = line
+        self.named: dict[int, str] = {}
+        """Profiles that a person has named, by device."""
+        self._note = note
+        self._found: dict[int, DriveSession | None] = {}
+        self._doubtful: frozenset[int] = frozenset()
+        """Devices that were silent since: another drive may answer there."""
+        self._asked: dict[int, float] = {}
+        self._tasks: dict[int, asyncio.Task[DriveSession | None]] = {}
+        self._leave = line.on_state(self._state)
+
+    def close(self) -> None:
+        """Look after nothing any more."""
+        self._leave()
+        for task in self._tasks.values():
+            task.cancel()
+
+    def known(self, device: int) -> DriveSession | None:
+        """The drive as it was found out last, None before. An unknown device is made readable."""
+        if device not in self._found:
+            self._found[device] = None
+            self.line.describe(device, READ_THROUGH)
+        return self._found[device]
+
+    def find_out(self, device: int) -> None:
+        """Ask a device that answers who it is, beside what else is done; not again and again."""
+        sure = self.known(device) is not None and device not in self._doubtful
+        if not sure and device not in self._tasks:
+            now = asyncio.get_running_loop().time()
+            if now - self._asked.get(device, now - WHO_AGAIN_AFTER) >= WHO_AGAIN_AFTER:
+                self._begin(device)
+
+    async def found(self, device: int) -> DriveSession | None:
+        """The drive, asked now if need be; None where no profile fits. Raises the line's errors."""
+        session = self.known(device)
+        if session is not None and device not in self._doubtful:
+            return session
+        task = self._tasks.get(device) or self._begin(device)
+        return await asyncio.shield(task)
+
+    def doubt(self, device: int) -> None:
+        """It was silent: who it is is asked again before anything but a stop is written to it."""
+        self._doubtful |= {device}
+        self._asked.pop(device, None)
+
+    def _state(self, state: LineState) -> None:
+        """Called in the line's thread."""
+        if state.status is not LineStatus.CONNECTED:
+            self._doubtful |= frozenset(self._found)
+            self._asked = {}
+
+    def _begin(self, device: int) -> asyncio.Task[DriveSession | None]:
+        loop = asyncio.get_running_loop()
+        self._asked[device] = loop.time()
+        task = loop.create_task(self._identify(device), name=f"who is {device}")
+        self._tasks[device] = task
+        task.add_done_callback(lambda done: self._ended(device, done))
+        return task
+
+    def _ended(self, device: int, task: asyncio.Task[DriveSession | None]) -> None:
+        self._tasks.pop(device, None)
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.info("who device %s is was not found out: %s", device, error)
+
+    async def _identify(self, device: int) -> DriveSession | None:
+        named = self.named.get(device)
+        identity: DriveIdentity | None
+        if named is not None:
+            identity = await own_words(self.line, device, library.load(named))
+        else:
+            identity = await identify_drive(self.line, device, priority=self._patience(device))
+            named = identity.profile or await asyncio.to_thread(self._remembered, device, identity)
+        if not named:
+            return self._take(device, None)
+        profile = await asyncio.to_thread(library.load, named)
+        session = DriveSession(self.line, device, profile, identity)
+        if session.contradiction:
+            log.warning("%s It is read only.", session.contradiction)
+            return self._take(device, None)
+        self._note(device, identity, profile.id)
+        return self._take(device, session)
+
+    def _take(self, device: int, session: DriveSession | None) -> DriveSession | None:
+        if session is None:
+            self.line.describe(device, READ_THROUGH)
+        self._found[device] = session
+        self._doubtful -= {device}
+        return session
+
+    def _patience(self, device: int) -> Priority:
+        """What never answered is not waited for as long: no client does either."""
+        heard = self.line.device_state(device).heard
+        return Priority.OPERATOR_READ if heard is not None else Priority.BACKGROUND
+
+    def _remembered(self, device: int, identity: DriveIdentity) -> str:
+        """The profile that a nameless drive was taken by when the line was used last."""
+        if identity.reference:
+            return ""
+        key = line_name(self.line.link).key
+        mark = load_memory().lines.get(key) if key else None
+        drive = mark.drives.get(device) if mark is not None else None
+        if drive is None or any(drive.said) or not drive.profile:
+            return ""
+        fits = not identity.candidates or drive.profile in identity.candidates
+        return drive.profile if fits else ""

@@ -1,0 +1,215 @@
+"""The lines of a gateway: each request of a Modbus TCP client to its drive, and the answer back."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping, Sequence
+from functools import partial
+
+from tui.bus.api import IdentificationObjects, ModbusLine, Priority
+from tui.bus.errors import (
+    DeviceException,
+    ExchangeError,
+    LineBusy,
+    LineError,
+    NoAnswer,
+    RequestRefused,
+)
+from tui.bus.gateway.pdu import (
+    BUSY,
+    DEVICE_FAILURE,
+    ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
+    NO_PATH,
+    NO_RESPONSE,
+    WRITE_FUNCTIONS,
+    DiagnoseAsked,
+    GatewayAsked,
+    IdentifyAsked,
+    ReadAsked,
+    Unanswerable,
+    WriteAsked,
+    diagnosed_pdu,
+    exception_pdu,
+    gateway_asked,
+    identified_pdu,
+    words_pdu,
+)
+from tui.bus.gateway.server import TcpClient
+from tui.drive.chart import read_chart
+from tui.drive.errors import DriveError
+
+from ..journal import Journal
+from ..read.reader import Reader
+from .commanding import GatewayCommanding
+from .drives import GatewayDrives, Note
+from .rules import GatewayRules
+from .writes import GatewayWrite
+
+log = logging.getLogger(__name__)
+
+STANDING_STILL = ("stopped", "ready", "blocked")
+
+
+class GatewayLine:
+    """One line of a gateway: its drives, and who commands them."""
+
+    def __init__(self, line: ModbusLine, note: Note = lambda *_: None) -> None:
+        self.line = line
+        self.drives = GatewayDrives(line, note)
+        self.commanding = GatewayCommanding(line, self._stands)
+
+    def close(self) -> None:
+        """Leave the line alone."""
+        self.drives.close()
+        self.commanding.close()
+
+    async def _stands(self, device: int) -> bool:
+        """Whether a motor surely stands now, asked for another program that wants the drive."""
+        session = self.drives.known(device)
+        if session is None:
+            return False
+        codes = list(dict.fromkeys(chart.status for chart in session.profile.data.charts))
+        try:
+            await Reader(session).read(codes)
+        except LineError:
+            return False
+        return read_chart(session.profile, session.image.fresh(2.0)).motion in STANDING_STILL
+
+
+class Gateway:
+    """Answers the requests of all clients; lives in one loop."""
+
+    def __init__(
+        self,
+        lines: Sequence[GatewayLine],
+        units: Mapping[int, tuple[int, int]],
+        rules: GatewayRules,
+        journal: Journal,
+    ) -> None:
+        self._lines = lines
+        self._units = units
+        self._rules = rules
+        self._journal = journal
+        for unit, profile in rules.profiles.items():
+            if (place := units.get(unit)) is not None:
+                lines[place[0]].drives.named[place[1]] = profile
+
+    def close(self) -> None:
+        """Leave all lines alone."""
+        for line in self._lines:
+            line.close()
+
+    def gone(self, client: TcpClient) -> None:
+        """A client has closed its connection."""
+        for line in self._lines:
+            line.commanding.gone(client.peer)
+
+    async def answer(self, client: TcpClient, unit: int, pdu: bytes) -> bytes:
+        """The answer to a request; whatever is wrong is an exception of Modbus."""
+        function = pdu[0]
+        place = self._units.get(unit)
+        if place is None:
+            return exception_pdu(function, NO_PATH)
+        line, device = self._lines[place[0]], place[1]
+        try:
+            return await self._answer(line, device, client, gateway_asked(pdu))
+        except Unanswerable as refused:
+            if function in WRITE_FUNCTIONS:
+                log.info("device %s, client %s: %s", device, client.peer, refused)
+            return exception_pdu(function, refused.code)
+        except LineError as error:
+            if isinstance(error, NoAnswer):
+                # another drive may answer there when one does
+                line.drives.doubt(device)
+            return exception_pdu(function, exception_of(error))
+        except DriveError as error:
+            log.error("device %s: %s", device, error)
+            return exception_pdu(function, DEVICE_FAILURE)
+
+    async def _answer(
+        self, line: GatewayLine, device: int, client: TcpClient, asked: GatewayAsked
+    ) -> bytes:
+        match asked:
+            case ReadAsked():
+                return await self._read(line, device, asked)
+            case WriteAsked():
+                return await self._write(line, device, client, asked)
+            case DiagnoseAsked():
+                return await self._diagnose(line, device, asked)
+            case IdentifyAsked():
+                found = await self._identify(line, device)
+                return identified_pdu(asked, found.conformity, found.objects)
+
+    async def _read(self, line: GatewayLine, device: int, asked: ReadAsked) -> bytes:
+        session = line.drives.known(device)
+        if session is not None and session.profile.function(asked.function) is None:
+            raise Unanswerable(ILLEGAL_FUNCTION)
+        try:
+            reply = await line.line.read(
+                device,
+                asked.address,
+                asked.count,
+                priority=_patience(line.line, device),
+                function=asked.function,
+                max_age=self._rules.fresh,
+            )
+        except RequestRefused as refused:
+            raise Unanswerable(_unsent(line.line, device), str(refused)) from refused
+        finally:
+            if line.line.device_state(device).answers:
+                line.drives.find_out(device)
+        return words_pdu(asked.function, reply.words)
+
+    async def _write(
+        self, line: GatewayLine, device: int, client: TcpClient, asked: WriteAsked
+    ) -> bytes:
+        # a stop does not wait until a drive that was silent has said again who it is
+        session = line.drives.known(device) or await line.drives.found(device)
+        if session is None:
+            raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
+        sure = partial(line.drives.found, device)
+        write = GatewayWrite(
+            session, asked, client.peer, self._rules, line.commanding, self._journal, sure
+        )
+        return await write.carry_out()
+
+    async def _diagnose(self, line: GatewayLine, device: int, asked: DiagnoseAsked) -> bytes:
+        session = await line.drives.found(device)
+        function = session.profile.function(8) if session is not None else None
+        if function is None or asked.subfunction not in (function.subfunctions or ()):
+            raise Unanswerable(ILLEGAL_FUNCTION)
+        if asked.subfunction in CHANGING_SUBFUNCTIONS:
+            raise Unanswerable(ILLEGAL_FUNCTION, "it would change the drive's counters")
+        data = await line.line.diagnose(device, asked.subfunction, asked.data)
+        return diagnosed_pdu(asked.subfunction, data)
+
+    async def _identify(self, line: GatewayLine, device: int) -> IdentificationObjects:
+        line.drives.known(device)
+        try:
+            return await line.line.identify(device, priority=_patience(line.line, device))
+        except RequestRefused as refused:
+            raise Unanswerable(ILLEGAL_FUNCTION, str(refused)) from refused
+
+
+CHANGING_SUBFUNCTIONS = frozenset({1, 3, 4, 10})
+"""Of function 8: restarts, the delimiter, listen-only mode, the clearing of counters."""
+
+
+def _patience(line: ModbusLine, device: int) -> Priority:
+    """A device that never answered is not waited for as long: its client does not either."""
+    return Priority.POLL if line.device_state(device).heard is not None else Priority.BACKGROUND
+
+
+def _unsent(line: ModbusLine, device: int) -> int:
+    """The exception for a read that the line did not send."""
+    return BUSY if device in line.facts.hushed else ILLEGAL_VALUE
+
+
+def exception_of(error: LineError) -> int:
+    """The exception that tells a client of trouble on the line, or what the drive itself said."""
+    if isinstance(error, DeviceException):
+        return error.code
+    if isinstance(error, ExchangeError):
+        return NO_RESPONSE
+    return BUSY if isinstance(error, LineBusy) else NO_PATH

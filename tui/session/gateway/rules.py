@@ -1,0 +1,71 @@
+"""What a gateway lets its clients do, and which drive a unit id means."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from tui.drive.errors import DriveError
+from tui.drive.foreign_write import ALL
+
+HIGHEST_DEVICE = 247
+_MAPPED = re.compile(r"(\d+)(?:-(\d+))?=(\d+)(?:@(\d+))?")
+
+
+class RulesError(DriveError):
+    """What was typed about ids or codes makes no sense."""
+
+
+@dataclass(frozen=True, slots=True)
+class GatewayRules:
+    """What clients may do; reading is always allowed, and so are words that only stop."""
+
+    fresh: float = 0.0
+    """Seconds up to which what was read before is an answer."""
+    writes: frozenset[str] = frozenset()
+    """Codes of settings that may be written, or `ALL`."""
+    commands: bool = False
+    """Whether command words and references may be written."""
+    profiles: Mapping[int, str] = field(default_factory=dict)
+    """Profiles that a person has named, by unit id."""
+
+
+def allowed_codes(text: str) -> frozenset[str]:
+    """Codes as they are typed, with commas between; `all` in any case. Raises RulesError."""
+    codes = frozenset(part.strip() for part in text.split(",") if part.strip())
+    if not codes:
+        raise RulesError(f"{text!r}: name codes, such as ACC,DEC, or all.")
+    return frozenset(ALL if code.casefold() == ALL else code for code in codes)
+
+
+def unit_map(lines: int, texts: Sequence[str]) -> Mapping[int, tuple[int, int]]:
+    """The line, counted from 0, and the device that each unit id means.
+
+    `texts` are `FIRST-LAST=LINE[@DEVICE]`: the ids are the devices from DEVICE on (else the same
+    numbers) of the line of that number, counted from 1. Without any all ids are those of the one
+    line. Raises RulesError.
+    """
+    if not texts:
+        if lines > 1:
+            raise RulesError(
+                "Several lines have the same ids: say which id is where, for example"
+                " --map 1-31=1 --map 101-131=2@1."
+            )
+        return {device: (0, device) for device in range(1, HIGHEST_DEVICE + 1)}
+    found: dict[int, tuple[int, int]] = {}
+    for text in texts:
+        match = _MAPPED.fullmatch(text.strip())
+        if match is None:
+            raise RulesError(f"{text!r}: write IDS=LINE[@DEVICE], for example 101-131=2@1.")
+        first, last = int(match[1]), int(match[2] or match[1])
+        line, device = int(match[3]), int(match[4] or match[1])
+        if not 1 <= line <= lines:
+            raise RulesError(f"{text!r}: there is no line {line}; {lines} named.")
+        if not 1 <= first <= last <= 255 or not 1 <= device <= HIGHEST_DEVICE - (last - first):
+            raise RulesError(f"{text!r}: ids are 1 to 255, devices 1 to {HIGHEST_DEVICE}.")
+        for offset in range(last - first + 1):
+            if first + offset in found:
+                raise RulesError(f"{text!r}: id {first + offset} is named twice.")
+            found[first + offset] = line - 1, device + offset
+    return found

@@ -1,0 +1,251 @@
+"""Writes of Modbus TCP clients: which pass, which pass as a stop, and what the journal keeps."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Awaitable, Callable, Mapping
+from typing import NoReturn
+
+from tui.bus.api import Priority
+from tui.bus.errors import LineError, RequestRefused
+from tui.bus.gateway.pdu import (
+    BUSY,
+    ILLEGAL_FUNCTION,
+    ILLEGAL_VALUE,
+    Unanswerable,
+    WriteAsked,
+    words_pdu,
+    written_pdu,
+)
+from tui.drive.chart import read_chart
+from tui.drive.foreign_write import (
+    ForeignWord,
+    WordKind,
+    foreign_words,
+    setting_refusal,
+    stop_deciding_codes,
+    value_refusal,
+)
+from tui.drive.profile.schema import Parameter
+from tui.drive.settings.writable import AT_REST, needs_standstill
+from tui.drive.shown import depends_on, shown_text
+from tui.drive.values import from_words, word_count
+
+from ..drive import DriveSession
+from ..journal import Entry, Journal, now_text
+from ..read.reader import Reader
+from ..reading import Reading
+from .commanding import GatewayCommanding
+from .rules import GatewayRules
+
+log = logging.getLogger(__name__)
+
+JUST_READ = 2.0
+"""Seconds up to which a word counts as read just now."""
+
+
+class GatewayWrite:
+    """One write of one client to a drive whose profile is known."""
+
+    def __init__(
+        self,
+        session: DriveSession,
+        asked: WriteAsked,
+        client: str,
+        rules: GatewayRules,
+        commanding: GatewayCommanding,
+        journal: Journal,
+        sure: Callable[[], Awaitable[DriveSession | None]],
+    ) -> None:
+        self._sure = sure
+        """Who the drive is, asked again where that is in doubt."""
+        self._session = session
+        self._asked = asked
+        self._client = client
+        self._rules = rules
+        self._commanding = commanding
+        self._journal = journal
+        self._stamp = session.line.facts.stops.stamp(session.device)
+        """A stop that comes while this is looked at voids it."""
+
+    async def carry_out(self) -> bytes:
+        """Write what is allowed; the answer. Raises Unanswerable and the line's errors."""
+        words = await self._told_apart()
+        stops = [one for one in words if one.kind is WordKind.STOP]
+        if len(stops) == len(words):
+            return await self._send(Priority.STOP)
+        for one in stops:
+            # first of all: whatever becomes of the rest
+            await self._send_alone(one)
+        await self._check(words)
+        return await self._send(Priority.OPERATOR_WRITE)
+
+    async def _told_apart(self) -> list[ForeignWord]:
+        """What each word does; what decides about a stop is read where it is not sure yet."""
+        profile, words = self._session.profile, self._asked.words
+        found = foreign_words(profile, words, {})
+        if not any(one.kind is WordKind.COMMAND for one in found):
+            return found
+        return foreign_words(profile, words, await self._read(stop_deciding_codes(profile)))
+
+    async def _read(self, codes: list[str]) -> Mapping[str, int]:
+        """Words that surely are as they are told now; before a stop nothing else is read."""
+        try:
+            await Reader(self._session).read(codes, priority=Priority.OPERATOR_WRITE)
+        except LineError as error:
+            log.info("what decides about a stop was not read: %s", error)
+            return {}
+        return self._session.image.fresh(JUST_READ)
+
+    async def _check(self, words: list[ForeignWord]) -> None:
+        """Raise Unanswerable where the request is not allowed as a whole."""
+        drive = await self._sure()
+        if drive is None or drive.profile.id != self._session.profile.id:
+            self._refuse(BUSY, "another drive answers now")
+        if any(one.kind is WordKind.UNKNOWN for one in words):
+            lacking = [one.address for one in words if one.kind is WordKind.UNKNOWN]
+            self._refuse(ILLEGAL_FUNCTION, f"nothing is known to be written at {lacking}")
+        commands = any(one.kind is WordKind.COMMAND for one in words)
+        if commands and not self._rules.commands:
+            self._refuse(ILLEGAL_FUNCTION, "commands are not allowed: --allow-commands")
+        settings = [one for one in words if one.kind is WordKind.SETTING]
+        for one in settings:
+            why = setting_refusal(self._session.profile, one, self._rules.writes)
+            if why:
+                self._refuse(ILLEGAL_FUNCTION, why)
+        await self._check_values(settings)
+        if commands:
+            why = self._commanding.claim(self._session.device, self._client)
+            if why:
+                self._refuse(BUSY, why)
+
+    async def _check_values(self, settings: list[ForeignWord]) -> None:
+        profile = self._session.profile
+        parameters = _each(settings)
+        for one in parameters:
+            if why := value_refusal(profile, one, self._asked.words):
+                self._refuse(ILLEGAL_VALUE, why)
+        # what the journal tells besides: the value before, and its unit
+        codes = [code for one in parameters for code in (one.code, *depends_on(one))]
+        still = any(needs_standstill(profile, one) for one in parameters)
+        if still:
+            codes += [*(chart.status for chart in profile.data.charts)]
+            codes += stop_deciding_codes(profile)
+        raws = await self._read(list(dict.fromkeys(codes))) if codes else {}
+        if still:
+            motion = read_chart(profile, raws).motion
+            if motion not in AT_REST:
+                self._refuse(BUSY, f"written with the motor stopped only; the drive is {motion}")
+
+    def _refuse(self, code: int, why: str) -> NoReturn:
+        log.warning(
+            "device %s, Modbus TCP client %s: not written: %s",
+            self._session.device, self._client, why,
+        )  # fmt: skip
+        raise Unanswerable(code, why)
+
+    async def _send_alone(self, one: ForeignWord) -> None:
+        self._commanding.stop(self._session.device, self._client)
+        self._stamp = self._session.line.facts.stops.stamp(self._session.device)
+        answer = "ok"
+        try:
+            await self._session.line.write(
+                self._session.device, one.address, [one.word], priority=Priority.STOP
+            )
+        except LineError as error:
+            answer = str(error)
+            raise
+        finally:
+            self._keep(list(one.parameters), {}, answer, "stop")
+
+    async def _send(self, priority: Priority) -> bytes:
+        """The request as it came; its answer. Each parameter of it goes to the journal."""
+        stops = priority is Priority.STOP
+        if stops:
+            self._commanding.stop(self._session.device, self._client)
+        parameters = _each(foreign_words(self._session.profile, self._asked.words, {}))
+        before = {one.code: self._session.image.get(one.code) for one in parameters}
+        answer = "ok"
+        try:
+            return await self._exchange(priority, parameters)
+        except LineError as error:
+            answer = str(error)
+            if isinstance(error, RequestRefused):
+                raise Unanswerable(self._refusal_code(), answer) from error
+            raise
+        finally:
+            self._keep(parameters, before, answer, "stop" if stops else "write")
+
+    async def _exchange(self, priority: Priority, parameters: list[Parameter]) -> bytes:
+        session, asked = self._session, self._asked
+        forbidden = None if priority is Priority.STOP else self._voided
+        for one in parameters:
+            session.image.doubt(one.code)
+        if asked.function == 23:
+            reply = await session.line.read_write(
+                session.device, asked.read_address, asked.count, asked.address, asked.values,
+                priority=priority, forbidden=forbidden,
+            )  # fmt: skip
+            return words_pdu(23, reply.words)
+        await session.line.write(
+            session.device, asked.address, asked.values,
+            priority=priority, multiple=asked.function == 16, forbidden=forbidden,
+        )  # fmt: skip
+        return written_pdu(asked)
+
+    def _voided(self) -> str:
+        """Why it must not go out any more; asked in the line's thread just before."""
+        now = self._session.line.facts.stops.stamp(self._session.device)
+        return "" if now == self._stamp else "Not sent: a stop came meanwhile."
+
+    def _refusal_code(self) -> int:
+        """The exception for what the line did not send."""
+        line, profile = self._session.line, self._session.profile
+        if profile.function(self._asked.function) is None or line.read_only or line.held:
+            return ILLEGAL_FUNCTION
+        device = self._session.device
+        if line.facts.commander(device) or device in line.facts.hushed or self._voided():
+            return BUSY
+        return ILLEGAL_VALUE
+
+    def _keep(
+        self,
+        parameters: list[Parameter],
+        before: Mapping[str, Reading | None],
+        answer: str,
+        what: str,
+    ) -> None:
+        """Put each parameter whose words were all written into the journal."""
+        session, words = self._session, self._asked.words
+        for one in parameters:
+            own = [one.address + offset for offset in range(word_count(one))]
+            if any(address not in words for address in own):
+                continue
+            held = before.get(one.code)
+            old, new = held.raw if held else None, from_words(one, [words[at] for at in own])
+            self._journal.add(
+                Entry(
+                    time=now_text(),
+                    line=session.line_text,
+                    device=session.device,
+                    profile=session.profile.id,
+                    code=one.code,
+                    address=one.address,
+                    old_raw=old,
+                    old=self._text(one, old),
+                    new_raw=new,
+                    new=self._text(one, new),
+                    answer=answer,
+                    read_back=None,
+                    why=f"{what} of Modbus TCP client {self._client}",
+                )
+            )
+
+    def _text(self, parameter: Parameter, raw: int | None) -> str:
+        image = self._session.image
+        return shown_text(self._session.profile, parameter, raw, image.raws, image.lacking)
+
+
+def _each(words: list[ForeignWord]) -> list[Parameter]:
+    """The parameters of several words, each once."""
+    return list({p.code: p for one in words for p in one.parameters}.values())
