@@ -61,7 +61,7 @@ def test_the_commands_of_a_section(
         elif words[:1] == ["hold"]:
             with served([*DRIVEPANEL, *words], ready="Device 1"):
                 pass
-        elif words[:1] == ["simulate"]:
+        elif words[:1] in (["simulate"], ["serve"]):
             with served([*DRIVEPANEL, *words], ready="Ready"):
                 pass
         elif not words or words[0] in PANEL:

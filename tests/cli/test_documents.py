@@ -160,10 +160,19 @@ def test_a_simulated_line() -> None:
     assert told["drives"] == [{"profile": "atv71", "device": 2}]
 
 
+def test_lines_that_are_served() -> None:
+    serve = [*DRIVEPANEL, "serve", "sim:atv71@2", "--tcp", ":0", "--allow-writes", "all", "--json"]
+    with served(serve, ready="{") as program:
+        (told,) = documents(program.ready)
+    assert port_of(told["tcp"])
+    assert (told["lines"], told["writes"], told["commands"]) == (["sim:atv71@2"], ["all"], False)
+
+
 def test_every_command_has_json() -> None:
     tried = {words[0] for _, words, _ in RUNS.values()} | {
         "run",
         "reset",
+        "serve",
         "simulate",
         "hold",
         "prove",

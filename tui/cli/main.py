@@ -38,6 +38,7 @@ COMMANDS = {
     "restore": ("restore", "Write a parameter set back to a drive."),
     "run": ("run", "Run a motor until this command ends."),
     "scan": ("scan", "Find the drives on a line."),
+    "serve": ("serve", "Own lines without a screen, and serve them by Modbus TCP."),
     "simulate": ("simulate", "Serve simulated drives to any Modbus client."),
     "status": ("status", "Tell a drive's state, control source and fault."),
     "stop": ("stop", "Stop a drive, or every drive of a line."),

@@ -12,6 +12,7 @@ import click
 
 from ..shared.completion import complete_profile
 from ..shared.errors import told
+from ..shared.host_port import host_port, written_host_port
 from ..shared.options import json_option
 from ..shared.output import print_json
 from ..shared.say import say
@@ -203,16 +204,8 @@ def _serve(
         if tcp is not None
         else ("rtu-tcp", rtu_tcp or "", simulation.serve_rtu_tcp)
     )
-    host, port = serve(*_host_port(place))
-    return f"{scheme}:[{host}]:{port}" if ":" in host else f"{scheme}:{host}:{port}"
-
-
-def _host_port(text: str) -> tuple[str, int]:
-    """Host and port; loopback where only a port is given, any free port for 0."""
-    host, _, port = text.rpartition(":")
-    if not port.isdecimal() or int(port) > 65535:
-        raise click.UsageError(f"{text!r}: write HOST:PORT, for example 127.0.0.1:5020.")
-    return host.strip("[]") or "127.0.0.1", int(port)
+    host, port = serve(*host_port(place))
+    return f"{scheme}:{written_host_port(host, port)}"
 
 
 def _addressed(text: str) -> tuple[int | None, str]:

@@ -40,6 +40,7 @@ from .of_others import (
     ProfileFolder,
     ProfileShown,
     ProfileTold,
+    ServeReady,
     SimulationReady,
     WiringTold,
 )
@@ -63,6 +64,7 @@ DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     CommandTold, StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
     BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
     ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
+    ServeReady,
     JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold, WhyTold, CountersTold,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""

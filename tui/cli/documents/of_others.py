@@ -124,6 +124,17 @@ class SimulationReady(DocumentTold, kw_only=True):
     drives: list[dict[str, str | int]]
 
 
+class ServeReady(DocumentTold, kw_only=True):
+    """`serve`: the lines are open; `tcp` is the LINE by which others reach them, null without."""
+
+    command: Literal["serve"]
+    event: Literal["ready"]
+    lines: list[str]
+    tcp: str | None
+    writes: list[str]
+    commands: bool
+
+
 class InputsTold(DocumentTold, kw_only=True):
     """`simulate`: inputs of a drive were set or asked for."""
 

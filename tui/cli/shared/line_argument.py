@@ -201,9 +201,14 @@ def takes_line_as(
         argument = click.argument(
             "line_text", metavar=metavar, cls=kind, shell_complete=complete_line
         )
-        return argument(_accept_option(share_group_option(command)))
+        return argument(line_options(command))
 
     return decorate
+
+
+def line_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    """What goes with any LINE: that it is accepted as it is now, and with whom it is shared."""
+    return _accept_option(share_group_option(command))
 
 
 takes_line = takes_line_as(LineArgument, "LINE")

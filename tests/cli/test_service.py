@@ -1,0 +1,89 @@
+"""What systemd is told, over a datagram socket as it has one; and the unit in the repository."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import socket
+from collections.abc import Iterator
+from configparser import ConfigParser
+from contextlib import suppress
+from pathlib import Path
+
+import pytest
+
+from tui.cli.running.service import Service
+
+UNITS = Path(__file__).resolve().parents[2] / "systemd"
+
+
+@pytest.fixture
+def systemd(tmp_path: Path) -> Iterator[socket.socket]:
+    """The end of systemd."""
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+        end.bind(str(tmp_path / "notify"))
+        end.settimeout(30)
+        yield end
+
+
+def service(systemd: socket.socket, **more: str) -> Service:
+    return Service({"NOTIFY_SOCKET": systemd.getsockname(), **more})
+
+
+def test_ready_and_stopping_are_told(systemd: socket.socket) -> None:
+    one = service(systemd)
+    one.ready("sim:atv71\nMAINPID=1")
+    assert systemd.recv(500) == b"READY=1\nSTATUS=sim:atv71 MAINPID=1"
+    one.stopping()
+    assert systemd.recv(500).startswith(b"STOPPING=1\n")
+
+
+def test_an_abstract_address_is_told_too() -> None:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as end:
+        name = f"drivepanel-test-{os.getpid()}"
+        end.bind(f"\0{name}")
+        end.settimeout(30)
+        Service({"NOTIFY_SOCKET": f"@{name}"}).ready("here")
+        assert end.recv(500) == b"READY=1\nSTATUS=here"
+
+
+def test_nothing_is_told_to_nobody(tmp_path: Path) -> None:
+    Service({}).ready("here")
+    Service({"NOTIFY_SOCKET": str(tmp_path / "gone")}).ready("here")
+    assert Service({}).watchdog is None
+    assert Service({"WATCHDOG_USEC": "soon"}).watchdog is None
+    assert Service({"WATCHDOG_USEC": "1000000", "WATCHDOG_PID": "1"}).watchdog is None
+    mine = str(os.getpid())
+    assert Service({"WATCHDOG_USEC": "3000000", "WATCHDOG_PID": mine}).watchdog == 3.0
+
+
+async def test_signs_of_life_end_where_the_line_stands_still(systemd: socket.socket) -> None:
+    alive = True
+    one = service(systemd, WATCHDOG_USEC="60000")
+    task = asyncio.create_task(one.watch(lambda: alive))
+    for _ in range(3):
+        assert await asyncio.to_thread(systemd.recv, 500) == b"WATCHDOG=1"
+    alive = False
+    systemd.setblocking(False)
+    await asyncio.sleep(0.1)
+    with suppress(BlockingIOError):
+        while True:
+            systemd.recv(500)
+    await asyncio.sleep(0.2)
+    with pytest.raises(BlockingIOError):
+        systemd.recv(500)
+    task.cancel()
+
+
+def test_the_unit_says_what_the_program_does() -> None:
+    unit = ConfigParser(strict=False, interpolation=None, delimiters=("=",))
+    unit.optionxform = str  # type: ignore[assignment, method-assign]
+    unit.read(UNITS / "drivepanel.service", "utf-8")
+    served = unit["Service"]
+    assert served["Type"] == "notify"
+    assert served["WatchdogSec"] == "30"
+    assert f"--share-group {served['Group']}" in served["ExecStart"]
+    assert " serve " in served["ExecStart"]
+    assert served["RuntimeDirectory"] == "drivepanel"
+    assert served["RuntimeDirectoryMode"] == "2770"
+    assert served["RuntimeDirectoryPreserve"] == "yes"
