@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import struct
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -96,6 +97,24 @@ async def test_reads_pass_and_a_drive_that_is_not_there_is_exception_11(bench: M
     assert await made.read(ACC, unit=9) == 11
     assert await made.read(ACC, unit=250) == 10
     assert made.written() == []
+
+
+async def test_a_drive_that_is_not_there_does_not_take_the_line(bench: Make) -> None:
+    made = bench()
+    for _ in range(20):
+        assert await made.read(ACC, unit=9) == 11
+    asked = [f for f in made.line.trace if f.direction == "out" and f.data[0] == 9]
+    assert len(asked) < 4
+
+
+async def test_a_stop_while_the_drive_is_asked_who_it_is_voids_the_command(bench: Make) -> None:
+    made = bench(commands=True)
+    under_way = asyncio.create_task(made.write(LFR, 300))
+    await asyncio.sleep(0)
+    made.line.facts.give_stop([1], "the stop key")
+    assert await under_way == 6
+    assert made.written() == []
+    assert await made.write(LFR, 300) == 0
 
 
 async def test_nothing_is_written_unless_it_was_allowed(bench: Make) -> None:

@@ -164,13 +164,14 @@ class Gateway:
     async def _write(
         self, line: GatewayLine, device: int, client: TcpClient, asked: WriteAsked
     ) -> bytes:
+        stamp = line.line.facts.stops.stamp(device)
         # a stop does not wait until a drive that was silent has said again who it is
         session = line.drives.known(device) or await line.drives.found(device)
         if session is None:
             raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
         sure = partial(line.drives.found, device)
         write = GatewayWrite(
-            session, asked, client.peer, self._rules, line.commanding, self._journal, sure
+            session, asked, client.peer, self._rules, line.commanding, self._journal, sure, stamp
         )
         return await write.carry_out()
 
@@ -197,8 +198,14 @@ CHANGING_SUBFUNCTIONS = frozenset({1, 3, 4, 10})
 
 
 def _patience(line: ModbusLine, device: int) -> Priority:
-    """A device that never answered is not waited for as long: its client does not either."""
-    return Priority.POLL if line.device_state(device).heard is not None else Priority.BACKGROUND
+    """A device that never answered is not waited for as long: its client does not either.
+
+    Asked as a poll it is left alone between two tries: a client that goes on asking for a drive
+    that is not there would take the line from all others.
+    """
+    state = line.device_state(device)
+    known = state.heard is not None or state.next_try is not None
+    return Priority.POLL if known else Priority.BACKGROUND
 
 
 def _unsent(line: ModbusLine, device: int) -> int:

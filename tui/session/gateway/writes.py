@@ -56,6 +56,7 @@ class GatewayWrite:
         commanding: GatewayCommanding,
         journal: Journal,
         sure: Callable[[], Awaitable[DriveSession | None]],
+        stamp: int,
     ) -> None:
         self._sure = sure
         """Who the drive is, asked again where that is in doubt."""
@@ -65,8 +66,8 @@ class GatewayWrite:
         self._rules = rules
         self._commanding = commanding
         self._journal = journal
-        self._stamp = session.line.facts.stops.stamp(session.device)
-        """A stop that comes while this is looked at voids it."""
+        self._stamp = stamp
+        """The drive's count of stops when it came: one that comes later voids it."""
 
     async def carry_out(self) -> bytes:
         """Write what is allowed; the answer. Raises Unanswerable and the line's errors."""
