@@ -31,6 +31,7 @@ from tests.defects import (
     diagnosis,
     drive,
     finding,
+    gateway,
     identity,
     lines,
     listening,
@@ -59,6 +60,7 @@ DEFECTS: tuple[Defect, ...] = (
     *diagnosis.DEFECTS,
     *teaching.DEFECTS,
     *terminal.DEFECTS,
+    *gateway.DEFECTS,
     *sharing.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
