@@ -108,7 +108,9 @@ def test_a_line_of_another_drivepanel_is_left_to_it(talk: Talk, place: SharePlac
     owner.open(wait=5.0)
     try:
         with (
-            pytest.raises(NotShared, match=r"drivepanel panel \(pid \d+\) has .* Frames screen"),
+            pytest.raises(
+                NotShared, match=r"drivepanel panel \(pid \d+\) has .* Frames .* of a panel"
+            ),
             ListeningLine(SerialLink(talk.path), place, ME),
         ):
             pass

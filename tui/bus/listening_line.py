@@ -79,7 +79,7 @@ class ListeningLine:
             who = f"drivepanel {owner.program.text}" if owner is not None else "another drivepanel"
             raise NotShared(
                 f"{who} has {self.link.path}, and a port that is listened to can have no other"
-                " user. Its Frames screen shows what goes over the line."
+                " user. Frames (7) of a panel on this line shows what goes over it."
             )
 
     def _give_back(self) -> None:
