@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from click.testing import CliRunner
 
 from tests.programs import (
     DRIVEPANEL,
@@ -27,6 +28,9 @@ from tests.programs import (
     simulated,
     wait_until,
 )
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineLost
+from tui.cli.main import main
 from tui.simulator import DriveSpec, Simulation
 from tui.simulator.spec import FaultRates
 
@@ -227,6 +231,22 @@ def test_a_stop_by_another_program_ends_it_and_is_told(order: list[str]) -> None
             assert "It was stopped by drivepanel stop, stop" in error
             assert "It was stopped by drivepanel stop, stop" in said
             assert stands(simulation)
+
+
+def test_what_others_meant_is_void_before_the_first_word_goes_out(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    counts = []
+
+    async def first(line: ModbusLine, device: int, *_: object) -> None:
+        counts.append(line.facts.stops.stamp(device))
+        raise LineLost("Enough is known.")
+
+    monkeypatch.setattr("tui.session.command.first_stop.stop_first", first)
+    done = CliRunner().invoke(main, ["stop", "sim:atv71", "-p", "atv71"])
+    assert done.exit_code == 3
+    assert "NOT STOPPED: Enough is known. Stop it at the machine." in done.stderr
+    assert counts == [1]
 
 
 def silence(simulation: Simulation) -> None:

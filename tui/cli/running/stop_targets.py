@@ -55,6 +55,8 @@ async def first_stopped(
     before = (await remembered(opened)).get(device)
     known = {typed, *(one.id for one in families)}
     named = [one for one in (typed, before) if one is not None and one in known]
+    # what other programs meant for it is void before the first word, not once it is known
+    opened.line.facts.give_stop([device], "drivepanel stop")
     for _ in range(BLIND_TRIES if typed else 1):
         first = await stop_first(opened.line, device, journal, families, named, order)
         if first.answered:
