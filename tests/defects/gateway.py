@@ -65,6 +65,22 @@ DEFECTS = (
         (GATEWAY,),
     ),
     Defect(
+        "foreign-start-unrecorded",
+        "tui/session/gateway/started.py",
+        "await asyncio.to_thread(self._keeper.begin, session, order)",
+        "pass",
+        "Nobody stops the motor of a controller whose gateway was killed.",
+        (GATEWAY,),
+    ),
+    Defect(
+        "foreign-motor-left-at-the-end",
+        "tui/session/gateway/started.py",
+        "        if left:",
+        "        if False:",
+        "A service that is restarted leaves motors that nobody commands.",
+        (GATEWAY,),
+    ),
+    Defect(
         "stop-word-of-another-chart",
         "tui/drive/foreign_write.py",
         "return bool(charts) and all(",

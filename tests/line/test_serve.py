@@ -233,6 +233,36 @@ def test_it_becomes_the_owner_when_the_one_before_ends(programs: ExitStack) -> N
         assert "Shared with watch" in said
 
 
+def started_by_a_client(made: Gateway) -> None:
+    """A controller starts the motor: its connection closes, the motor runs on."""
+    with made.client() as client:
+        for address, word in ((REFERENCE, 300), (COMMAND, 6), (COMMAND, 7), (COMMAND, 15)):
+            assert not client.write_register(address, word, device_id=1).isError()
+    wait_until(lambda: turns(made.simulation), "the motor turns")
+
+
+ENABLED = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600})
+
+
+def test_its_end_stops_a_motor_that_a_client_started() -> None:
+    with gateway("--allow-commands", specs=(ENABLED,)) as made:
+        started_by_a_client(made)
+        status, said = made.program.end()
+        assert status == 0
+        assert "Stopped: 1: stopped" in said
+        assert stands(made.simulation)
+        assert made.simulation.drive(1).fault is None
+
+
+def test_a_motor_that_a_client_started_is_stopped_where_it_is_killed(programs: ExitStack) -> None:
+    with gateway("--allow-commands", specs=(ENABLED,)) as made:
+        programs.enter_context(served(records(made.line), ready="{"))
+        started_by_a_client(made)
+        made.program.process.kill()
+        wait_until(lambda: stands(made.simulation), "the motor stops")
+        assert made.simulation.drive(1).fault is None
+
+
 def test_a_motor_that_a_program_left_is_stopped_by_it(programs: ExitStack) -> None:
     with gateway() as made:
         runner = run_beside(programs, made)

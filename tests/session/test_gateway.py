@@ -3,17 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import os
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import AsyncIterator, Callable
 from dataclasses import dataclass
+from pathlib import Path
 
 import pytest
+import pytest_asyncio
 
+from tests.programs import wait_until
 from tui.bus.gateway.server import TcpClient
 from tui.bus.line import Line
 from tui.bus.program import Program
 from tui.drive.profile import library
-from tui.session.gateway.gateway import Gateway, GatewayLine
+from tui.session.gateway.gateway import Gateway
+from tui.session.gateway.line import GatewayLine
 from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
 from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
@@ -73,20 +78,20 @@ class Bench:
 Make = Callable[..., Bench]
 
 
-@pytest.fixture
-def bench(start: Start, journal: Journal) -> Iterator[Make]:
+@pytest_asyncio.fixture
+async def bench(start: Start, journal: Journal) -> AsyncIterator[Make]:
     """A gateway with these rules, on an Altivar 71 at address 1 unless told otherwise."""
     gateways: list[Gateway] = []
 
     def make(*specs: DriveSpec, **rules: object) -> Bench:
         simulation, line = start(*(specs or [DriveSpec("atv71", 1, sets={"CHCF": 1})]))
         kept = GatewayRules(**rules)  # type: ignore[arg-type]
-        gateways.append(Gateway([GatewayLine(line)], unit_map(1, ()), kept, journal))
+        gateways.append(Gateway([GatewayLine(line, journal)], unit_map(1, ()), kept))
         return Bench(simulation, line, gateways[-1], journal, TcpClient(1, "10.0.0.9:5000"))
 
     yield make
     for gateway in gateways:
-        gateway.close()
+        await gateway.close()
 
 
 async def test_reads_pass_and_a_drive_that_is_not_there_is_exception_11(bench: Make) -> None:
@@ -203,6 +208,35 @@ async def test_commands_that_are_allowed_run_the_motor_and_claim_it(bench: Make)
     assert await made.write(CMD, 0x0007) == 0
     assert 1 not in facts.commanders
     await wait_for(lambda: drive.motor.frequency == 0)
+
+
+async def start_motor(made: Bench) -> None:
+    assert await made.write(LFR, 300) == 0
+    for word in (0x0006, 0x0007, 0x000F):
+        assert await made.write(CMD, word) == 0
+    await wait_for(lambda: made.simulation.drive(1).motor.frequency > 3)
+
+
+def recorded() -> int:
+    return len(list(Path(os.environ["DRIVEPANEL_STATE"], "starts").iterdir()))
+
+
+async def test_a_motor_that_a_client_started_is_on_record_until_it_stands(bench: Make) -> None:
+    made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600}), commands=True)
+    await start_motor(made)
+    assert recorded() == 1
+    assert await made.write(CMD, 0x0007) == 0
+    await asyncio.to_thread(wait_until, lambda: recorded() == 0, "the record goes")
+    assert made.simulation.drive(1).motor.frequency == 0
+
+
+async def test_the_end_of_the_gateway_stops_what_its_clients_started(bench: Make) -> None:
+    made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 600}), commands=True)
+    await start_motor(made)
+    (told,) = await made.gateway.close()
+    assert "1: stopped" in told.text
+    assert made.simulation.drive(1).motor.frequency == 0
+    assert made.simulation.drive(1).fault is None
 
 
 async def test_a_client_that_repeats_its_run_word_does_not_undo_a_stop(bench: Make) -> None:

@@ -10,6 +10,7 @@ from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from enum import Enum
 from functools import lru_cache
+from typing import Literal
 
 from .channel import channel_codes
 from .chart import state_of
@@ -22,6 +23,8 @@ from .values import check_raw, from_words, is_field, word_count
 
 ALL = "all"
 """In place of codes: every setting that may be written without being named."""
+
+StartDirection = Literal["forward", "reverse"]
 
 
 class WordKind(Enum):
@@ -70,6 +73,32 @@ def _word(profile: Profile, address: int, word: int, raws: Mapping[str, int]) ->
     if found and all(is_setting(profile, one) for one in found):
         return ForeignWord(address, word, WordKind.SETTING, found)
     return ForeignWord(address, word, WordKind.UNKNOWN, found)
+
+
+def starts_by(profile: Profile, words: Collection[ForeignWord]) -> StartDirection | None:
+    """Whether words may start the motor, and which way by what is known; None where none may.
+
+    Every command counts but a reference, which starts nothing that no command has enabled.
+    """
+    references = {reference.parameter for reference in profile.data.references}
+    found = [
+        one
+        for one in words
+        if one.kind is WordKind.COMMAND
+        and not all(
+            p.code in references or p.quantity in ("command_frequency", "command_speed")
+            for p in one.parameters
+        )
+    ]
+    back = {
+        order.words[-1] & 0xFFFF
+        for chart in profile.data.charts
+        for order in chart.orders
+        if order.id == "reverse"
+    }
+    if not found:
+        return None
+    return "reverse" if any(one.word in back for one in found) else "forward"
 
 
 @lru_cache(maxsize=32)

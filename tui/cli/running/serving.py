@@ -70,10 +70,11 @@ async def _gateway(
         service.stopping()
         return
     from tui.bus.gateway.server import TcpGateway
-    from tui.session.gateway.gateway import Gateway, GatewayLine
+    from tui.session.gateway.gateway import Gateway
+    from tui.session.gateway.line import GatewayLine
 
-    lines = [GatewayLine(one.line, _noting(one)) for one in opened]
-    gateway = Gateway(lines, wish.units, wish.rules, journal)
+    lines = [GatewayLine(one.line, journal, _noting(one)) for one in opened]
+    gateway = Gateway(lines, wish.units, wish.rules)
     server = TcpGateway(gateway.answer, gateway.gone)
     try:
         try:
@@ -88,7 +89,8 @@ async def _gateway(
     finally:
         service.stopping()
         await server.close()
-        gateway.close()
+        for told in await gateway.close():
+            say(f"drivepanel: {told.head if told.failed else 'Stopped:'} {told.text}", err=True)
 
 
 def _noting(opened: OpenLine) -> Note:

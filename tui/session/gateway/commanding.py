@@ -12,6 +12,8 @@ from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
 from tui.bus.program import Program
 
+from .started import StartedMotors
+
 log = logging.getLogger(__name__)
 
 STOPPED_ELSEWHERE = (
@@ -28,8 +30,12 @@ class GatewayCommanding:
     """
 
     def __init__(
-        self, line: ModbusLine, stands: Callable[[int], Coroutine[Any, Any, bool]]
+        self,
+        line: ModbusLine,
+        stands: Callable[[int], Coroutine[Any, Any, bool]],
+        started: StartedMotors,
     ) -> None:
+        self._started = started
         self._line = line
         self._stands = stands
         self._lock = threading.Lock()
@@ -71,6 +77,7 @@ class GatewayCommanding:
         with self._lock:
             self._stopped.pop(device, None)
         self._release(device)
+        self._started.stopped(device)
 
     def gone(self, client: str) -> None:
         """A client has closed its connection."""
@@ -111,4 +118,5 @@ class GatewayCommanding:
         if yes:
             with self._lock:
                 self._by.pop(device, None)
+            self._started.given(device)
         self._line.facts.answer(device, program.id, yes=yes)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Mapping, Sequence
-from functools import partial
 
 from tui.bus.api import IdentificationObjects, ModbusLine, Priority
 from tui.bus.errors import (
@@ -36,45 +35,14 @@ from tui.bus.gateway.pdu import (
     words_pdu,
 )
 from tui.bus.gateway.server import TcpClient
-from tui.drive.chart import read_chart
 from tui.drive.errors import DriveError
 
-from ..journal import Journal
-from ..read.reader import Reader
-from .commanding import GatewayCommanding
-from .drives import GatewayDrives, Note
+from ..command.stop_report import StopSummary
+from .line import GatewayLine
 from .rules import GatewayRules
 from .writes import GatewayWrite
 
 log = logging.getLogger(__name__)
-
-STANDING_STILL = ("stopped", "ready", "blocked")
-
-
-class GatewayLine:
-    """One line of a gateway: its drives, and who commands them."""
-
-    def __init__(self, line: ModbusLine, note: Note = lambda *_: None) -> None:
-        self.line = line
-        self.drives = GatewayDrives(line, note)
-        self.commanding = GatewayCommanding(line, self._stands)
-
-    def close(self) -> None:
-        """Leave the line alone."""
-        self.drives.close()
-        self.commanding.close()
-
-    async def _stands(self, device: int) -> bool:
-        """Whether a motor surely stands now, asked for another program that wants the drive."""
-        session = self.drives.known(device)
-        if session is None:
-            return False
-        codes = list(dict.fromkeys(chart.status for chart in session.profile.data.charts))
-        try:
-            await Reader(session).read(codes)
-        except LineError:
-            return False
-        return read_chart(session.profile, session.image.fresh(2.0)).motion in STANDING_STILL
 
 
 class Gateway:
@@ -85,20 +53,17 @@ class Gateway:
         lines: Sequence[GatewayLine],
         units: Mapping[int, tuple[int, int]],
         rules: GatewayRules,
-        journal: Journal,
     ) -> None:
         self._lines = lines
         self._units = units
         self._rules = rules
-        self._journal = journal
         for unit, profile in rules.profiles.items():
             if (place := units.get(unit)) is not None:
                 lines[place[0]].drives.named[place[1]] = profile
 
-    def close(self) -> None:
-        """Leave all lines alone."""
-        for line in self._lines:
-            line.close()
+    async def close(self) -> list[StopSummary]:
+        """Leave all lines alone; what became of the motors that had to be stopped."""
+        return [told for line in self._lines if (told := await line.close()) is not None]
 
     def gone(self, client: TcpClient) -> None:
         """A client has closed its connection."""
@@ -169,10 +134,7 @@ class Gateway:
         session = line.drives.known(device) or await line.drives.found(device)
         if session is None:
             raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
-        sure = partial(line.drives.found, device)
-        write = GatewayWrite(
-            session, asked, client.peer, self._rules, line.commanding, self._journal, sure, stamp
-        )
+        write = GatewayWrite(line, session, asked, client.peer, self._rules, stamp)
         return await write.carry_out()
 
     async def _diagnose(self, line: GatewayLine, device: int, asked: DiagnoseAsked) -> bytes:

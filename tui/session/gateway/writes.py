@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Mapping
 from typing import NoReturn
 
 from tui.bus.api import Priority
@@ -20,9 +20,11 @@ from tui.bus.gateway.pdu import (
 from tui.drive.chart import read_chart
 from tui.drive.foreign_write import (
     ForeignWord,
+    StartDirection,
     WordKind,
     foreign_words,
     setting_refusal,
+    starts_by,
     stop_deciding_codes,
     value_refusal,
 )
@@ -32,10 +34,10 @@ from tui.drive.shown import depends_on, shown_text
 from tui.drive.values import from_words, word_count
 
 from ..drive import DriveSession
-from ..journal import Entry, Journal, now_text
+from ..journal import Entry, now_text
 from ..read.reader import Reader
 from ..reading import Reading
-from .commanding import GatewayCommanding
+from .line import GatewayLine
 from .rules import GatewayRules
 
 log = logging.getLogger(__name__)
@@ -49,23 +51,18 @@ class GatewayWrite:
 
     def __init__(
         self,
+        line: GatewayLine,
         session: DriveSession,
         asked: WriteAsked,
         client: str,
         rules: GatewayRules,
-        commanding: GatewayCommanding,
-        journal: Journal,
-        sure: Callable[[], Awaitable[DriveSession | None]],
         stamp: int,
     ) -> None:
-        self._sure = sure
-        """Who the drive is, asked again where that is in doubt."""
+        self._line = line
         self._session = session
         self._asked = asked
         self._client = client
         self._rules = rules
-        self._commanding = commanding
-        self._journal = journal
         self._stamp = stamp
         """The drive's count of stops when it came: one that comes later voids it."""
 
@@ -79,7 +76,8 @@ class GatewayWrite:
             # first of all: whatever becomes of the rest
             await self._send_alone(one)
         await self._check(words)
-        return await self._send(Priority.OPERATOR_WRITE)
+        order = starts_by(self._session.profile, words)
+        return await (self._start(order) if order else self._send(Priority.OPERATOR_WRITE))
 
     async def _told_apart(self) -> list[ForeignWord]:
         """What each word does; what decides about a stop is read where it is not sure yet."""
@@ -100,7 +98,7 @@ class GatewayWrite:
 
     async def _check(self, words: list[ForeignWord]) -> None:
         """Raise Unanswerable where the request is not allowed as a whole."""
-        drive = await self._sure()
+        drive = await self._line.drives.found(self._session.device)
         if drive is None or drive.profile.id != self._session.profile.id:
             self._refuse(BUSY, "another drive answers now")
         if any(one.kind is WordKind.UNKNOWN for one in words):
@@ -116,7 +114,7 @@ class GatewayWrite:
                 self._refuse(ILLEGAL_FUNCTION, why)
         await self._check_values(settings)
         if commands:
-            why = self._commanding.claim(self._session.device, self._client)
+            why = self._line.commanding.claim(self._session.device, self._client)
             if why:
                 self._refuse(BUSY, why)
 
@@ -145,8 +143,21 @@ class GatewayWrite:
         )  # fmt: skip
         raise Unanswerable(code, why)
 
+    async def _start(self, order: StartDirection) -> bytes:
+        """Send what may start the motor, once that is on record. Raises StartNotRecorded."""
+        begun = await self._line.started.begin(self._session, order)
+        sent = True
+        try:
+            return await self._send(Priority.OPERATOR_WRITE)
+        except Unanswerable:
+            sent = False
+            raise
+        finally:
+            if begun or sent:
+                self._line.started.sent(self._session, sent=sent)
+
     async def _send_alone(self, one: ForeignWord) -> None:
-        self._commanding.stop(self._session.device, self._client)
+        self._line.commanding.stop(self._session.device, self._client)
         self._stamp = self._session.line.facts.stops.stamp(self._session.device)
         answer = "ok"
         try:
@@ -163,7 +174,7 @@ class GatewayWrite:
         """The request as it came; its answer. Each parameter of it goes to the journal."""
         stops = priority is Priority.STOP
         if stops:
-            self._commanding.stop(self._session.device, self._client)
+            self._line.commanding.stop(self._session.device, self._client)
         parameters = _each(foreign_words(self._session.profile, self._asked.words, {}))
         before = {one.code: self._session.image.get(one.code) for one in parameters}
         answer = "ok"
@@ -224,7 +235,7 @@ class GatewayWrite:
                 continue
             held = before.get(one.code)
             old, new = held.raw if held else None, from_words(one, [words[at] for at in own])
-            self._journal.add(
+            self._line.journal.add(
                 Entry(
                     time=now_text(),
                     line=session.line_text,

@@ -1,0 +1,46 @@
+"""One line of a gateway: its drives, who commands them, and which motors were started."""
+
+from __future__ import annotations
+
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineError
+from tui.drive.chart import read_chart
+
+from ..command.stop_report import StopSummary
+from ..journal import Journal
+from ..read.reader import Reader
+from .commanding import GatewayCommanding
+from .drives import GatewayDrives, Note
+from .started import StartedMotors
+
+STANDING_STILL = ("stopped", "ready", "blocked")
+
+
+class GatewayLine:
+    """One line of a gateway: its drives, and who commands them."""
+
+    def __init__(self, line: ModbusLine, journal: Journal, note: Note = lambda *_: None) -> None:
+        self.line = line
+        self.journal = journal
+        self.drives = GatewayDrives(line, note)
+        self.started = StartedMotors(line, journal)
+        self.commanding = GatewayCommanding(line, self._stands, self.started)
+
+    async def close(self) -> StopSummary | None:
+        """Leave the line alone; what became of motors that clients had started, None for none."""
+        summary = await self.started.end()
+        self.commanding.close()
+        self.drives.close()
+        return summary
+
+    async def _stands(self, device: int) -> bool:
+        """Whether a motor surely stands now, asked for another program that wants the drive."""
+        session = self.drives.known(device)
+        if session is None:
+            return False
+        codes = list(dict.fromkeys(chart.status for chart in session.profile.data.charts))
+        try:
+            await Reader(session).read(codes)
+        except LineError:
+            return False
+        return read_chart(session.profile, session.image.fresh(2.0)).motion in STANDING_STILL

@@ -1,0 +1,119 @@
+"""Motors that clients have started: on record before the frame, stopped when the gateway ends.
+
+The record is what other programs on the line go by where this one is killed: they stop the motor.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+
+from tui.bus.api import ModbusLine
+from tui.bus.errors import LineClosed, LineError
+from tui.drive.foreign_write import StartDirection
+
+from ..command.stop import Stopper
+from ..command.stop_report import StopSummary
+from ..drive import DriveSession
+from ..journal import Journal
+from ..read.reader import Reader
+from ..starts.keeper import StartKeeper
+
+log = logging.getLogger(__name__)
+
+STANDSTILL_LOOK = 0.5
+LONGEST_LOOK = 300.0
+"""Seconds after a stop in which the motor is looked at until it stands."""
+CLIENT_MOTORS_STOP_WITHIN = 10.0
+"""Seconds that the end of the gateway waits for its motors."""
+
+
+class StartedMotors:
+    """The motors of one line that clients have started; lives in the gateway's loop.
+
+    A motor is looked at after a stop only: before, that would keep its drive from noticing that
+    its controller is lost.
+    """
+
+    def __init__(self, line: ModbusLine, journal: Journal) -> None:
+        self._line = line
+        self._journal = journal
+        self._keeper = StartKeeper("serve")
+        self._sessions: dict[int, DriveSession] = {}
+        self._looks: dict[int, asyncio.Task[None]] = {}
+        self._loop = asyncio.get_running_loop()
+        self._leave = line.facts.on_stop(lambda devices, *_: self.stopped(*devices))
+
+    async def begin(self, session: DriveSession, order: StartDirection) -> bool:
+        """Put a start on record, before its frame; False where it is already.
+
+        Raises StartNotRecorded.
+        """
+        session.starts = self._keeper
+        self._sessions[session.device] = session
+        look = self._looks.pop(session.device, None)
+        if look is not None:
+            # the rest before this start must not end its record
+            look.cancel()
+        elif self._keeper.holds(session.device):
+            # a controller repeats its word: the disk is written once
+            return False
+        await asyncio.to_thread(self._keeper.begin, session, order)
+        return True
+
+    def sent(self, session: DriveSession, *, sent: bool) -> None:
+        """The frame went out, or was refused before."""
+        (self._keeper.sent if sent else self._keeper.never_sent)(session)
+
+    def stopped(self, *devices: int) -> None:
+        """A stop was given, by whomever: see the motors stand. For any thread."""
+        for device in devices:
+            if self._keeper.holds(device):
+                self._loop.call_soon_threadsafe(self._look_at, device)
+
+    def given(self, device: int) -> None:
+        """Another program commands the drive from now on."""
+        if (session := self._sessions.get(device)) is not None:
+            self._keeper.give_away(session)
+
+    def _look_at(self, device: int) -> None:
+        if device not in self._looks:
+            task = self._loop.create_task(self._until_standing(device), name=f"stands {device}")
+            self._looks[device] = task
+            task.add_done_callback(lambda done: self._looked(device, done))
+
+    def _looked(self, device: int, task: asyncio.Task[None]) -> None:
+        if self._looks.get(device) is task:
+            del self._looks[device]
+        if not task.cancelled() and (error := task.exception()) is not None:
+            log.error("device %s was not seen to stand: %r", device, error)
+
+    async def _until_standing(self, device: int) -> None:
+        session = self._sessions[device]
+        codes = list(dict.fromkeys(chart.status for chart in session.profile.data.charts))
+        end = self._loop.time() + LONGEST_LOOK
+        while self._keeper.holds(device) and self._loop.time() < end:
+            try:
+                await Reader(session).read(codes)
+            except LineClosed:
+                return
+            except LineError as error:
+                log.info("device %s was not seen to stand: %s", device, error)
+            await session.clock.sleep(STANDSTILL_LOOK)
+
+    async def end(self) -> StopSummary | None:
+        """Stop what still runs: nobody commands it any more. None where nothing does."""
+        self._leave()
+        left = [one for device, one in self._sessions.items() if self._keeper.holds(device)]
+        summary = None
+        if left:
+            stopper = Stopper(self._line, self._journal)
+            try:
+                stopper.stop(left, by="the end of serve")
+                summary = await asyncio.to_thread(stopper.wait, left, CLIENT_MOTORS_STOP_WITHIN)
+            except LineClosed as error:
+                log.error("motors were not stopped: %s", error)
+        for task in tuple(self._looks.values()):
+            task.cancel()
+        await asyncio.to_thread(self._keeper.close)
+        return summary
