@@ -120,7 +120,7 @@ def test_where_a_key_has_a_meaning() -> None:
     assert elsewhere("monitor", "asterisk", "*").startswith("* has a meaning on Parameters (3)")
     assert elsewhere("parameters", "less_than_sign", "<").startswith("< has a meaning on Monitor")
     assert elsewhere("monitor", "r") == ""
-    assert elsewhere("monitor", "j", "j") == ""
+    assert elsewhere("monitor", "Y", "Y") == ""
 
 
 KEY_OF = {name: key for name, key, _ in PLACES}

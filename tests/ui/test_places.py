@@ -14,7 +14,7 @@ from tui.bus.line import Frame
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.drive.values import type_range
-from tui.screens.frames.screen import frame_line
+from tui.screens.frames.frame_view import frame_line
 from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, of_screen
 from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
 from tui.screens.monitor.assembly import monitor_parts, watched_words
@@ -218,7 +218,7 @@ def test_no_key_is_dropped_at_80_columns(screen: str) -> None:
     width=st.integers(60, 200),
 )
 def test_a_frame_fits_its_line_and_keeps_its_note(data: bytes, note: str, width: int) -> None:
-    line = frame_line(Frame(0.0, "in", data, note), 3.0, width)
+    line = frame_line(Frame(0.0, "in", data, note), 3.0, 0.012, width)
     assert line.cell_len <= width
     assert line.plain.endswith(note)
     assert ("…" in line.plain) == (data.hex(" ").upper() not in line.plain)

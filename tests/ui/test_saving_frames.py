@@ -14,7 +14,8 @@ from tests.programs import PATIENCE
 from tui.app import DrivePanelApp
 from tui.bus.api import Frame
 from tui.screens.dialogs.ask import Ask
-from tui.screens.frames.saving import frame_text, save_frames
+from tui.screens.frames.frame_view import frames_text
+from tui.screens.frames.saving import KeptFrames, save_frames
 from tui.screens.frames.screen import FramesScreen
 from tui.wire.frames import is_whole, sealed
 
@@ -34,10 +35,8 @@ WORDS = ("2 read ETA", "", "2 ETA 16#0637")
 def save(path: Path, frames: tuple[Frame, ...] = FRAMES, *, tcp: bool = False) -> int:
     """Save frames as the screen does; the line's clock began at the time 100."""
     words = WORDS if len(frames) == len(WORDS) else [""] * len(frames)
-    return save_frames(
-        path, frames, words, "serial:x", tcp=tcp,
-        wall_of=lambda time: time + 100, time_text=lambda wall: f"{wall:.2f}",
-    )  # fmt: skip
+    text = frames_text(frames, range(len(frames)), words, 100.0, ["serial:x"])
+    return save_frames(path, KeptFrames(frames, text, "serial:x", tcp, 100.0))
 
 
 def packets(path: Path) -> list[bytes]:
@@ -85,16 +84,19 @@ def test_frames_of_modbus_tcp_have_one_form(tmp_path: Path) -> None:
 def test_as_text(tmp_path: Path) -> None:
     path = tmp_path / "frames.txt"
     assert save(path) == 3
-    assert path.read_text("utf-8").splitlines() == [
-        "101.00  out  02 03 0C 81 00 01 D7 41  2 read ETA",
-        "101.01  in   00 02",
-        "101.02  in   02 03 02 06 37 BE 32  2 ETA 16#0637",
+    head, columns, *lines = path.read_text("utf-8").splitlines()
+    assert (head, columns.split("\t")[-1]) == ("# serial:x", "bytes")
+    told = [line.split("\t") for line in lines]
+    assert [one[2:] for one in told] == [
+        ["request", "2 read ETA", "", "02 03 0C 81 00 01 D7 41"],
+        ["reply", "", "", "00 02"],
+        ["reply", "2 ETA 16#0637", "", "02 03 02 06 37 BE 32"],
     ]
 
 
 def test_a_note_is_text_and_commands_nothing() -> None:
-    text = frame_text(Frame(1.0, "in", b"\x00", "\x1b[2J"), "", "now")
-    assert text == "now  in   00  ␛[2J"
+    frame = Frame(1.0, "in", b"\x00", "\x1b[2J")
+    assert "␛[2J" in frames_text([frame], [0], [""], 0.0, [])
 
 
 def test_a_file_that_is_there_is_kept(tmp_path: Path) -> None:

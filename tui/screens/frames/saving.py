@@ -1,64 +1,93 @@
-"""The frames of the line in a file: for tshark, or as text."""
+"""Saving frames to a file whose name the person may change: for tshark, or as a text."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
 
 from tui.bus.api import Frame
-from tui.drive.plain import plain
 from tui.session.capture_file import CaptureFile
-from tui.wire.frames import hex_text, is_whole
+from tui.session.paths import state_folder
+from tui.wire.frames import is_whole
 
 from .decoded import MBAP_BYTES, pdu_of
+
+if TYPE_CHECKING:
+    from ..app_port import Panel
 
 RAW_NAME, TEXT_NAME = ".raw.pcapng", ".txt"
 """How a name ends that is for frames as they are on the line, or for text."""
 SAVED_AS = (
     "pcapng as Modbus/TCP, which tshark decodes at once; a name with .raw.pcapng as RTU with its"
-    " checksums, one with .txt as text."
+    " checksums, one with .txt as text, a line a frame with tabs between."
 )
 
-WallOf = Callable[[float], float]
-"""The time since 1970 of a time of the line's clock."""
+
+class KeptFrames(NamedTuple):
+    """Frames to save, and what goes with them into a file."""
+
+    frames: Sequence[Frame]
+    text: str
+    """All of them as a text."""
+    line: str
+    tcp: bool
+    since_epoch: float
+    """What is added to a frame's time for that since 1970."""
 
 
-def save_frames(
-    path: Path,
-    frames: Sequence[Frame],
-    words: Sequence[str],
-    line: str,
-    *,
-    tcp: bool,
-    wall_of: WallOf,
-    time_text: Callable[[float], str],
-) -> int:
-    """Write frames to a new file, in the form that its name asks for; how many it holds.
+def ask_where(app: Panel, kept: KeptFrames) -> None:
+    """Ask for the file, and save the frames in the form that its name asks for."""
+    from ..dialogs.ask import Ask
+    from ..dialogs.files import fault_of_new
 
-    `words` are what each frame says. Frames of Modbus TCP have no other form than that. Raises
-    OSError.
+    if not kept.frames:
+        app.tell("Nothing to save: no frame is shown.")
+        return
+    name = time.strftime("frames-%Y%m%d-%H%M%S.pcapng", time.localtime(app.clock.wall()))
+
+    def told(answer: str | None) -> None:
+        if answer:
+            _save(app, Path(answer).expanduser(), kept)
+
+    asked = Ask(
+        "Save the frames as",
+        fault_of_new,
+        text=str(state_folder() / name),
+        about=SAVED_AS,
+        takes="writes the file",
+    )
+    app.push_screen(asked, told)
+
+
+def _save(app: Panel, path: Path, kept: KeptFrames) -> None:
+    try:
+        count = save_frames(path, kept)
+    except OSError as error:
+        app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
+    else:
+        app.tell(f"Saved: {count} frames in {path}")
+
+
+def save_frames(path: Path, kept: KeptFrames) -> int:
+    """Write frames to a new file; how many it holds. Raises OSError.
+
+    Frames of Modbus TCP have no raw form.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     if path.name.endswith(TEXT_NAME):
         with path.open("x", encoding="utf-8") as text:
-            for frame, said in zip(frames, words, strict=True):
-                text.write(f"{frame_text(frame, said, time_text(wall_of(frame.time)))}\n")
-        return len(frames)
-    raw = path.name.endswith(RAW_NAME) and not tcp
-    file = CaptureFile(path, line, raw=raw)
+            text.write(kept.text)
+        return len(kept.frames)
+    raw = path.name.endswith(RAW_NAME) and not kept.tcp
+    file = CaptureFile(path, kept.line, raw=raw)
     try:
-        for frame in frames:
-            _add(file, frame, wall_of(frame.time), tcp=tcp)
+        for frame in kept.frames:
+            _add(file, frame, kept.since_epoch + frame.time, tcp=kept.tcp)
     finally:
         file.close()
     return file.packets
-
-
-def frame_text(frame: Frame, words: str, at: str) -> str:
-    """One frame as a line of text: time, direction, bytes, what it says, and its note."""
-    direction = "out" if frame.direction == "out" else "in "
-    said = "  ".join(part for part in (words, frame.note) if part)
-    return plain(f"{at}  {direction}  {hex_text(frame.data)}  {said}".rstrip())
 
 
 def _add(file: CaptureFile, frame: Frame, wall: float, *, tcp: bool) -> None:

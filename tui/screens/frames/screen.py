@@ -1,84 +1,141 @@
-"""Frames: what went over the line, in codes and values, and as bytes."""
+"""Frames: what went over the line, in codes and values, as bytes, and counted."""
 
 from __future__ import annotations
 
-import time
-from collections.abc import Mapping
-from datetime import datetime
-from pathlib import Path
-from typing import ClassVar
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Literal
 
 from rich.text import Text
 from textual.app import ComposeResult
+from textual.containers import Horizontal
+from textual.widgets import Input
 
 from tui.bus.api import Frame
 from tui.bus.link import TcpLink, label
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
-from tui.session.paths import state_folder
-from tui.widgets.drawing import cut, cut_at_word, rule, short
+from tui.widgets.drawing import rule
+from tui.widgets.fields import Field
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
-from tui.wire.frames import hex_text
+from tui.widgets.plain import Plain
 
-from ..base import PanelScreen
-from ..dialogs.files import fault_of_new
 from ..keys.table import FRAMES, bindings
+from .choice import choice_of, chosen
+from .counter_keys import CounterKeys
 from .decoded import decoded
+from .frame_view import BESIDE_BYTES, frame_line, frames_text, gaps
+from .saving import KeptFrames, ask_where
 
-FEWEST = 12
-"""Columns of bytes that are shown, however long the note on the frame is."""
-
-
-BYTES_WIDTH = 44
-"""Columns of the bytes where they stand beside the words."""
-BESIDE_BYTES = 110
-"""Columns from which on words and bytes stand side by side."""
-
-
+Page = Literal["words", "bytes", "counters"]
+PAGES: tuple[Page, ...] = ("words", "bytes", "counters")
 FEW = 6
 """Frames that are shown on a slow link while they come."""
+FILTER_HINT = "drive, function, error, or what it says: 2 read error"
+FIND_HINT = "Enter: the one before; drive, function, error, or what it says"
 
 
-class FramesScreen(PanelScreen):
-    """The frame log of the line in words; the newest at the bottom."""
+class FramesScreen(CounterKeys):
+    """The frame log of the line in words, the newest at the bottom; then its counters."""
 
     CSS_PATH = "frames.tcss"
     BINDINGS: ClassVar = bindings(FRAMES)
     TITLE = "Frames"
     LOOK = 0.5
+    AUTO_FOCUS: ClassVar = ""
+    """None: while the field has the focus, Space is text and stops nothing."""
 
     def __init__(self, console: DriveConsole) -> None:
-        super().__init__()
-        self.console = console
+        super().__init__(console)
         self._line = console.session.line
         self._held: tuple[Frame, ...] | None = None
-        self._bytes = False
+        self._up = 0
+        """How many frames below the last one shown are out of sight."""
+        self._page: Page = "words"
+        self._filter = ""
+        self._asking: Literal["", "filter", "find"] = ""
+        self._found: Frame | None = None
+        self._room = 1
+        self._since_epoch = 0.0
+        """What is added to a frame's time; taken once, or times that stay would tremble."""
 
     def body(self) -> ComposeResult:
-        """One list."""
+        """One list, and under it the field for what is wanted of it."""
         yield Lines(id="frames")
+        with Horizontal(id="wanted"):
+            yield Plain("", id="which")
+            yield Field(id="typed")
+
+    def on_mount(self) -> None:
+        """Nothing is asked for yet."""
+        self._since_epoch = self.app.clock.wall() - self.app.clock.monotonic()
+        self.query_one("#wanted").display = False
+
+    @property
+    def shows_counters(self) -> bool:
+        """Whether the counters stand in the place of the frames."""
+        return self._page == "counters"
 
     def draw(self, width: int) -> None:
-        """Show the newest frames that fit."""
+        """Show the counters, or the newest frames that fit."""
         super().draw(width)
-        frames = self._held if self._held is not None else tuple(self._line.trace)
-        room, columns, few = max(1, self.size.height - 5), width, ""
+        self._room = max(1, self.size.height - (6 if self._asking else 5))
+        if self.shows_counters:
+            self.put("frames", self.counter_lines(width, self._room + 1))
+            return
+        frames = self._kept
+        room, columns, few = self._room, width, ""
         if self.app.low_bandwidth and self._held is None:
             # all of them anew each time is more than a slow link carries
             room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h shows all, "
-        # one more than fits: a reply at the top is told by its request
-        told = decoded(
-            frames[-room - 1 :], self._profile, self._raws, tcp=isinstance(self._line.link, TcpLink)
-        )[-room:]
+        places = self._places(frames)
+        self._up = min(self._up, max(0, len(places) - room))
+        end = len(places) - self._up
+        count = f"{len(places)} of {len(frames)}" if self._filter else f"{len(frames)}"
+        lines = [rule(self._title(), width, f"{few}{count} kept")]
+        shown = places[max(0, end - room) : end]
+        self.put("frames", lines + self._lines(frames, shown, columns))
+
+    def _title(self) -> str:
         held = " (held)" if self._held is not None else ""
-        lines = [rule(f"Frames on the line{held}", width, f"{few}{len(frames)} kept")]
-        now = self.app.clock.monotonic()
-        for frame, words in zip(frames[-room:], told, strict=True):
-            if self._bytes:
-                words = ""
-            lines.append(frame_line(frame, now, columns, words))
-        self.put("frames", lines)
+        only = f", only {self._filter}" if self._filter else ""
+        return f"Frames on the line{only}{held}"
+
+    @property
+    def _kept(self) -> tuple[Frame, ...]:
+        return self._held if self._held is not None else tuple(self._line.trace)
+
+    def _places(self, frames: Sequence[Frame]) -> list[int]:
+        """Places of the frames that are wanted."""
+        return chosen(frames, choice_of(self._filter), self._told, tcp=self._is_tcp)
+
+    def _lines(self, frames: Sequence[Frame], places: Sequence[int], width: int) -> list[Text]:
+        between, told = gaps(frames), dict(zip(places, self._words(frames, places), strict=True))
+        return [
+            frame_line(
+                frames[at],
+                self._since_epoch + frames[at].time,
+                between[at],
+                width,
+                told[at] if self._page == "words" else "",
+                found=frames[at] is self._found,
+            )
+            for at in places
+        ]
+
+    def _words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
+        """What some frames say; a reply is told by its request, seen or not."""
+        if not places:
+            return []
+        first = places[0] - 1 if places[0] else 0
+        told = self._told(frames[first : places[-1] + 1])
+        return [told[at - first] for at in places]
+
+    def _told(self, frames: Sequence[Frame]) -> list[str]:
+        return decoded(frames, self._profile, self._raws, tcp=self._is_tcp)
+
+    @property
+    def _is_tcp(self) -> bool:
+        return isinstance(self._line.link, TcpLink)
 
     def _profile(self, device: int) -> Profile | None:
         console = self.app.fleet.console(device) if self.app.fleet else None
@@ -88,86 +145,117 @@ class FramesScreen(PanelScreen):
         console = self.app.fleet.console(device) if self.app.fleet else None
         return console.session.image.raws if console else {}
 
+    # Holding, scrolling, pages
+
     def action_hold(self) -> None:
         """Hold the list still, or let it run."""
         self._held = tuple(self._line.trace) if self._held is None else None
+        self._up, self._found = 0, None
         self.look()
 
-    def action_save_file(self) -> None:
-        """Write the frames that are kept, or held, to a file whose name the person may change."""
-        from ..dialogs.ask import Ask
-        from .saving import SAVED_AS
-
-        frames = self._held if self._held is not None else tuple(self._line.trace)
-        if not frames:
-            self.app.tell("Nothing to save: no frame is kept yet.")
+    def action_scroll(self, frames: int) -> None:
+        """Older frames or newer ones; the list is held."""
+        if self.shows_counters:
             return
-        name = f"frames-{time.strftime('%Y%m%d-%H%M%S')}.pcapng"
-        proposed = str(state_folder() / name)
-
-        def told(name: str | None) -> None:
-            if name:
-                self._write(Path(name).expanduser(), frames)
-
-        asked = Ask(
-            "Save the frames as",
-            fault_of_new,
-            text=proposed,
-            about=SAVED_AS,
-            takes="writes the file",
-        )
-        self.app.push_screen(asked, told)
-
-    def _write(self, path: Path, frames: tuple[Frame, ...]) -> None:
-        from .saving import save_frames
-
-        tcp = isinstance(self._line.link, TcpLink)
-        words = decoded(frames, self._profile, self._raws, tcp=tcp)
-        since_1970 = time.time() - self.app.clock.monotonic()
-        try:
-            count = save_frames(
-                path,
-                frames,
-                words,
-                label(self._line.link),
-                tcp=tcp,
-                wall_of=lambda moment: moment + since_1970,
-                time_text=_time_text,
-            )
-        except OSError as error:
-            self.app.notify(f"Not saved: {error.strerror or error}: {path}", severity="error")
-        else:
-            self.app.tell(f"Saved: {count} frames in {path}")
+        if self._held is None:
+            self._held = tuple(self._line.trace)
+        self._up = max(0, self._up - frames)
+        self.look()
 
     def action_other_page(self) -> None:
-        """The bytes as they are, or words."""
-        self._bytes = not self._bytes
+        """Words, bytes, counters in turn."""
+        self._page = PAGES[(PAGES.index(self._page) + 1) % len(PAGES)]
+        if self.shows_counters:
+            self._end_asking()
+            self.begin_counters()
         self.look()
 
+    # Filtering and finding
 
-def _time_text(wall: float) -> str:
-    """A time of the day with its date, to the millisecond."""
-    moment = datetime.fromtimestamp(wall).astimezone()
-    return moment.isoformat(sep=" ", timespec="milliseconds")
+    def action_only(self) -> None:
+        """Show only some frames: of a drive, a function, with errors, that say something."""
+        self._ask_for("filter", " only ", self._filter, FILTER_HINT)
 
+    def action_find_frame(self) -> None:
+        """Find a frame: the list is held, and the newest that fits is shown and marked."""
+        self._found = None
+        self._ask_for("find", " find ", "", FIND_HINT)
 
-def frame_line(frame: Frame, now: float, width: int, words: str = "") -> Text:
-    """One frame: how long ago, direction, what it says or its bytes, and what was said of it.
+    def _ask_for(self, what: Literal["filter", "find"], title: str, text: str, hint: str) -> None:
+        if self.shows_counters:
+            self._page = "words"
+        self._asking = what
+        self.query_one("#wanted").display = True
+        self.query_one("#which", Plain).update(title)
+        field = self.query_one("#typed", Input)
+        field.placeholder = hint
+        with field.prevent(Input.Changed):
+            field.value = text
+        self.set_focus(field)
+        self.call_after_refresh(self.look)
 
-    Bytes that form no frame, and all where there are no `words`, are shown as they are.
-    """
-    text = Text(no_wrap=True)
-    text.append(f" {now - frame.time:6.2f} s ", FAINT)
-    text.append("→ " if frame.direction == "out" else "  ← ", STRONG)
-    note = f"  {frame.note}" if frame.note else ""
-    room = max(FEWEST, width - text.cell_len - len(note))
-    if not words:
-        text.append(short(hex_text(frame.data), room), PLAIN)
-    elif width >= BESIDE_BYTES:
-        left = max(FEWEST, room - BYTES_WIDTH)
-        text.append(cut(words, left), PLAIN)
-        text.append(f" {short(hex_text(frame.data), BYTES_WIDTH - 1)}", FAINT)
-    else:
-        text.append(cut_at_word(words, room), PLAIN)
-    text.append(note, ALARM)
-    return text
+    def _end_asking(self) -> None:
+        self._asking = ""
+        self.set_focus(None)
+        self.query_one("#wanted").display = False
+        self.call_after_refresh(self.look)
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """What is typed into the filter has its effect at once."""
+        if self._asking == "filter":
+            self._filter = " ".join(event.value.split())
+            self._up = 0
+            self.look()
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Keep the filter; or the next older frame that fits."""
+        if self._asking == "filter":
+            self._end_asking()
+        elif event.value.strip():
+            self._find(event.value)
+
+    def _find(self, text: str) -> None:
+        if self._held is None:
+            self._held = tuple(self._line.trace)
+        frames = self._held
+        places = self._places(frames)
+        shown = [frames[at] for at in places]
+        fits = chosen(shown, choice_of(text), self._told, tcp=self._is_tcp)
+        before = next((at for at, one in enumerate(shown) if one is self._found), len(shown))
+        older = [at for at in fits if at < before]
+        if not older:
+            self.app.tell("No older frame fits." if self._found else "No frame fits.")
+            self._found = None
+            self.look()
+            return
+        self._found = shown[older[-1]]
+        # in the middle of the list, so that what came before and after it is seen
+        self._up = max(0, len(shown) - older[-1] - 1 - self._room // 2)
+        self.look()
+
+    def action_leave(self) -> None:
+        """Out of the field, then out of a filter, then back to Monitor."""
+        if self._asking or self._filter:
+            if self._asking != "find":
+                self._filter = ""
+            self._end_asking()
+            return
+        super().action_leave()
+
+    # Saving
+
+    def action_save_file(self) -> None:
+        """Save the frames that the list has, filtered as it is: for tshark, or as a text."""
+        frames = self._kept
+        places = self._places(frames)
+        heading = [self.app.line_label, self._title(), f"{len(places)} of {len(frames)} frames"]
+        text = frames_text(
+            frames, places, self._all_words(frames, places), self._since_epoch, heading
+        )
+        shown = [frames[at] for at in places]
+        line = label(self._line.link)
+        ask_where(self.app, KeptFrames(shown, text, line, self._is_tcp, self._since_epoch))
+
+    def _all_words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
+        told = self._told(frames)
+        return [told[at] for at in places]

@@ -102,8 +102,16 @@ ACTIONS: tuple[Action, ...] = (
     *on(
         (FRAMES,),
         ("hold", "h", "hold", "Hold the list still, or let it run."),
-        ("other_page", "tab", "bytes", "The bytes as they are, or codes and values."),
-        ("leave", "escape", "back", "Go back to Monitor."),
+        ("other_page", "tab", "page", "Codes and values, bytes, or the counters."),
+        ("only", "O", "only", "Only some frames: 2 read error; of a drive, a function, errors."),
+        ("find_frame", "j", "find", "Find frames by drive, function, error, or what they say."),
+        ("scroll(-1)", "up", "", "Older frames; the list is held."),
+        ("scroll(1)", "down", "", "Newer frames."),
+        ("scroll(-10)", "pageup", "", "Ten frames older."),
+        ("scroll(10)", "pagedown", "", "Ten frames newer."),
+        ("reset_counters", "C", "", "Count from now on; what others see stays."),
+        ("reset_drive_counters", "Z", "", "Set the drive's own counters to 0; asks."),
+        ("leave", "escape", "back", "Out of the filter, then back to Monitor."),
     ),
     *on(
         (MESSAGES,),

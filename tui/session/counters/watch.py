@@ -91,6 +91,7 @@ class CounterWatch:
     _line: LineCounters = field(init=False)
     """The line when it was begun."""
     _begun: float = field(init=False)
+    _looked: bool = False
     _drive: dict[str, Comparison] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -148,6 +149,10 @@ class CounterWatch:
     async def look(self) -> None:
         """Read the drive's own; what keeps that from being done is in `trouble`."""
         self.trouble = ""
+        if not self._looked:
+            # both sides begin together
+            self._looked = True
+            self.reset_ours()
         try:
             if self.has_diagnostics:
                 await self._look_by_diagnostics()

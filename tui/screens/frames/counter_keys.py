@@ -1,0 +1,112 @@
+"""The counters of Frames: reading those of the drive now and then, and both resets."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from tui.bus.errors import LineError
+from tui.drive.plain import plain
+from tui.session.console import DriveConsole
+
+from ..base import PanelScreen
+
+COUNTERS_EVERY, COUNTERS_SELDOM = 3.0, 10.0
+"""Seconds between two looks at the drive's own counters, and on a slow link."""
+RESETS_NOTHING_ELSE = (
+    "Function 8, sub-function 0A: by the manual it sets the counters of the drive's exchanges to 0"
+    " and nothing else. The motor goes on as it does. Whoever else compares them begins anew."
+)
+
+
+class CounterKeys(PanelScreen):
+    """What the page of counters does."""
+
+    def __init__(self, console: DriveConsole) -> None:
+        super().__init__()
+        self.console = console
+        self.session = console.session
+        self._looking = False
+
+    def on_mount(self) -> None:
+        """Look at the drive's own now and then, while they are shown."""
+        every = COUNTERS_SELDOM if self.app.low_bandwidth else COUNTERS_EVERY
+        self.set_interval(every, self._look_at_drive)
+
+    @property
+    def shows_counters(self) -> bool:
+        """Whether the counters are shown now."""
+        raise NotImplementedError
+
+    def counter_lines(self, width: int, height: int) -> list[Text]:
+        """The page as it is now."""
+        from .counters_view import counters_lines
+
+        session = self.session
+        who = plain(f"drive {session.device}, {session.profile.name}")
+        return counters_lines(self.console.counters.now(), who, width, height)
+
+    def begin_counters(self) -> None:
+        """They are shown from now on."""
+        self._look_at_drive()
+
+    def _look_at_drive(self) -> None:
+        # one after the other: with a silent drive a look takes longer than the time between two
+        if self.shows_counters and self.is_current and not self._looking:
+            self._looking = True
+            self.run_worker(self._read_counters(), group="counters")
+
+    async def _read_counters(self) -> None:
+        try:
+            await self.console.counters.look()
+        finally:
+            self._looking = False
+        self.look()
+
+    def action_reset_counters(self) -> None:
+        """Count from now on; only what this panel shows."""
+        if self._shown_or_told():
+            self.console.counters.reset_ours()
+            self.app.tell("Counted from now on. What was counted since the line was opened stays.")
+            self.look()
+
+    def action_reset_drive_counters(self) -> None:
+        """Ask, then set the drive's own counters to 0."""
+        watch, device = self.console.counters, self.session.device
+        if not self._shown_or_told():
+            return
+        if not watch.can_reset_drive:
+            read_only = self.session.line.read_only
+            why = "the line is read-only" if read_only else "the drive has no such command"
+            self.app.tell(f"The drive's own counters cannot be reset: {why}.")
+            return
+        from ..dialogs.confirm import Confirm
+        from ..dialogs.now import MotorsNow
+
+        def told(sure: bool | None) -> None:
+            if sure:
+                self.run_worker(self._reset_drive(), group="counters")
+
+        asked = Confirm(
+            f"Reset the counters of drive {device}?",
+            RESETS_NOTHING_ELSE,
+            yes="resets them",
+            no="leaves them",
+            loses=True,
+            now=MotorsNow(self.app, [self.session]),
+        )
+        self.app.push_screen(asked, told)
+
+    async def _reset_drive(self) -> None:
+        device = self.session.device
+        try:
+            await self.console.counters.reset_drive()
+        except LineError as error:
+            self.app.events.add("refused", f"Counters not reset: {error}", device)
+        else:
+            self.app.events.add("done", "The drive's counters are reset.", device)
+        self.look()
+
+    def _shown_or_told(self) -> bool:
+        if not self.shows_counters:
+            self.app.tell("Tab shows the counters first.")
+        return self.shows_counters

@@ -1,0 +1,159 @@
+"""The page of counters: ours, the drive's own, its turnarounds, and what they say. Pure."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from rich.text import Text
+
+from tui.session.counters.compare import Comparison
+from tui.session.counters.turnarounds import TurnaroundBar, bars
+from tui.session.counters.watch import CountersNow
+from tui.widgets.drawing import rule, short, wrapped
+from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNING, STRONG
+
+LEFT = 42
+"""Columns of our counts; those of the drive stand beside them."""
+BAR_WIDTH = 7
+TALL, TALL_BARS, LOW_BARS = 30, 6, 1
+"""Rows from which on the bars are tall; the rows of both."""
+EIGHTHS = " ▁▂▃▄▅▆▇█"
+LOAD_CELLS = 20
+MOST_LINES_OF_ONE = 4
+RESETS = "C counts from now, Z resets the drive's"
+BAD = frozenset({"never-arrived", "not-answered", "damaged-there", "damaged-here", "no-answer"})
+"""Differences that are frames lost."""
+
+
+def counters_lines(found: CountersNow, who: str, width: int, height: int) -> list[Text]:
+    """The page in so many lines at most; `who` is the drive, as a person calls it."""
+    by = f"counted by {found.counted_by}" if found.counted_by else "counted by this panel"
+    lines = [rule(f"Counters of {who}", width, by)]
+    lines += beside(our_lines(found), drive_lines(found, width - LEFT), width)
+    lines += load_lines(found)
+    lines.append(rule("Turnaround of the drive, in ms", width, "since the line was opened"))
+    tall = TALL_BARS if height >= TALL else LOW_BARS
+    lines += bar_lines(bars(found.total.turnarounds), tall)
+    lines.append(rule("What differs", width, RESETS))
+    lines += said(found, width, max(1, height - len(lines)))
+    return lines[:height]
+
+
+def our_lines(found: CountersNow) -> list[Text]:
+    """What was counted here: since the line was opened, and since the last reset."""
+    total, since = found.total, found.since
+    head = Text(f" {'Ours':<15}{'since open':>12}{time_text(found.seconds):>12}", FAINT)
+    rows = [
+        ("frames sent", total.requests, since.requests),
+        ("answered", total.replies, since.replies),
+        ("time-outs", total.timeouts, since.timeouts),
+        ("damaged", total.checksum, since.checksum),
+        ("strange", total.wrong, since.wrong),
+        ("refused", sum(total.exceptions.values()), sum(since.exceptions.values())),
+        ("sent again", total.repeats, since.repeats),
+        ("bytes sent", total.bytes_out, since.bytes_out),
+        ("bytes received", total.bytes_in, since.bytes_in),
+    ]
+    lost = {"time-outs", "damaged", "strange"}
+    lines = [head]
+    for name, all_of_them, lately in rows:
+        text = Text(f" {name:<15}", FAINT, no_wrap=True)
+        text.append(f"{all_of_them:>12}", PLAIN)
+        text.append(f"{lately:>12}", ALARM if name in lost and lately else STRONG)
+        lines.append(text)
+    return lines
+
+
+def time_text(seconds: float) -> str:
+    """How long ago: `last 95 s`, `last 12 min`, `last 3 h`."""
+    if seconds < 2 * 60:
+        return f"last {seconds:.0f} s"
+    return f"last {seconds / 60:.0f} min" if seconds < 2 * 3600 else f"last {seconds / 3600:.0f} h"
+
+
+def drive_lines(found: CountersNow, width: int) -> list[Text]:
+    """What the drive tells, and what it counted since the first look; refusals by their code."""
+    refused = ", ".join(f"{code}: {n}" for code, n in sorted(found.total.exceptions.items()))
+    codes = [Text(f"Refused, by code  {refused}", FAINT)] if refused else []
+    if found.trouble:
+        told = wrapped(found.trouble, width - 2, 3)
+        return [Text("The drive's own", FAINT), *(Text(line, ALARM) for line in told), *codes]
+    if not found.drive:
+        none = Text("It has none that it tells, or none was read yet.", FAINT)
+        return [Text("The drive's own", FAINT), none, *codes]
+    lines = [Text(f"{'The drive itself':<16}{'now':>6}{'since':>7}{'of':>8}", FAINT)]
+    for name, one in found.drive:
+        lines += _pair(name, one)
+    return [*lines, *codes]
+
+
+def _pair(name: str, one: Comparison) -> list[Text]:
+    """Frames as the drive tells them, those since the first look, and how many we sent by then."""
+    # counters of another port are no part of the comparison
+    other = one.counts_this_line is False
+    strong, sent = FAINT if other else STRONG, one.sent
+    ours = min(max(one.frames, sent.low), sent.high)
+    frames = Text(f"{short(name, 15):<16}", FAINT if other else PLAIN, no_wrap=True)
+    frames.append(f"{one.last.frames:>6}").append(f"{one.frames:>7}", strong)
+    frames.append("" if other else f"{ours:>8}", PLAIN if ours == one.frames else ALARM)
+    errors = Text(f"{'  bad checksum':<16}", FAINT, no_wrap=True)
+    most = f">{one.last.damaged}" if one.last.saturated else str(one.last.damaged)
+    errors.append(f"{most:>6}", PLAIN)
+    errors.append(f"{one.damaged:>7}", ALARM if one.damaged else strong)
+    return [frames, errors]
+
+
+def beside(left: Sequence[Text], right: Sequence[Text], width: int) -> list[Text]:
+    """Two columns of lines, the right one from a fixed place on."""
+    lines = []
+    for at in range(max(len(left), len(right))):
+        text = left[at].copy() if at < len(left) else Text(no_wrap=True)
+        if at < len(right):
+            text.append(" " * max(0, LEFT - text.cell_len)).append_text(right[at])
+        text.truncate(width, overflow="ellipsis")
+        lines.append(text)
+    return lines
+
+
+def load_lines(found: CountersNow) -> list[Text]:
+    """The share of the time in which the line was busy, since the last reset."""
+    text = Text(" load of the line ", FAINT, no_wrap=True)
+    if found.line_load is None or found.device_load is None:
+        return [text.append("-----", FAINT)]
+    full = round(LOAD_CELLS * found.line_load)
+    text.append("▕", FAINT).append("█" * full, BAR).append("·" * (LOAD_CELLS - full), BAR_REST)
+    text.append("▏", FAINT).append(f"{100 * found.line_load:>4.0f} %", STRONG)
+    text.append("   with this drive ", FAINT).append(f"{100 * found.device_load:.0f} %", PLAIN)
+    return [text]
+
+
+def bar_lines(shown: Sequence[TurnaroundBar], rows: int) -> list[Text]:
+    """The bars, the counts under them, and up to how many ms each goes."""
+    most = max((bar.count for bar in shown), default=0)
+    heights = [math.ceil(8 * rows * bar.count / most) if most else 0 for bar in shown]
+    lines = []
+    for row in reversed(range(rows)):
+        cells = [EIGHTHS[min(8, max(0, height - 8 * row))] * 4 for height in heights]
+        lines.append(Text("".join(f"{cell:>{BAR_WIDTH}}" for cell in cells), BAR, no_wrap=True))
+    counts = Text(no_wrap=True)
+    for bar in shown:
+        counts.append(f"{bar.count:>{BAR_WIDTH}}", PLAIN if bar.count else BAR_REST)
+    ends = [str(bar.up_to_ms) if bar.up_to_ms is not None else "more" for bar in shown]
+    return [*lines, counts, Text("".join(f"{end:>{BAR_WIDTH}}" for end in ends), FAINT)]
+
+
+def said(found: CountersNow, width: int, room: int) -> list[Text]:
+    """What the counters show, a sentence each; the worst first."""
+    if found.agree:
+        text = Text(no_wrap=True).append(" ● ", RUNNING)
+        return [text.append(short(found.agreeing, width - 4), PLAIN)]
+    lines: list[Text] = []
+    for one in sorted(found.differences, key=lambda one: one.kind not in BAD):
+        sign = ALARM if one.kind not in BAD else FAULT
+        for at, part in enumerate(wrapped(one.text, width - 5, MOST_LINES_OF_ONE)):
+            text = Text(no_wrap=True).append("   " if at else " ■ ", sign)
+            lines.append(text.append(part, PLAIN))
+    if len(lines) > room:
+        lines = [*lines[: room - 1], Text("   … drivepanel counters tells all of it", FAINT)]
+    return lines

@@ -1,0 +1,104 @@
+"""One frame as a line of the list, and all of them as a text to keep. Pure."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+
+from rich.text import Text
+
+from tui.bus.api import Frame
+from tui.drive.plain import plain
+from tui.widgets.drawing import cut, cut_at_word, short
+from tui.widgets.palette import ALARM, CURSOR, FAINT, PLAIN, STRONG
+from tui.wire.frames import hex_text
+
+FEWEST = 12
+"""Columns of bytes that are shown, however long the note on the frame is."""
+BYTES_WIDTH = 44
+"""Columns of the bytes where they stand beside the words."""
+BESIDE_BYTES = 110
+"""Columns from which on words and bytes stand side by side, and the hour before the minutes."""
+
+
+def time_of(wall: float) -> str:
+    """The time of day to the millisecond."""
+    thousandth = int(wall * 1000) % 1000
+    return f"{time.strftime('%H:%M:%S', time.localtime(wall))}.{thousandth:03d}"
+
+
+def gap_text(seconds: float | None) -> str:
+    """The time since the frame before, in nine columns: ms up to 10 s."""
+    if seconds is None:
+        return " " * 9
+    told = f"{1000 * seconds:.1f} ms" if seconds < 10 else f"{seconds:.0f} s"
+    return f"{'+' + told:>9}"
+
+
+def gaps(frames: Sequence[Frame]) -> list[float | None]:
+    """Seconds from each frame's predecessor to it, however few of them are shown."""
+    before = [None, *(frame.time for frame in frames[:-1])]
+    return [
+        None if one is None else max(0.0, frame.time - one)
+        for one, frame in zip(before, frames, strict=True)
+    ]
+
+
+def frame_line(
+    frame: Frame,
+    wall: float,
+    gap: float | None,
+    width: int,
+    words: str = "",
+    *,
+    found: bool = False,
+) -> Text:
+    """One frame: when, how long after the one before, direction, what it says, the note on it.
+
+    Bytes that form no frame, and all where there are no `words`, are shown as they are. One that
+    was `found` is marked.
+    """
+    text = Text(no_wrap=True)
+    at = time_of(wall)
+    text.append(f" {at if width >= BESIDE_BYTES else at[3:]} {gap_text(gap)} ", FAINT)
+    text.append("→ " if frame.direction == "out" else "  ← ", STRONG)
+    note = f"  {frame.note}" if frame.note else ""
+    room = max(FEWEST, width - text.cell_len - len(note))
+    if not words:
+        text.append(short(hex_text(frame.data), room), PLAIN)
+    elif width >= BESIDE_BYTES:
+        left = max(FEWEST, room - BYTES_WIDTH)
+        text.append(cut(words, left), PLAIN)
+        text.append(f" {short(hex_text(frame.data), BYTES_WIDTH - 1)}", FAINT)
+    else:
+        text.append(cut_at_word(words, room), PLAIN)
+    text.append(note, ALARM)
+    if found:
+        text.stylize(CURSOR)
+    return text
+
+
+def frames_text(
+    frames: Sequence[Frame],
+    places: Sequence[int],
+    told: Sequence[str],
+    since_epoch: float,
+    heading: Sequence[str],
+) -> str:
+    """Frames as a text to keep: a line each, tabs between time, gap, direction, words and bytes.
+
+    `since_epoch` is added to the line's times for the time of day; `told` goes with the `places`.
+    """
+    between = gaps(frames)
+    lines = [f"# {line}" for line in heading]
+    lines.append("# date time\tgap ms\tdirection\tsays\tnote\tbytes")
+    for at, words in zip(places, told, strict=True):
+        frame, gap = frames[at], between[at]
+        wall = since_epoch + frame.time
+        day = time.strftime("%Y-%m-%d", time.localtime(wall))
+        ms = "" if gap is None else f"{1000 * gap:.1f}"
+        way = "request" if frame.direction == "out" else "reply"
+        said = plain(words), plain(frame.note)
+        parts = (f"{day} {time_of(wall)}", ms, way, *said, hex_text(frame.data))
+        lines.append("\t".join(parts))
+    return "\n".join(lines) + "\n"
