@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import AsyncIterator, Iterator
+from collections.abc import AsyncIterator, Callable, Iterator
 from contextlib import asynccontextmanager
 from pathlib import Path
 
@@ -20,7 +20,9 @@ from tui.session.connect.open_line import open_line
 from tui.session.diagnosis.diagnosis import Diagnosis, diagnosed
 from tui.session.diagnosis.heard import Heard
 from tui.session.diagnosis.sight import Sight
+from tui.session.events import EventLog
 
+from . import fakes
 from .test_flows import shown, until
 from .test_frame import no_ports as no_ports  # the fixture is for these tests too
 from .test_frame import panel
@@ -114,3 +116,22 @@ def test_every_line_fits(family: str, width: int) -> None:
 def test_it_is_found_by_its_words() -> None:
     for query in ("why", "no answer", "silent"):
         assert "why" in [one.action.id for one in find(query, "line")][:2], query
+
+
+@pytest.mark.parametrize("size", [(80, 24), (60, 20)], ids=["80x24", "60x20"])
+def test_picture(snap_compare: Callable[..., bool], size: tuple[int, int]) -> None:
+    app = fakes.app_of()
+
+    async def found() -> Diagnosis:
+        return silence("atv71")
+
+    async def asked(pilot: Pilot[None]) -> None:
+        await pilot.pause()
+        app.push_screen(WhyScreen("Why no answer? Address 2 on /dev/ttyUSB0 19200 8E1", found))
+        await until(pilot, lambda: "Nobody answers" in shown(app, "reasons"))
+        app.events = EventLog()
+        assert isinstance(app.screen, WhyScreen)
+        app.screen.draw_frame(app.frame_now())
+        await pilot.pause()
+
+    assert snap_compare(app, terminal_size=size, run_before=asked)
