@@ -19,7 +19,8 @@ from tui.bus.link import SerialLink
 from tui.drive.profile import library
 from tui.drive.read_plan import WireTiming
 from tui.session.connect.known_lines import DriveMark, LineMark, LinesMemory, keep_memory
-from tui.session.listening.families import Families, known_profiles, remembered_families
+from tui.session.connect.strangers import known_profiles
+from tui.session.listening.families import Families, remembered_families
 from tui.session.listening.listener import LineListener, ToldExchange
 from tui.session.listening.summary import ListeningSummary, summary_lines, summary_of
 from tui.session.listening.telling import exchange_text, names_asked

@@ -17,7 +17,7 @@ from tui.session.connect.other_masters import (
     MasterLookout,
     OtherMaster,
     Overheard,
-    listen,
+    listen_first,
     overheard,
 )
 from tui.wire.frames import frame, read_frame
@@ -91,7 +91,7 @@ async def test_a_master_is_heard_on_a_line_on_which_nothing_is_sent(gap: float) 
         line.open(wait=10.0)
         try:
             with talking(peer, gap=gap):
-                heard = await listen(line, 2.0)
+                heard = await listen_first(line, 2.0)
             assert {one.device for one in heard.requests} == {4}
             assert peer.requests == []
         finally:

@@ -80,7 +80,8 @@ def listen(
         raise click.UsageError("--raw and --force go with --pcap FILE.")
     named = profiles_named(profile_ids)
     from tui.bus.errors import LineError
-    from tui.session.listening.families import Families, known_profiles, remembered_families
+    from tui.session.connect.strangers import known_profiles
+    from tui.session.listening.families import Families, remembered_families
 
     from ..running.listening import HearingRun, line_to_listen
     from ..shared.listen_outputs import HeardJson, HeardLines

@@ -72,7 +72,7 @@ class Scan:
     async def _listen(self) -> None:
         """Nothing is sent on a line on which another master asks. Raises Failure."""
         from tui.bus.link import TcpLink
-        from tui.session.connect.other_masters import LISTEN, listen
+        from tui.session.connect.other_masters import LISTEN, listen_first
 
         line = self.opened.line
         if self.opened.simulation is not None or isinstance(line.link, TcpLink):
@@ -80,7 +80,7 @@ class Scan:
         if line.facts.others:
             return  # what is said there comes from programs of ours
         self.tell.note(f"Listening for {LISTEN:g} s before the first request.")
-        if text := (await listen(line, LISTEN)).text:
+        if text := (await listen_first(line, LISTEN)).text:
             raise Failure(f"{text} Nothing was sent.", REFUSED_HERE)
 
     @property

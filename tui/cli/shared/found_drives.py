@@ -18,12 +18,12 @@ if TYPE_CHECKING:
     from tui.session.drive import DriveSession
 
 T = TypeVar("T")
-Found = list[tuple[LineWish, "DriveSession"]]
+FoundOnLines = list[tuple[LineWish, "DriveSession"]]
 
 
 async def find_drives(
     lines: Sequence[tuple[OpenLine, LineWish]], *, as_json: bool
-) -> tuple[Found, int]:
+) -> tuple[FoundOnLines, int]:
     """The wanted drives that are there, in order, and the highest status of the others.
 
     What is wrong with one of several is told; raises it where there is one drive only.
@@ -43,13 +43,13 @@ class _Finding:
         self._several = several
         self._as_json = as_json
 
-    async def on_line(self, opened: OpenLine, wish: LineWish) -> Found:
+    async def on_line(self, opened: OpenLine, wish: LineWish) -> FoundOnLines:
         """The drives of one line."""
         drives = wish.on(opened)
         there = partial(_there, opened, wish)
         if self._several and not await self._done(there, opened, wish, drives):
             return []
-        found: Found = []
+        found: FoundOnLines = []
         for drive in drives:
             connect = partial(connect_drive, opened, drive)
             made = await self._done(connect, opened, wish, [drive])

@@ -103,7 +103,7 @@ class Scanning(LineView):
         if not isinstance(link, SerialLink) or opened.line.facts.others:
             return False  # nobody else is heard there, or programs of ours are
         self.advise("Listening for another master.", "Then drives are searched for.")
-        text = (await other_masters.listen(opened.line, other_masters.LISTEN)).text
+        text = (await other_masters.listen_first(opened.line, other_masters.LISTEN)).text
         if text:
             self.say(text, "Nothing was sent; s listens again.", ALARM_KIND)
         return bool(text)

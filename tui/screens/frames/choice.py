@@ -10,11 +10,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from tui.bus.api import Frame
+from tui.wire.heard.pairing import BROADCAST_DEVICE
 
 from .decoded import EXCEPTION_BIT, FUNCTIONS, pdu_of
 
 ERRORS = frozenset({"error", "errors"})
-BROADCAST_DEVICE = 0
 TellFrames = Callable[[Sequence[Frame]], Sequence[str]]
 """What frames say, a sentence each."""
 

@@ -12,16 +12,16 @@ from tui.session.counters.turnarounds import TurnaroundBar, bars
 from tui.session.counters.watch import CountersNow
 from tui.widgets.drawing import rule, short, wrapped
 from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNING, STRONG
+from tui.widgets.trend import EIGHTHS
 
 LEFT = 42
 """Columns of our counts; those of the drive stand beside them."""
 BAR_WIDTH = 7
 TALL, TALL_BARS, LOW_BARS = 30, 6, 1
 """Rows from which on the bars are tall; the rows of both."""
-EIGHTHS = " ▁▂▃▄▅▆▇█"
 LOAD_CELLS = 20
 MOST_LINES_OF_ONE = 4
-RESETS = "C counts from now, Z resets the drive's"
+RESET_KEYS = "C counts from now, Z resets the drive's"
 BAD = frozenset({"never-arrived", "not-answered", "damaged-there", "damaged-here", "no-answer"})
 """Differences that are frames lost."""
 
@@ -35,7 +35,7 @@ def counters_lines(found: CountersNow, who: str, width: int, height: int) -> lis
     lines.append(rule("Turnaround of the drive, in ms", width, "since the line was opened"))
     tall = TALL_BARS if height >= TALL else LOW_BARS
     lines += bar_lines(bars(found.total.turnarounds), tall)
-    lines.append(rule("What differs", width, RESETS))
+    lines.append(rule("What differs", width, RESET_KEYS))
     lines += said(found, width, max(1, height - len(lines)))
     return lines[:height]
 

@@ -84,7 +84,9 @@ def overheard(frames: Iterable[Frame], since: float) -> Overheard:
     return Overheard(tuple(requests), tuple(answered), loose)
 
 
-async def listen(line: ModbusLine, seconds: float = LISTEN, clock: Clock = REAL_CLOCK) -> Overheard:
+async def listen_first(
+    line: ModbusLine, seconds: float = LISTEN, clock: Clock = REAL_CLOCK
+) -> Overheard:
     """Listen to a line on which nothing is sent from here."""
     since, before = _last_time(line.trace), line.counters.bytes_in
     await clock.sleep(seconds)

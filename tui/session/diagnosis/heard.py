@@ -11,7 +11,7 @@ from tui.wire.frames import is_whole
 
 REFUSED = 0x80
 """Bit that a refusal adds to its function."""
-READS = (3, 4)
+REGISTER_READS = (3, 4)
 TCP_HEAD = 6
 """Bytes of Modbus TCP before the address."""
 LATE_NOTE = "late"
@@ -105,7 +105,7 @@ def _with_whole(found: Heard, asked: bytes, body: bytes, *, late: bool) -> Heard
         return replace(found, exceptions=(*found.exceptions, body[-1]))
     if function != asked[1]:
         return replace(found, functions=_once(found.functions, function))
-    if function in READS and len(body) != due_bytes(asked) - 2:
+    if function in REGISTER_READS and len(body) != due_bytes(asked) - 2:
         return replace(found, misshapen=found.misshapen + 1)
     if late:
         return replace(found, late=found.late + 1)
@@ -118,7 +118,7 @@ def _with_loose(found: Heard, asked: bytes, loose: bytes, *, alone: bool) -> Hea
     if loose[:2] in (asked[:2], bytes([asked[0], asked[1] | REFUSED])):
         return replace(found, damaged=found.damaged + 1)
     found = replace(found, garbage=found.garbage + len(loose))
-    if asked[1] in READS and alone:
+    if asked[1] in REGISTER_READS and alone:
         came, due = found.compared
         found = replace(found, compared=(came + len(loose), due + due_bytes(asked)))
     return found

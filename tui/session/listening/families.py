@@ -7,12 +7,10 @@ longest read.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Literal
 
 from tui.bus.link import Link
-from tui.drive.errors import DriveError
 from tui.drive.profile import library
 from tui.drive.profile.profile import Profile
 from tui.wire.heard.pairing import HeardExchange
@@ -64,15 +62,6 @@ def remembered_families(link: Link) -> dict[int, str]:
         fits = library.matching_profiles(drive.reference) if drive.reference else []
         if profile := drive.profile or next(iter(fits), ""):
             found[device] = profile
-    return found
-
-
-def known_profiles() -> list[Profile]:
-    """Every profile that can be used; one that cannot is told where it is chosen."""
-    found = []
-    for listing in library.listings():
-        with suppress(DriveError):
-            found.append(library.load(listing.id))
     return found
 
 
