@@ -147,8 +147,8 @@ DEFECTS = (
     Defect(
         "back-off-never-ends",
         "tui/bus/schedule",
-        "if priority < Priority.POLL or record.next_try is None or now >= record.next_try:",
-        "if priority < Priority.POLL or record.next_try is None:",
+        "if asked_now or record.next_try is None or now >= record.next_try:",
+        "if asked_now or record.next_try is None:",
         "A drive that was off for a moment is never watched again.",
         ("tests/bus/test_queue.py",),
     ),
