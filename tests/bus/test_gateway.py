@@ -121,6 +121,51 @@ async def test_requests_that_pile_up_get_the_answers_of_their_own_transactions()
     await gateway.close()
 
 
+async def test_a_write_waits_for_no_read_before_it() -> None:
+    """It may be a stop, and the drive before it may be silent."""
+    free = asyncio.Event()
+
+    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
+        if pdu[0] == 3:
+            await free.wait()
+            return bytes([3, 2, 0, 0])
+        return pdu
+
+    gateway = TcpGateway(answer)
+    reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
+    await _asked(writer, 1, 1, struct.pack(">BHH", 3, 0, 1))
+    stop = struct.pack(">BHH", 6, 8501, 7)
+    await _asked(writer, 2, 1, stop)
+    assert await _answer(reader) == (2, 1, stop)
+    free.set()
+    assert (await _answer(reader))[0] == 1
+    writer.close()
+    await gateway.close()
+
+
+async def test_what_was_sent_before_the_connection_closed_is_carried_out() -> None:
+    done: list[bytes] = []
+    both = asyncio.Event()
+
+    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
+        await asyncio.sleep(0.05)
+        done.append(pdu)
+        if len(done) == 2:
+            both.set()
+        return pdu
+
+    gone = asyncio.Event()
+    gateway = TcpGateway(answer, lambda _: gone.set())
+    _, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
+    for word in (15, 7):
+        await _asked(writer, word, 1, struct.pack(">BHH", 6, 8501, word))
+    writer.close()
+    await asyncio.wait_for(both.wait(), 30)
+    assert [pdu[-1] for pdu in done] == [15, 7]
+    await asyncio.wait_for(gone.wait(), 30)
+    await gateway.close()
+
+
 async def test_one_client_that_waits_holds_up_no_other() -> None:
     gone: list[str] = []
 

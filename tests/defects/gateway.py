@@ -129,6 +129,14 @@ DEFECTS = (
         (GATEWAY,),
     ),
     Defect(
+        "foreign-stop-behind-reads",
+        "tui/bus/gateway/server.py",
+        "async with talk.writes if pdu[0] in WRITE_FUNCTIONS else talk.reads:",
+        "async with talk.reads:",
+        "A stop waits until a silent drive before it was given up.",
+        ("tests/bus/test_gateway.py::test_a_write_waits_for_no_read_before_it",),
+    ),
+    Defect(
         "half-a-value-written",
         "tui/bus/gateway/pdu.py",
         "if size != 2 * count or len(data) != size:",

@@ -10,11 +10,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import struct
-from collections.abc import Awaitable, Callable
+from collections.abc import Awaitable, Callable, Coroutine
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import Any
 
-from .pdu import DEVICE_FAILURE, exception_pdu
+from .pdu import DEVICE_FAILURE, WRITE_FUNCTIONS, exception_pdu
 
 log = logging.getLogger(__name__)
 
@@ -22,6 +23,8 @@ HEADER = struct.Struct(">HHHB")
 LONGEST_PDU = 253
 MOST_CLIENTS = 64
 """Connections at a time; one more is closed at once."""
+MOST_AT_ONCE = 16
+"""Requests of one connection that may be under way; further ones stay in its socket."""
 IDLE_CLIENT_ENDS_AFTER = 600.0
 """Seconds after which a connection that asks nothing, or takes no answer, is closed."""
 
@@ -92,24 +95,72 @@ class TcpGateway:
     async def _converse(
         self, client: TcpClient, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
     ) -> None:
-        while True:
+        talk = _Talk(client, writer)
+        try:
+            while True:
+                async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
+                    head = await reader.readexactly(HEADER.size)
+                transaction, protocol, length, unit = HEADER.unpack(head)
+                if protocol != 0 or not 2 <= length <= LONGEST_PDU + 1:
+                    log.warning("what %s sends is no Modbus TCP; it is let go", client.peer)
+                    return
+                async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
+                    pdu = await reader.readexactly(length - 1)
+                await talk.room.acquire()
+                talk.begin(self._one(talk, transaction, unit, pdu))
+        except asyncio.CancelledError:
+            talk.cancel()
+            raise
+        finally:
+            # what a client sent before it went is carried out: a stop may be among it
+            await talk.ended()
+
+    async def _one(self, talk: _Talk, transaction: int, unit: int, pdu: bytes) -> None:
+        """Answer one request, in the turn of its kind."""
+        try:
+            async with talk.writes if pdu[0] in WRITE_FUNCTIONS else talk.reads:
+                reply = await self._replied(talk.client, unit, pdu)
+            talk.writer.write(HEADER.pack(transaction, 0, len(reply) + 1, unit) + reply)
             async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
-                head = await reader.readexactly(HEADER.size)
-            transaction, protocol, length, unit = HEADER.unpack(head)
-            if protocol != 0 or not 2 <= length <= LONGEST_PDU + 1:
-                log.warning("what %s sends is no Modbus TCP; it is let go", client.peer)
-                return
-            async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
-                pdu = await reader.readexactly(length - 1)
-            try:
-                reply = await self._answer(client, unit, pdu)
-            except Exception:
-                # one request that nobody foresaw ends no connection
-                log.exception("a request of %s: %s", client.peer, pdu.hex())
-                reply = exception_pdu(pdu[0], DEVICE_FAILURE)
-            writer.write(HEADER.pack(transaction, 0, len(reply) + 1, unit) + reply)
-            async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
-                await writer.drain()
+                await talk.writer.drain()
+        except (OSError, TimeoutError) as error:
+            log.info("Modbus TCP client %s took no answer: %s", talk.client.peer, error or "idle")
+            talk.writer.transport.abort()
+        finally:
+            talk.room.release()
+
+    async def _replied(self, client: TcpClient, unit: int, pdu: bytes) -> bytes:
+        try:
+            return await self._answer(client, unit, pdu)
+        except Exception:
+            # one request that nobody foresaw ends no connection
+            log.exception("a request of %s: %s", client.peer, pdu.hex())
+            return exception_pdu(pdu[0], DEVICE_FAILURE)
+
+
+class _Talk:
+    """What is under way on one connection."""
+
+    def __init__(self, client: TcpClient, writer: asyncio.StreamWriter) -> None:
+        self.client = client
+        self.writer = writer
+        self.reads, self.writes = asyncio.Lock(), asyncio.Lock()
+        self.room = asyncio.Semaphore(MOST_AT_ONCE)
+        self._under_way: set[asyncio.Task[None]] = set()
+
+    def begin(self, work: Coroutine[Any, Any, None]) -> None:
+        task = asyncio.create_task(work)
+        self._under_way.add(task)
+        task.add_done_callback(self._under_way.discard)
+
+    def cancel(self) -> None:
+        """Answer nothing any more."""
+        for task in self._under_way:
+            task.cancel()
+
+    async def ended(self) -> None:
+        """Return once all is answered; cancelled, it cancels that."""
+        await asyncio.gather(*self._under_way, return_exceptions=True)
 
 
 def peer_text(peer: object) -> str:
