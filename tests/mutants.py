@@ -29,6 +29,7 @@ from tests.defects import (
     bus,
     commanding,
     diagnosis,
+    counting,
     drive,
     finding,
     gateway,
@@ -62,6 +63,7 @@ DEFECTS: tuple[Defect, ...] = (
     *terminal.DEFECTS,
     *gateway.DEFECTS,
     *sharing.DEFECTS,
+    *counting.DEFECTS,
 )
 LAST_RUN = Path(tempfile.gettempdir()) / "drivepanel-mutants.json"
 """What became of each defect when it was planted last; `--table` tells it."""

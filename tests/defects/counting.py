@@ -1,0 +1,58 @@
+"""Defects of the counters, and of what Frames shows."""
+
+from __future__ import annotations
+
+from .defect import Defect
+
+COMPARED = ("tests/session/test_counters.py",)
+
+DEFECTS = (
+    Defect(
+        "roll-over-not-undone",
+        "tui/session/counters/compare.py",
+        "found = (now - before) % MODULO",
+        "found = now - before",
+        "After 65536 frames the drive seems to have counted less than nothing.",
+        COMPARED,
+    ),
+    Defect(
+        "counted-anew-not-seen",
+        "tui/session/counters/compare.py",
+        "if frames is None or now.damaged < self.last.damaged:",
+        "if frames is None:",
+        "A drive that was switched off and on seems to have heard fewer errors than none.",
+        COMPARED,
+    ),
+    Defect(
+        "uncertain-taken-for-certain",
+        "tui/session/counters/compare.py",
+        "missed = min(frames, found.sent.low) - damaged - found.answered.high",
+        "missed = min(frames, found.sent.high) - damaged - found.answered.low",
+        "A request that is on its way at the moment of the look is told as a lost answer.",
+        COMPARED,
+    ),
+    Defect(
+        "refusal-counted-to-no-drive",
+        "tui/bus/tally.py",
+        "self.of(device).count_exception(code)",
+        "self.of(0).count_exception(code)",
+        "The drive that refuses is not the one of which it is told.",
+        ("tests/bus/test_counters.py",),
+    ),
+    Defect(
+        "hidden-field-takes-the-focus",
+        "tui/screens/frames/screen.py",
+        'AUTO_FOCUS: ClassVar = ""',
+        'AUTO_FOCUS: ClassVar = "#typed"',
+        "Space on Frames goes into a field that nobody sees, and stops no motor.",
+        ("tests/ui/test_frames_screen.py::test_nothing_takes_the_focus_so_that_space_stops",),
+    ),
+    Defect(
+        "unanswered-is-no-error",
+        "tui/screens/frames/choice.py",
+        "return unanswered and asked is not None and asked.device != BROADCAST_DEVICE",
+        "return unanswered and asked is None",
+        "Requests without an answer are missing where only errors are shown.",
+        ("tests/ui/test_frame_choice.py",),
+    ),
+)
