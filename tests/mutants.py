@@ -28,8 +28,8 @@ from threading import Lock
 from tests.defects import (
     bus,
     commanding,
-    diagnosis,
     counting,
+    diagnosis,
     drive,
     finding,
     gateway,

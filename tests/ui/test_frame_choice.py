@@ -12,7 +12,7 @@ from tui.bus.api import Frame
 from tui.drive.profile import library
 from tui.screens.frames.choice import FrameChoice, choice_of, chosen
 from tui.screens.frames.decoded import decoded
-from tui.screens.frames.frame_view import frames_text, gap_text, gaps, time_of_day
+from tui.screens.frames.frame_view import frame_time, frames_text, gap_text, gaps
 from tui.wire.frames import sealed
 
 ATV71 = library.load("atv71")
@@ -89,7 +89,7 @@ def test_gaps_are_those_on_the_line_whichever_frames_are_shown() -> None:
 
 
 def test_the_time_of_day_has_its_thousandths(utc: None) -> None:
-    assert time_of_day(1_795_259_250.0625) == "11:07:30.062"
+    assert frame_time(1_795_259_250.0625) == "11:07:30.062"
 
 
 def test_what_is_kept_has_a_line_a_frame_with_its_gap_on_the_line(utc: None) -> None:

@@ -10,7 +10,7 @@ from rich.text import Text
 from tui.session.counters.compare import Comparison
 from tui.session.counters.turnarounds import TurnaroundBar, bars
 from tui.session.counters.watch import CountersNow
-from tui.widgets.drawing import rule, short, wrapped
+from tui.widgets.drawing import cut_at_word, rule, short, wrapped
 from tui.widgets.palette import ALARM, BAR, BAR_REST, FAINT, FAULT, PLAIN, RUNNING, STRONG
 from tui.widgets.trend import EIGHTHS
 
@@ -80,7 +80,7 @@ def drive_lines(found: CountersNow, width: int) -> list[Text]:
         told = wrapped(found.trouble, width - 2, 3)
         return [Text("The drive's own", FAINT), *(Text(line, ALARM) for line in told), *codes]
     if not found.drive:
-        none = Text("It has none that it tells, or none was read yet.", FAINT)
+        none = Text("None is told, or none was read yet.", FAINT)
         return [Text("The drive's own", FAINT), none, *codes]
     lines = [Text(f"{'The drive itself':<16}{'now':>6}{'since':>7}{'of':>8}", FAINT)]
     for name, one in found.drive:
@@ -148,12 +148,15 @@ def said(found: CountersNow, width: int, room: int) -> list[Text]:
     if found.agree:
         text = Text(no_wrap=True).append(" ● ", RUNNING)
         return [text.append(short(found.agreeing, width - 4), PLAIN)]
+    worst = sorted(found.differences, key=lambda one: one.kind not in BAD)
+    parts = [wrapped(one.text, width - 5, MOST_LINES_OF_ONE) for one in worst]
+    if sum(map(len, parts)) > room:
+        # what differs of all goes before what to look at of the first
+        parts = [[cut_at_word(one.text, width - 5)] for one in worst]
     lines: list[Text] = []
-    for one in sorted(found.differences, key=lambda one: one.kind not in BAD):
-        sign = ALARM if one.kind not in BAD else FAULT
-        for at, part in enumerate(wrapped(one.text, width - 5, MOST_LINES_OF_ONE)):
+    for one, told in zip(worst, parts, strict=True):
+        sign = FAULT if one.kind in BAD else ALARM
+        for at, part in enumerate(told):
             text = Text(no_wrap=True).append("   " if at else " ■ ", sign)
             lines.append(text.append(part, PLAIN))
-    if len(lines) > room:
-        lines = [*lines[: room - 1], Text("   … drivepanel counters tells all of it", FAINT)]
     return lines

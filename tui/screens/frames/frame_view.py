@@ -21,7 +21,7 @@ BESIDE_BYTES = 110
 """Columns from which on words and bytes stand side by side, and the hour before the minutes."""
 
 
-def time_of_day(wall: float) -> str:
+def frame_time(wall: float) -> str:
     """The time of day to the millisecond."""
     thousandth = int(wall * 1000) % 1000
     return f"{time.strftime('%H:%M:%S', time.localtime(wall))}.{thousandth:03d}"
@@ -59,7 +59,7 @@ def frame_line(
     was `found` is marked.
     """
     text = Text(no_wrap=True)
-    at = time_of_day(wall)
+    at = frame_time(wall)
     text.append(f" {at if width >= BESIDE_BYTES else at[3:]} {gap_text(gap)} ", FAINT)
     text.append("→ " if frame.direction == "out" else "  ← ", STRONG)
     note = f"  {frame.note}" if frame.note else ""
@@ -99,6 +99,6 @@ def frames_text(
         ms = "" if gap is None else f"{1000 * gap:.1f}"
         way = "request" if frame.direction == "out" else "reply"
         said = plain(words), plain(frame.note)
-        parts = (f"{day} {time_of_day(wall)}", ms, way, *said, hex_text(frame.data))
+        parts = (f"{day} {frame_time(wall)}", ms, way, *said, hex_text(frame.data))
         lines.append("\t".join(parts))
     return "\n".join(lines) + "\n"

@@ -91,7 +91,7 @@ class FramesScreen(CounterKeys):
         self._up = min(self._up, max(0, len(places) - room))
         end = len(places) - self._up
         count = f"{len(places)} of {len(frames)}" if self._filter else f"{len(frames)}"
-        lines = [rule(self._title(), width, f"{few}{count} kept")]
+        lines = [rule(self._title(), width, f"{few}j finds, {count} kept")]
         shown = places[max(0, end - room) : end]
         self.put("frames", lines + self._lines(frames, shown, columns))
 

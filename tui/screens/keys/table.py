@@ -104,7 +104,7 @@ ACTIONS: tuple[Action, ...] = (
         ("hold", "h", "hold", "Hold the list still, or let it run."),
         ("other_page", "tab", "page", "Codes and values, bytes, or the counters."),
         ("only", "O", "only", "Only some frames: 2 read error; of a drive, a function, errors."),
-        ("find_frame", "j", "find", "Find frames by drive, function, error, or what they say."),
+        ("find_frame", "j", "", "Find frames by drive, function, error, or what they say."),
         ("scroll(-1)", "up", "", "Older frames; the list is held."),
         ("scroll(1)", "down", "", "Newer frames."),
         ("scroll(-10)", "pageup", "", "Ten frames older."),
