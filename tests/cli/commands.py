@@ -18,7 +18,10 @@ from tui.cli.main import main
 @contextmanager
 def tcp_line(*arguments: str) -> Iterator[str]:
     """What `drivepanel simulate` serves with these arguments, in this process; the LINE to it."""
-    with simulate.make_context("simulate", [*arguments]) as context:
+    # a command keeps the names of its help from its first context
+    names = main.context_settings["help_option_names"]
+    made = simulate.make_context("simulate", [*arguments], help_option_names=names)
+    with made as context:
         places = ("pty", "serial", "tcp", "rtu_tcp", "as_json")
         options = {name: given for name, given in context.params.items() if name not in places}
         with simulation_of(**options) as simulation:
