@@ -136,7 +136,7 @@ async def test_a_write_waits_for_no_read_before_it() -> None:
     await _asked(writer, 1, 1, struct.pack(">BHH", 3, 0, 1))
     stop = struct.pack(">BHH", 6, 8501, 7)
     await _asked(writer, 2, 1, stop)
-    assert await _answer(reader) == (2, 1, stop)
+    assert await asyncio.wait_for(_answer(reader), 30) == (2, 1, stop)
     free.set()
     assert (await _answer(reader))[0] == 1
     writer.close()

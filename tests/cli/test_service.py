@@ -5,13 +5,15 @@ from __future__ import annotations
 import asyncio
 import os
 import socket
-from collections.abc import Iterator
+import subprocess
+from collections.abc import Callable, Iterator
 from configparser import ConfigParser
 from contextlib import suppress
 from pathlib import Path
 
 import pytest
 
+from tests.programs import PATIENCE
 from tui.cli.running.service import Service
 
 UNITS = Path(__file__).resolve().parents[2] / "systemd"
@@ -87,3 +89,17 @@ def test_the_unit_says_what_the_program_does() -> None:
     assert served["RuntimeDirectory"] == "drivepanel"
     assert served["RuntimeDirectoryMode"] == "2770"
     assert served["RuntimeDirectoryPreserve"] == "yes"
+
+
+def test_systemd_understands_the_unit_and_finds_it_tight(peer: Callable[[str, str], str]) -> None:
+    analyze = peer("systemd-analyze", "systemd")
+    unit = str(UNITS / "drivepanel.service")
+    done = subprocess.run(
+        [analyze, "security", "--offline=yes", "--threshold=30", unit],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout
+    assert "Unknown" not in done.stderr
