@@ -129,6 +129,14 @@ DEFECTS = (
         (GATEWAY,),
     ),
     Defect(
+        "nameless-drive-written",
+        "tui/session/gateway/drives.py",
+        "if profiles and stops else None",
+        "if profiles else None",
+        "A drive that does not say who it is takes any command.",
+        (GATEWAY,),
+    ),
+    Defect(
         "foreign-stop-behind-reads",
         "tui/bus/gateway/server.py",
         "async with talk.writes if pdu[0] in WRITE_FUNCTIONS else talk.reads:",

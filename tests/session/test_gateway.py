@@ -268,7 +268,16 @@ async def test_a_drive_without_a_profile_is_only_read(bench: Make) -> None:
     made = bench(leroy, writes=allowed_codes("all"), commands=True)
     assert isinstance(await made.read(library.load("powerdrive")["10.40"].address), tuple)
     assert await made.write(641, 3) == 1
+    assert await made.write(641, 1) == 1  # stops it in one state, and enables it in another
     assert made.written() == []
+
+
+async def test_a_nameless_drive_takes_the_word_that_stops_all_it_may_be(bench: Make) -> None:
+    made = bench(DriveSpec("powerdrive", 1))
+    assert await made.write(641, 0) == 0
+    assert made.written() == [(641, 0)]
+    assert await made.write(641, 3) == 1
+    assert made.written() == [(641, 0)]
 
 
 async def test_a_profile_that_a_person_has_named_lets_its_stop_pass(bench: Make) -> None:

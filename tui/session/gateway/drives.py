@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 from tui.bus.api import LineState, LineStatus, ModbusLine, Priority
 from tui.bus.limits import MAX_READ, Limits
+from tui.drive.foreign_write import WordKind, foreign_words
 from tui.drive.profile import library
 
 from ..connect.contradiction import own_words
@@ -44,6 +45,8 @@ class GatewayDrives:
         self._found: dict[int, DriveSession | None] = {}
         self._doubtful: frozenset[int] = frozenset()
         """Devices that were silent since: another drive may answer there."""
+        self._candidates: dict[int, tuple[str, ...]] = {}
+        """Families of which a nameless device may be."""
         self._asked: dict[int, float] = {}
         self._tasks: dict[int, asyncio.Task[DriveSession | None]] = {}
         self._leave = line.on_state(self._state)
@@ -76,6 +79,20 @@ class GatewayDrives:
             return session
         task = self._tasks.get(device) or self._begin(device)
         return await asyncio.shield(task)
+
+    def stoppable(self, device: int, words: Mapping[int, int]) -> DriveSession | None:
+        """A nameless drive by one of its families, for words that only stop each of them."""
+        profiles = [library.load(id) for id in self._candidates.get(device, ())]
+        stops = all(
+            one.kind is WordKind.STOP
+            for profile in profiles
+            for one in foreign_words(profile, words, {})
+        )
+        return DriveSession(self.line, device, profiles[0]) if profiles and stops else None
+
+    def unknown_again(self, device: int) -> None:
+        """The stop of a nameless drive was sent: it is only read as before."""
+        self._take(device, None)
 
     def doubt(self, device: int) -> None:
         """It was silent: who it is is asked again before anything but a stop is written to it."""
@@ -110,6 +127,7 @@ class GatewayDrives:
             identity = await identify_drive(self.line, device, priority=self._patience(device))
             named = identity.profile or await asyncio.to_thread(self._remembered, device, identity)
         if not named:
+            self._candidates[device] = identity.candidates if identity is not None else ()
             return self._take(device, None)
         profile = await asyncio.to_thread(library.load, named)
         session = DriveSession(self.line, device, profile, identity)

@@ -133,9 +133,22 @@ class Gateway:
         # a stop does not wait until a drive that was silent has said again who it is
         session = line.drives.known(device) or await line.drives.found(device)
         if session is None:
-            raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
+            return await self._stop_nameless(line, device, client, asked, stamp)
         write = GatewayWrite(line, session, asked, client.peer, self._rules, stamp)
         return await write.carry_out()
+
+    async def _stop_nameless(
+        self, line: GatewayLine, device: int, client: TcpClient, asked: WriteAsked, stamp: int
+    ) -> bytes:
+        """Stop a drive that does not say who it is, by a word that stops all it may be."""
+        session = line.drives.stoppable(device, asked.words)
+        if session is None:
+            raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
+        try:
+            write = GatewayWrite(line, session, asked, client.peer, self._rules, stamp)
+            return await write.carry_out()
+        finally:
+            line.drives.unknown_again(device)
 
     async def _diagnose(self, line: GatewayLine, device: int, asked: DiagnoseAsked) -> bytes:
         session = await line.drives.found(device)
