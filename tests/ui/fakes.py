@@ -76,6 +76,10 @@ class StillClock(Clock):
         """The moment of every fake."""
         return NOW
 
+    def wall(self) -> float:
+        """The same day, too."""
+        return 1_795_259_250.4
+
     def time_of_day(self) -> str:
         """The same on every machine."""
         return "14:02:11"

@@ -32,14 +32,6 @@ OURS = DeviceCounters(
 SATURATED = DriveCount(0, 65_535, Bounds(621, 621), Bounds(599, 599))
 
 
-class EarlyClock(fakes.StillClock):
-    """The same moment by the time of day, too."""
-
-    def wall(self) -> float:
-        """Always the same."""
-        return 1_795_259_250.4
-
-
 def log() -> tuple[Frame, ...]:
     """Some seconds of a line: reads, a refusal, a damaged reply, silence."""
     frames = []
@@ -103,7 +95,6 @@ def test_frames(
     )
     snapshot = fakes.snapshot_of(library.load("atv71"), fakes.RUNNING)
     app = fakes.app_of(kind=fakes.Easel)
-    app.clock = EarlyClock()
     app.opened = fakes.opened()
     console = fakes.console_of(snapshot)
     console.session.clock = app.clock
