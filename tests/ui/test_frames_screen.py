@@ -153,6 +153,10 @@ async def test_the_drives_own_counters_are_reset_after_a_question_only() -> None
         counters = made.simulation.drive(1).server.counters
         before = counters.frames
         await made.pilot.press("Z")
+        await made.until(lambda: "Not armed" in made.shown("said"))
+        await made.pilot.press("2", "a")
+        await made.until(lambda: " ARMED" in made.shown("strip"))
+        await made.pilot.press("7", "tab", "tab", "Z")
         await made.until(lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("n")
         await made.until(lambda: isinstance(made.app.screen, FramesScreen))

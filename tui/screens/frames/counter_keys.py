@@ -70,7 +70,7 @@ class CounterKeys(PanelScreen):
             self.look()
 
     def action_reset_drive_counters(self) -> None:
-        """Ask, then set the drive's own counters to 0."""
+        """Armed, ask; then set the drive's own counters to 0."""
         watch, device = self.console.counters, self.session.device
         if not self._shown_or_told():
             return
@@ -78,6 +78,9 @@ class CounterKeys(PanelScreen):
             read_only = self.session.line.read_only
             why = "the line is read-only" if read_only else "the drive has no such command"
             self.app.tell(f"The drive's own counters cannot be reset: {why}.")
+            return
+        if not self.session.arming.armed:
+            self.app.tell("Not armed: a on Monitor arms this drive.")
             return
         from ..dialogs.confirm import Confirm
         from ..dialogs.now import MotorsNow

@@ -110,7 +110,7 @@ ACTIONS: tuple[Action, ...] = (
         ("scroll(-10)", "pageup", "", "Ten frames older."),
         ("scroll(10)", "pagedown", "", "Ten frames newer."),
         ("reset_counters", "C", "", "Count from now on; what others see stays."),
-        ("reset_drive_counters", "Z", "", "Set the drive's own counters to 0; asks."),
+        ("reset_drive_counters", "Z", "", "Set the drive's own counters to 0; armed, asks."),
         ("leave", "escape", "back", "Out of the filter, then back to Monitor."),
     ),
     *on(
