@@ -85,10 +85,12 @@ async def test_a_picture_while_the_panel_ends_draws_nothing(
     app = DrivePanelApp(open_line=Held().open)
     async with app.run_test(size=(80, 24)) as pilot:
         await until(pilot, lambda: app.screen is app.connection)
-        await app.connection.lines.remove()
+        drawn: list[bool] = []
         with monkeypatch.context() as ending:
             ending.setattr(DrivePanelApp, "is_running", False)
+            ending.setattr(app.connection, "show_drives", lambda: drawn.append(True))
             app.connection._redraw()
+        assert not drawn
 
 
 async def test_a_drive_that_does_not_answer_says_so_on_line() -> None:
