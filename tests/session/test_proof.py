@@ -203,7 +203,8 @@ def test_nothing_is_proved_that_is_not_so(
     proof = compared(real, given, rounds, chance, wanted)
     for slot, code in real.items():
         assert proof.brings(slot) in ("", code), (slot, code)
-        assert not proof.excludes(slot, RAWS[code]), (slot, code)
+        # one that trembles may miss its own two readings by chance: its place is not used then
+        assert given[code].noise or not proof.excludes(slot, RAWS[code]), (slot, code)
         for other in CODES:
             if other != code:
                 assert not proof.holds(slot, RAWS[other]), (slot, code, other)
