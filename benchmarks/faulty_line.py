@@ -13,6 +13,7 @@ import os
 import pty
 import random
 import select
+import struct
 import subprocess
 import sys
 import time
@@ -114,7 +115,10 @@ class _Server:
             if self.fd in ready:
                 self._take(os.read(self.fd, 4096))
             while self.waiting and self.waiting[0][0] <= time.monotonic():
-                os.write(self.fd, heapq.heappop(self.waiting)[2])
+                due, _, data = heapq.heappop(self.waiting)
+                os.write(self.fd, data)
+                late = round(1000 * (time.monotonic() - due))
+                self.counts["ms behind time"] = max(late, self.counts.get("ms behind time", 0))
 
     def _take(self, data: bytes) -> None:
         self.pending += data
@@ -151,9 +155,11 @@ class _Server:
             self.written[device, address] = number
             return request[1:6]
         if request[1] == 16:
-            for at in range(number):
-                word = int.from_bytes(request[7 + 2 * at : 9 + 2 * at], "big")
-                self.written[device, address + at] = word
+            sent = struct.unpack_from(f">{number}H", request, 7)
+            new = {(device, address + at): word for at, word in enumerate(sent)}
+            if new.items() <= self.written.items():
+                self.counts["written again"] = self.counts.get("written again", 0) + 1
+            self.written.update(new)
             return request[1:6]
         places = range(address, address + number)
         words = [self.written.get((device, at & 0xFFFF), value_of(device, at)) for at in places]
