@@ -77,10 +77,16 @@ async def line(*, first: int = 3, family: str = "atv21") -> AsyncIterator[Line]:
         simulation.stop()
 
 
-async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips() -> None:
+async def test_enter_during_the_search_leaves_the_line_open_and_no_drive_trips(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # far more empty addresses than three keys take
+    for place in ("line_form", "line_keys"):
+        monkeypatch.setattr(f"tui.screens.connection.{place}.ADDRESSES", "1-99")
     async with line() as made:
         app, pilot = made.app, made.pilot
         await made.searched()
+        assert " of 99" in shown(app, "search")
         chosen = app.connection.lines.chosen
         assert chosen is not None
         assert chosen.text == NAMED
