@@ -14,8 +14,8 @@ DEFECTS = (
     Defect(
         "scan-among-another-masters-requests",
         "tui/cli/running/scanning.py",
-        "if text := (await listen(line, LISTEN)).text:",
-        "if (text := (await listen(line, LISTEN)).text) and False:",
+        "if text := (await listen_first(line, LISTEN)).text:",
+        "if (text := (await listen_first(line, LISTEN)).text) and False:",
         "A running plant's controller loses its answers while drives are searched for.",
         (f"{SCAN}::test_another_master_ends_it_before_anything_is_sent",),
     ),

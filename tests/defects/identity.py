@@ -86,8 +86,8 @@ DEFECTS = (
     Defect(
         "farewell-not-said-after-an-error",
         "tui/cli/shared/options.py",
-        "        finally:\n            await say_farewells(opened)",
-        "        else:\n            await say_farewells(opened)",
+        "        finally:\n            await asyncio.gather(",
+        "        else:\n            await asyncio.gather(",
         "A command that fails leaves a time-out running and says nothing of it.",
         (f"{LEFT}::test_it_is_told_where_the_command_failed",),
     ),

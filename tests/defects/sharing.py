@@ -200,7 +200,7 @@ DEFECTS = (
     Defect(
         "motor-of-a-killed-program-fed",
         "tui/session/sharing/guardian.py",
-        'self._stopper.stop([session], by=f"{program.text} is gone")',
+        'self._stopper.stop([session], by=f"{program.text} {why}")',
         "return",
         "A recorder keeps a motor running whose program was killed.",
         ("tests/session/test_guardian.py",),
@@ -208,8 +208,8 @@ DEFECTS = (
     Defect(
         "no-time-to-take-a-motor-over",
         "tui/session/sharing/guardian.py",
-        "if takers else 0.0",
-        "if False else 0.0",
+        "if frozen or takers else begun",
+        "if frozen else begun",
         "A motor stops before the person beside it can take it over.",
         ("tests/session/test_guardian.py",),
     ),
