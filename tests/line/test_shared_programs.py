@@ -248,7 +248,8 @@ def test_a_stop_beside_run_ends_it_and_says_by_whom(programs: ExitStack) -> None
             assert '"RFR"' in recorder.process.stdout.readline()
         status, said = recorder.end()
         assert status == 128 + signal.SIGTERM
-        assert said == f"drivepanel: Shared with run (pid {runner.process.pid}).\n"
+        # it may say, too, what the drive does now that the recorder asks it no more
+        assert said.startswith(f"drivepanel: Shared with run (pid {runner.process.pid}).\n")
         assert sockets() == []
 
 

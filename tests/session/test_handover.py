@@ -326,3 +326,12 @@ async def test_who_was_there_before_this_panel_is_missed_as_well(
     line.facts.set_programs((line.facts.me,))
     await asyncio.wait_for(looked.wait(), 20)
     fleet.forget()
+
+
+async def test_a_fleet_comes_to_a_line_on_which_another_program_commands() -> None:
+    line = FakeLine({1: {}})
+    line.facts.set_programs((line.facts.me, REMOTE))
+    line.facts.note_commander(1, REMOTE.id)
+    fleet = Fleet(line, Journal())
+    assert any("commands this drive now" in one.text for one in fleet.events.events)
+    fleet.handover.close()

@@ -64,6 +64,9 @@ class Fleet:
         events: EventLog | None = None,
         clock: Clock = REAL_CLOCK,
     ) -> None:
+        # first of all: a line that is shared tells at once who commands what
+        self._lock = threading.Lock()
+        self._found: Mapping[int, FoundDrive] = MappingProxyType({})
         self.line = line
         self.clock = clock
         """What the sessions with its drives count by."""
@@ -82,8 +85,6 @@ class Fleet:
         line.facts.on_change(self._look_for_left)
         self.search: Search | None = None
         """The search for drives that goes on, or the last one."""
-        self._lock = threading.Lock()
-        self._found: Mapping[int, FoundDrive] = MappingProxyType({})
 
     @property
     def found(self) -> Mapping[int, FoundDrive]:
