@@ -10,9 +10,10 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from tui.bus.api import Frame
+from tui.session.listening.words import FUNCTION_NAMES
 from tui.wire.heard.pairing import BROADCAST_DEVICE
 
-from .decoded import EXCEPTION_BIT, FUNCTIONS, pdu_of
+from .decoded import EXCEPTION_BIT, pdu_of
 
 ERRORS = frozenset({"error", "errors"})
 TellFrames = Callable[[Sequence[Frame]], Sequence[str]]
@@ -46,7 +47,7 @@ def choice_of(text: str) -> FrameChoice:
             errors = True
         elif word[0] == "f" and word[1:].isascii() and word[1:].isdigit():
             functions.add(int(word[1:]))
-        elif named := {code for code, name in FUNCTIONS.items() if word in name.split()}:
+        elif named := {code for code, name in FUNCTION_NAMES.items() if word in name.split()}:
             functions |= named
         else:
             words.append(word)

@@ -10,17 +10,9 @@ from tui.bus.api import Frame
 from tui.drive.profile.profile import Profile
 from tui.drive.shown import shown
 from tui.drive.values import from_words, word_count
+from tui.session.listening.words import FUNCTION_NAMES
 
 READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE, IDENTIFY_DRIVE = 3, 4, 6, 16, 23, 43
-FUNCTIONS: Mapping[int, str] = {
-    READ: "read",
-    READ_INPUT: "read input",
-    WRITE_ONE: "write",
-    WRITE_MANY: "write",
-    READ_WRITE: "read and write",
-    IDENTIFY_DRIVE: "identify",
-    8: "diagnostics",
-}
 EXCEPTION_BIT = 0x80
 MBAP_BYTES = 7
 """Bytes before the function code on Modbus TCP."""
@@ -90,7 +82,7 @@ def _asked(pdu: Pdu) -> Asked | None:
 
 
 def _request(pdu: Pdu, words: _Words) -> str:
-    who, name = pdu.device or "all", FUNCTIONS.get(pdu.function, f"function {pdu.function}")
+    who, name = pdu.device or "all", FUNCTION_NAMES.get(pdu.function, f"function {pdu.function}")
     head = f"{who} {name}"
     match pdu.function:
         case 3 | 4:
@@ -112,7 +104,7 @@ def _request(pdu: Pdu, words: _Words) -> str:
 
 def _reply(pdu: Pdu, asked: Asked | None, words: _Words) -> str:
     if pdu.function & EXCEPTION_BIT:
-        name = FUNCTIONS.get(pdu.function & ~EXCEPTION_BIT, "")
+        name = FUNCTION_NAMES.get(pdu.function & ~EXCEPTION_BIT, "")
         return f"{pdu.device} refuses to {name or 'do it'}: exception {pdu.body[0]}"
     if pdu.function in (READ, READ_INPUT, READ_WRITE):
         raws = struct.unpack_from(f">{pdu.body[0] // 2}H", pdu.body, 1)
@@ -124,7 +116,7 @@ def _reply(pdu: Pdu, asked: Asked | None, words: _Words) -> str:
     if pdu.function == WRITE_MANY:
         address, count = struct.unpack_from(">HH", pdu.body)
         return f"{pdu.device} wrote {words.names(address, count)}"
-    return f"{pdu.device} {FUNCTIONS.get(pdu.function, f'function {pdu.function}')}"
+    return f"{pdu.device} {FUNCTION_NAMES.get(pdu.function, f'function {pdu.function}')}"
 
 
 def _one(pdu: Pdu) -> tuple[int, list[int]]:
