@@ -22,7 +22,7 @@ from tui.cli.shared.logs import stop_logging
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
-COSTLY_FIRST = {"ui": 0, "session": 1, "cli": 2, "bus": 3}
+COSTLY_FIRST = {"ui": 0, "session": 1, "cli": 2, "bus": 3, "tests": 4}
 """Rooms whose tests take long; all others come after them."""
 FOLDERS = count()
 
@@ -34,10 +34,15 @@ def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item
     """Deal the modules to the workers, the costly first: no long test is left for the end."""
     workers: int = getattr(config, "workerinput", {}).get("workercount", 1)
     if workers > 1:
-        modules = [list(of_one) for _, of_one in groupby(items, lambda item: item.path)]
+        modules = [list(of_one) for _, of_one in groupby(items, _dealt_with)]
         modules.sort(key=lambda of_one: COSTLY_FIRST.get(of_one[0].path.parent.name, 9))
         dealt = [module for worker in range(workers) for module in modules[worker::workers]]
         items[:] = chain.from_iterable(dealt)
+
+
+def _dealt_with(item: pytest.Item) -> Path:
+    """What goes to one worker: a module; all that look at the source, which is parsed once."""
+    return item.path.parent if item.path.parent == Path(__file__).parent else item.path
 
 
 def pytest_collection_finish() -> None:

@@ -18,8 +18,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 from .programs import PATIENCE
+from .sources import ROOT, modules, nodes_of
 
-ROOT = Path(__file__).resolve().parent.parent
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 CI = ROOT / ".ci" / "run"
 
@@ -192,7 +192,7 @@ def test_what_the_test_command_leaves_out_is_run_by_the_gate() -> None:
     settings = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
     options = settings["tool"]["pytest"]["ini_options"]
     assert options["addopts"].endswith(" -m 'not sweep'")
-    assert [marker.partition(":")[0] for marker in options["markers"]] == ["sweep"]
+    assert [marker.partition(":")[0] for marker in options["markers"]] == ["sweep", "drawn"]
     layer = ".venv/bin/python -m pytest -q -n 7"
     assert f"{layer} -m sweep" in README
     assert re.search(rf"PEERS=required {layer} .*-m sweep$", CI.read_text("utf-8"), re.MULTILINE)
@@ -265,8 +265,8 @@ def test_every_package_that_the_project_needs_is_pinned() -> None:
 def test_values_become_text_in_one_place() -> None:
     """Screen, journal and command line go through tui.drive.shown, which knows of scales."""
     found = set()
-    for path in (ROOT / "tui").rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+    for path in modules():
+        for node in nodes_of(path):
             if not isinstance(node, ast.ImportFrom) or not f".{node.module}".endswith(".values"):
                 continue
             if any(name.name == "decode" for name in node.names):

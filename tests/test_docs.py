@@ -15,7 +15,8 @@ from typing import NamedTuple
 
 import pytest
 
-ROOT = Path(__file__).resolve().parent.parent
+from .sources import ROOT, modules, nodes_of
+
 TREES = ("tui", "tests", "benchmarks", "screenshots")
 DOCUMENTS = sorted([*(ROOT / "docs").rglob("*.md"), ROOT / "CONTRIBUTING.md"])
 FOREIGN = frozenset({"DataTable", "Digits", "Sparkline", "Text", "TYPE_CHECKING"})
@@ -49,8 +50,8 @@ def tree() -> Tree:
     """All that the modules of the project define."""
     found = Tree(defaultdict(set), defaultdict(set), set(), set())
     for folder in TREES:
-        for path in (ROOT / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+        for path in modules(ROOT / folder):
+            for node in nodes_of(path):
                 _note(node, found)
     return found
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import ast
 from collections import defaultdict
 from collections.abc import Iterator
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parent.parent
+from .sources import ROOT, modules, tree_of
+
 LIKE_A_COMMAND = {"compare", "identify", "main", "report", "restore"}
 """Functions of the command line are called as the commands that a person types."""
 
@@ -24,8 +24,8 @@ def public(tree: ast.Module) -> Iterator[str]:
 
 def test_no_public_name_stands_for_two_things() -> None:
     where = defaultdict(list)
-    for path in sorted((ROOT / "tui").rglob("*.py")):
-        for name in public(ast.parse(path.read_text("utf-8"))):
+    for path in modules():
+        for name in public(tree_of(path)):
             if not name.startswith("_") and name not in ("log", "T", "P", "R"):
                 where[name].append(path.relative_to(ROOT).as_posix())
     twice = {name: found for name, found in where.items() if len(found) > 1}

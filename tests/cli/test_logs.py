@@ -6,14 +6,11 @@ import ast
 import logging
 import os
 import threading
-from pathlib import Path
 
-import tui
 from tests.programs import PATIENCE, wait_until
+from tests.sources import PACKAGE, calls_of
 from tui.cli.shared.logs import log_file, start_logging, stop_logging
 from tui.session.connect.open_line import open_line
-
-SOURCES = Path(tui.__file__).parent
 
 
 async def unforeseen() -> None:
@@ -39,11 +36,9 @@ def test_work_that_dies_leaves_its_traceback_in_the_log() -> None:
 def test_every_module_logs_by_its_own_name() -> None:
     """The handler hangs above all of them; a logger of any other name is heard by nobody."""
     named: dict[str, list[str]] = {}
-    for path in SOURCES.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.Call) and ast.unparse(node.func).endswith("getLogger"):
-                name = path.relative_to(SOURCES).as_posix()
-                named.setdefault(name, []).extend(ast.unparse(each) for each in node.args)
+    for path, call in calls_of("getLogger"):
+        name = path.relative_to(PACKAGE).as_posix()
+        named.setdefault(name, []).extend(ast.unparse(each) for each in call.args)
     # the one that hangs the handler, and the one that silences pymodbus
     assert named.pop("cli/shared/logs.py") == ["PANEL", "PANEL"]
     assert named["bus/line.py"] == ["'pymodbus'", "'pymodbus'"]

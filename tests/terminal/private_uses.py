@@ -12,7 +12,7 @@ import importlib
 import inspect
 import pkgutil
 import textwrap
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 from typing import NamedTuple
@@ -100,12 +100,13 @@ def _is_own(node: ast.AST) -> bool:
 def uses(source: str, bases: Bases) -> list[Use]:
     """Every use of a private part of Textual in a module, whose classes stand on these."""
     tree = ast.parse(source)
-    return sorted({*_imports(tree), *_of_others(tree), *_of_own_classes(tree, bases)})
+    nodes = list(ast.walk(tree))
+    return sorted({*_imports(nodes), *_of_others(nodes), *_of_own_classes(tree, bases)})
 
 
-def _imports(tree: ast.Module) -> Iterator[Use]:
+def _imports(nodes: Sequence[ast.AST]) -> Iterator[Use]:
     """Private modules, and private names of public ones."""
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             paths = [alias.name for alias in node.names]
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -117,10 +118,10 @@ def _imports(tree: ast.Module) -> Iterator[Use]:
                 yield Use(found, node.lineno)
 
 
-def _of_others(tree: ast.Module) -> Iterator[Use]:
+def _of_others(nodes: Sequence[ast.AST]) -> Iterator[Use]:
     """Private attributes of anything but `self`, and what is set on a class of Textual."""
-    modules, theirs = _imported(tree)
-    for node in ast.walk(tree):
+    modules, theirs = _imported(nodes)
+    for node in nodes:
         if isinstance(node, ast.Attribute) and not _is_own(node.value):
             owner = node.value.id if isinstance(node.value, ast.Name) else ""
             patched = owner in theirs and isinstance(node.ctx, ast.Store | ast.Del)
@@ -143,11 +144,11 @@ def _by_name(call: ast.Call, theirs: set[str]) -> str | None:
     return str(name.value) if patched or name.value in names_of_any() else None
 
 
-def _imported(tree: ast.Module) -> tuple[set[str], set[str]]:
+def _imported(nodes: Sequence[ast.AST]) -> tuple[set[str], set[str]]:
     """Names of modules of others than Textual, and names that were imported from Textual."""
     modules: set[str] = set()
     theirs: set[str] = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             tops = {(alias.asname or alias.name).partition(".")[0] for alias in node.names}
             ours = {name for name in tops if name not in DRAWN_BY}
@@ -160,7 +161,7 @@ def _imported(tree: ast.Module) -> tuple[set[str], set[str]]:
 
 def _of_own_classes(tree: ast.Module, bases: Bases) -> Iterator[Use]:
     """Private names that `self` has from Textual: read, set or defined anew."""
-    for name, node in _classes(tree):
+    for name, node in _classes(tree) if bases else ():
         known = frozenset().union(*(private_names(base) for base in bases.get(name, ())))
         for part in node.body:
             for found, line in _defined(part):

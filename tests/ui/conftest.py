@@ -6,12 +6,13 @@ import time
 from collections.abc import Iterator
 
 import pytest
+from textual._compositor import Compositor
 from textual.css.stylesheet import Stylesheet
 from textual.widgets import Input
 
 from tui.screens.dialogs.question import Question
 
-from .quick import parse_once
+from .quick import drawn_for_somebody, parse_once
 
 
 @pytest.fixture(autouse=True)
@@ -39,6 +40,17 @@ def nobody_else(monkeypatch: pytest.MonkeyPatch) -> None:
 def styles_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A fifth of the time of a test of the panel would go into the same style sheets."""
     monkeypatch.setattr(Stylesheet, "_parse_rules", parse_once)
+
+
+@pytest.fixture(autouse=True)
+def drawn_when_looked_at(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A quarter of the time went into drawing what nobody looks at.
+
+    Pictures are drawn as a person comes to them, and so is all that is marked `drawn`.
+    """
+    looked_at = "snap_compare" in request.fixturenames or request.node.get_closest_marker("drawn")
+    if not looked_at:
+        monkeypatch.setattr(Compositor, "render_update", drawn_for_somebody)
 
 
 @pytest.fixture(autouse=True)

@@ -30,6 +30,8 @@ from tui.widgets.lines import Lines, looks, runs
 
 from .bytes_per_second import compare
 
+pytestmark = pytest.mark.drawn
+
 CONTROL = re.compile(r"\x1b\[([0-9;?]*)([A-Za-z])")
 ROWS, COLUMNS = 6, 40
 Cell = tuple[str, str]

@@ -17,6 +17,7 @@ from textual.pilot import Pilot
 from textual.widgets import Input, OptionList
 
 from tests.programs import rtu_tcp
+from tests.sources import calls_of
 from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.screens.command.options import OptionsScreen
@@ -365,9 +366,7 @@ def test_numbers_references_and_addresses_take_no_space() -> None:
     }
     asked = {
         ast.unparse(call.args[0]): any(keyword.arg == "number" for keyword in call.keywords)
-        for path in SOURCES.rglob("*.py")
-        for call in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(call, ast.Call) and ast.unparse(call.func) == "Ask"
+        for _, call in calls_of("Ask", SOURCES)
     }
     numbers = {question for question, number in asked.items() if number}
     assert numbers == {

@@ -14,6 +14,8 @@ from tui.terminal.lean import cells_of
 
 from .test_flows import until
 
+pytestmark = pytest.mark.drawn
+
 
 def picture(app: Any) -> list[list[tuple[str, str]]]:
     """Every cell with its colours, but for the strip, which has the time of day."""

@@ -11,6 +11,8 @@ from tui.terminal.abilities import ASCII, Abilities
 from .test_monitor_pictures import SCENES, panel, show
 from .test_pictures import Compare
 
+pytestmark = pytest.mark.drawn
+
 POOR = {
     "plain signs": Abilities(ASCII),
     "latin-1": Abilities("iso8859-1"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ast
 import os
 import pty
 import select
@@ -17,6 +16,7 @@ from rich.text import Text
 from textual.widgets import Input
 
 from tests.answering import read_answering
+from tests.sources import calls_of
 from tests.sweeps import kept
 from tui.app import DrivePanelApp
 from tui.drive.settings.restore_plan import RestoreItem
@@ -39,6 +39,8 @@ from .fakes import press
 from .test_command_flows import Bench, bench
 from .test_flows import shown, until
 from .test_parameter_flows import open_file, write
+
+pytestmark = pytest.mark.drawn
 
 ROOT = Path(__file__).resolve().parents[2]
 MARKUP = ("[/]", "[bold]", "[@click=app.quit]x[/]", "[")
@@ -220,13 +222,7 @@ async def test_markup_in_every_field_is_text(name: str) -> None:
 
 
 def test_every_field_that_asks_is_one_of_these() -> None:
-    calls = [
-        node
-        for path in (ROOT / "tui").rglob("*.py")
-        for node in ast.walk(ast.parse(path.read_text("utf-8")))
-        if isinstance(node, ast.Call) and ast.unparse(node.func) == "Ask"
-    ]
-    assert len(calls) == len(ASKED), "a new question: type markup into it here too"
+    assert len(list(calls_of("Ask"))) == len(ASKED), "a new question: type markup into it here too"
 
 
 async def test_texts_of_dialogs_notices_and_lists_are_shown_as_they_are_written() -> None:

@@ -14,6 +14,8 @@ from tui.session.connect.open_line import OpenLine, demo_line
 
 from .test_flows import until
 
+pytestmark = pytest.mark.drawn
+
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "tour.md"
 STEP = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 SEEN = re.compile(r"`([^`]+)`")

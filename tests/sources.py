@@ -1,0 +1,40 @@
+"""The source of the project, parsed once in a process for all tests that look at it."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "tui"
+
+
+@cache
+def modules(folder: Path = PACKAGE) -> tuple[Path, ...]:
+    """The modules below a folder, in the order of their names."""
+    return tuple(sorted(folder.rglob("*.py")))
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    """What a module says, parsed."""
+    return ast.parse(path.read_text("utf-8"))
+
+
+@cache
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    """All that a module says, from the outside in."""
+    return tuple(ast.walk(tree_of(path)))
+
+
+def calls_of(name: str, folder: Path = PACKAGE) -> Iterator[tuple[Path, ast.Call]]:
+    """Where something is called, by its name alone or as a part of something."""
+    for path in modules(folder):
+        if f"{name}(" in path.read_text("utf-8"):
+            for node in nodes_of(path):
+                match node:
+                    case ast.Call(func=ast.Name(id=found) | ast.Attribute(attr=found)):
+                        if found == name:
+                            yield path, node
