@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from tests.programs import DRIVEPANEL, drivepanel, served
+from tests.sweeps import kept
 from tui.cli.main import COMMANDS
 
 from .commands import ended
@@ -49,7 +50,12 @@ EXAMPLES = {
 }
 
 
-@pytest.mark.parametrize("text", EXAMPLES.values(), ids=EXAMPLES.keys())
+LONG = {"run", "hold", "simulate", "serve", "prove", "listen", "scan", "backup", "restore"}
+"""Commands that take a while and have tests of their own: their examples are for the sweeps."""
+SHORT = [text for text in EXAMPLES.values() if not LONG & {*commands_of(text)}]
+
+
+@pytest.mark.parametrize("text", kept(EXAMPLES.values(), *SHORT), ids=EXAMPLES.keys())
 def test_the_commands_of_a_section(
     text: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

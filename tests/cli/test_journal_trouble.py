@@ -13,6 +13,7 @@ from pathlib import Path
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE
+from tests.sweeps import kept
 from tui.cli.commands.orders import close_journal
 from tui.session.journal import Journal
 
@@ -68,7 +69,7 @@ def test_a_write_whose_journal_cannot_be_kept_is_done_and_told() -> None:
     ]
 
 
-@pytest.mark.parametrize("command", [WRITE, STOP, STOP_ALL, REFERENCE, RUN])
+@pytest.mark.parametrize("command", kept([WRITE, STOP, STOP_ALL, REFERENCE, RUN], WRITE, RUN))
 def test_a_full_disk_is_said_in_a_sentence_and_nothing_else_fails(command: tuple[str, ...]) -> None:
     done = program(*command, limit=no_room)
     assert done.returncode == 0, done.stderr
@@ -101,7 +102,7 @@ def test_a_disk_that_does_not_answer_is_told_at_the_end(
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="without /dev/full")
-@pytest.mark.parametrize("command", [WRITE, STOP, STOP_ALL, REFERENCE])
+@pytest.mark.parametrize("command", kept([WRITE, STOP, STOP_ALL, REFERENCE], STOP))
 def test_what_was_done_is_not_said_to_have_failed_as_its_output_is_lost(
     command: tuple[str, ...],
 ) -> None:
@@ -127,7 +128,7 @@ def test_what_was_asked_for_and_is_lost_is_a_failure(more: tuple[str, ...]) -> N
     ]
 
 
-@pytest.mark.parametrize("which", CLOSED)
+@pytest.mark.parametrize("which", kept(CLOSED, "2", "all"))
 def test_streams_that_are_closed_hurt_nothing(which: str) -> None:
     command = f'exec "$@" {CLOSED[which]}'
     done = subprocess.run(

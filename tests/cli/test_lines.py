@@ -11,6 +11,7 @@ from click.shell_completion import ShellComplete
 
 from tests.adapters import Adapters, adapters
 from tests.programs import drivepanel
+from tests.sweeps import kept
 from tui.cli.main import main
 from tui.cli.shared.lines import is_line
 from tui.session.connect.known_lines import load_memory
@@ -222,13 +223,17 @@ def test_reading_a_drive_that_is_another_one_goes_on_with_a_warning(line: str) -
 
 @pytest.mark.parametrize(
     "command",
-    [
+    kept(
+        [
+            ["write", "ACC=7"],
+            ["run", "--for", "1"],
+            ["reference", "20Hz"],
+            ["reset"],
+            ["block", "set", "NMA3=LCR"],
+        ],
         ["write", "ACC=7"],
         ["run", "--for", "1"],
-        ["reference", "20Hz"],
-        ["reset"],
-        ["block", "set", "NMA3=LCR"],
-    ],
+    ),
     ids=lambda command: command[0],
 )
 def test_nothing_is_written_to_a_drive_that_is_another_one(line: str, command: list[str]) -> None:
