@@ -23,7 +23,7 @@ from tui.bus.master import LineContext, Sending
 from tui.bus.requests import Read
 from tui.bus.result import Piece, ResultKind
 from tui.bus.rtu.exchange import FLOOD, RtuExchange
-from tui.bus.rtu.master import RtuMaster
+from tui.bus.rtu.master import STOOD_STILL, RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.tcp.master import TcpMaster
 from tui.bus.trace import Trace
@@ -85,6 +85,27 @@ async def test_what_came_before_a_request_is_not_its_answer() -> None:
     assert result.kind is ResultKind.NOTHING
     assert [piece.whole for piece in strays] == [True]
     assert around.tally.stale == 1
+    master.close()
+
+
+async def test_what_came_while_the_program_stood_still_as_it_sent_is_no_answer() -> None:
+    """Frozen between its look at the line and the request: an answer of before is there first."""
+    strays: list[Piece] = []
+    transport = HeldBack(b"")
+    around = context(strays)
+    master = RtuMaster(transport, RtuTcpLink("x", 1), around, lambda: None, wire_time=False)
+
+    def freeze() -> None:
+        time.sleep(STOOD_STILL + 0.05)
+        transport.held = reply(b"\x01" + QUESTION + b"\0\0")
+
+    asked = Sending(1, QUESTION, REQUEST.expectation(), 0.05, look=freeze)
+    result = await master.exchange(asked)
+    assert result.kind is ResultKind.NOTHING
+    await master.quiet()
+    assert [piece.whole for piece in strays] == [True]
+    # sent all the same, which a write has to know
+    assert len(transport.sent) == 1
     master.close()
 
 

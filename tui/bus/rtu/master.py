@@ -25,6 +25,8 @@ TOLERANCE = 0.001
 """Seconds by which the end of a request is uncertain."""
 REMEMBERED, JUDGED, SELDOM = 64, 8, 0.15
 """Replies looked back at; how many are enough; the share of early ones on a line with a baud."""
+STOOD_STILL = 0.2
+"""Seconds from the last look at the line to the end of sending, past which nothing is sure."""
 MUCH_TALK = 256
 """Bytes that came in while nothing was due, and no silence, after which they are looked at."""
 IDLE_LIMIT = 4096
@@ -161,7 +163,8 @@ class RtuMaster:
             await self._send(data)
             tally.count_sent(sending.device, len(data))
             self._around.trace.add(begun, "out", data)
-            result = await self._result(exchange, sending)
+            still = clock() - begun > STOOD_STILL
+            result = await (self._distrust(sending) if still else self._result(exchange, sending))
         finally:
             self._exchange = self._done = None
             self._stop_timer()
@@ -185,6 +188,20 @@ class RtuMaster:
             if self.failure is None:
                 self.lost(str(error.strerror or error))
             raise self.failure or LineLost("The line was lost.") from error
+
+    async def _distrust(self, sending: Sending) -> ExchangeResult:
+        """Let the time of the answer go by unheard.
+
+        The program stood still as it sent: what came meanwhile may answer a request before.
+        """
+        clock = self._around.clock
+        self._exchange = None
+        self._sent = self._last = clock() + (len(sending.pdu) + 3) * self._character
+        while self.failure is None and clock() < self._sent + sending.time_out:
+            await self._transport.rest(self._sent + sending.time_out)
+        if self.failure is not None:
+            raise self.failure
+        return ExchangeResult(ResultKind.NOTHING)
 
     async def _result(self, exchange: RtuExchange, sending: Sending) -> ExchangeResult:
         """Wait for the result; while bytes are coming in, a little over the time-out."""
