@@ -46,8 +46,8 @@ WRITTEN, STOPPED = 0.15, 0.01
 AGES = (0.0, 0.0, 0.2)
 """Greatest ages in s that the reads accept."""
 FAULTS = Faults(late=0.02, lost=0.01, duplicated=0.0, corrupted=0.02, noise=0.01)
-"""No reply comes twice: each owner learns anew that a line does that, by a first copy that RTU
-gives it no means to tell (see `truth`)."""
+"""No reply comes twice: of the first copy on a line RTU gives no means to tell that it is one (see
+`truth`). Whoever takes the line over is told of those before."""
 TIMING = replace(FAST, late_reply=Timing().late_reply)
 """Quick, but for replies that come late because the computer is busy with all these programs."""
 FROZEN = (0.1, 4.0)

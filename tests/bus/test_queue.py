@@ -332,6 +332,24 @@ def test_a_feed_is_not_held_back_but_skips_what_may_come_late() -> None:
     assert devices.doubts(1, request.expectation(), 11.0) == (False, 1)
 
 
+def test_who_takes_a_line_over_knows_whose_replies_come_late_or_twice() -> None:
+    owner, heir = (Devices(Timing(), mistakable=True) for _ in range(2))
+    expectation = Read(1, 3201, 1).expectation()
+    reply = Piece(frame(1, bytes([3, 2, 0, 7])), whole=True)
+    owner.silent(1, expectation, 10.0, 10.3)
+    assert owner.stray(reply, 10.8)
+    owner.answered(1, expectation, 0.005, 11.0)
+    assert owner.stray(reply, 11.4)
+    heir.copy(1, owner.state(1))
+    assert heir.state(1) == owner.state(1)
+    # the copy of a reply to the heir's first request is not taken for that to its second
+    heir.answered(1, expectation, 0.005, 12.0)
+    assert heir.not_before(1, expectation, Priority.POLL, 12.1) == pytest.approx(12.8)
+    # and the line is left quiet for one that is late, as the owner would leave it
+    heir.silent(1, expectation, 13.0, 13.3)
+    assert heir.quiet_until > 13.3
+
+
 def test_when_a_device_was_last_heard() -> None:
     devices = Devices(Timing(), mistakable=True)
     expectation = Read(1, 3201, 1).expectation()

@@ -59,6 +59,10 @@ class DeviceState:
     """The median of the same."""
     heard: float | None
     """When its last reply ended, on the line's clock; None before the first."""
+    lateness: float = 0.0
+    """Seconds by which a reply came after its time-out, the longest; fades with those in time."""
+    copies_within: float = 0.0
+    """Seconds after a reply in which it may come once more; 0 where none ever came twice."""
 
 
 @dataclass(frozen=True, slots=True)

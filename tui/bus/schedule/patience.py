@@ -110,6 +110,8 @@ class Devices:
             record.turnaround,
             usual(record.recent) or record.told_usual,
             record.heard,
+            record.lateness,
+            max(record.settle, self._settle),
         )
 
     @property
@@ -123,7 +125,8 @@ class Devices:
         record.answers, record.failures = state.answers, state.failures
         record.silent_since, record.next_try = state.silent_since, state.next_try
         record.turnaround, record.told_usual = state.turnaround, state.usual_turnaround
-        record.heard = state.heard
+        record.heard, record.repeated = state.heard, state.heard or 0.0
+        record.lateness, record.settle = state.lateness, state.copies_within
 
     def last_reply_by(self, now: float) -> float:
         """When the last reply that is due may have come, of those who ever answered; else now."""
@@ -142,8 +145,7 @@ class Devices:
         if within is not None and within >= 0.0:
             return min(within, timing.first_timeout)
         if priority >= Priority.BACKGROUND and not record.ever_answered:
-            patient = priority is Priority.PATIENT
-            wait = timing.patient_timeout if patient else timing.scan_timeout
+            wait = timing.patient_timeout if priority is Priority.PATIENT else timing.scan_timeout
             return min(wait, timing.first_timeout)
         recent = record.recent.get(function)
         if not recent:
@@ -174,11 +176,8 @@ class Devices:
         """
         if priority <= Priority.FEED:
             return 0.0
-        expires = [
-            late.expires
-            for late in self._still_outstanding(device, now)
-            if late.expectation == expectation
-        ]
+        there = self._still_outstanding(device, now)
+        expires = [late.expires for late in there if late.expectation == expectation]
         return max([self.quiet_until, *expires])
 
     def doubts(self, device: int, expectation: Expectation, now: float) -> tuple[bool, int]:

@@ -27,7 +27,7 @@ from ..requests import (
 )
 from .failures import ErrorForm
 
-VERSION = 2
+VERSION = 3
 """Of the messages; programs of different versions do not share a line."""
 LONGEST_MESSAGE = 1 << 18
 """Bytes of one message; more is no message of ours."""
