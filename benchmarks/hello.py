@@ -1,10 +1,13 @@
 """The least that Textual can be: one text on the screen; `w` changes it, `?` asks, `q` leaves.
 
-python -m benchmarks.hello
+    python -m benchmarks.hello [TEXTS LINES]
+
+With so many texts beside each other, each of so many lines, `w` changes all of them.
 """
 
 from __future__ import annotations
 
+import sys
 from typing import ClassVar
 
 from textual.app import App, ComposeResult
@@ -32,24 +35,32 @@ class Asked(ModalScreen[None]):
 
 
 class Hello(App[None]):
-    """One Static."""
+    """One Static, or several beside each other."""
 
+    CSS = "#_default { layout: horizontal; } #_default Static { width: 1fr; }"
     BINDINGS: ClassVar = [
         ("w", "turn", "Turn"),
         ("question_mark", "ask", "Ask"),
         ("q", "quit", "Quit"),
     ]
 
-    _turns = 0
+    def __init__(self, texts: int = 1, lines: int = 1) -> None:
+        super().__init__()
+        self._texts, self._lines, self._turns = texts, lines, 0
 
     def compose(self) -> ComposeResult:
         """The text."""
-        yield Static(TEXTS[0])
+        for _ in range(self._texts):
+            yield Static(self._text())
 
     def action_turn(self) -> None:
         """Show the other text."""
         self._turns += 1
-        self.query_one(Static).update(TEXTS[self._turns % 2])
+        for text in self.query(Static):
+            text.update(self._text())
+
+    def _text(self) -> str:
+        return "\n".join([TEXTS[self._turns % 2]] * self._lines)
 
     def action_ask(self) -> None:
         """Show the box."""
@@ -57,4 +68,4 @@ class Hello(App[None]):
 
 
 if __name__ == "__main__":
-    Hello().run()
+    Hello(*map(int, sys.argv[1:])).run()

@@ -41,6 +41,8 @@ SIMULATED = ("--format", "8N1", "--real-time", "--run", "50", "--set", "SLL=0")
 """A drive that goes on where nobody asks it between two programs."""
 HELLO = (sys.executable, "-m", "benchmarks.hello")
 HTOP = ("htop", "-d", "1")
+AS_MUCH = {(80, 24): (1, 6), (120, 40): (4, 17)}
+"""Texts and lines that Tab changes on Monitor, by the size of the terminal."""
 FIRST_WORDS = (
     "Drive Panel",
     "Lines ─",
@@ -222,6 +224,16 @@ def hello(bench: Bench, size: tuple[int, int]) -> Figures:
     return found
 
 
+def hello_as_much(bench: Bench, size: tuple[int, int]) -> Figures:
+    """The bare Textual program where its key changes as much as the panel's."""
+    texts, lines = AS_MUCH[size]
+    with bench.open((*HELLO, str(texts), str(lines)), size) as terminal:
+        terminal.see(TEXTS[0])
+        terminal.run(SETTLED)
+        key = Key("w", lambda text: tuple(text.count(one) for one in TEXTS))
+        return {"key": press_often(terminal, key, bench.options.presses // 2)}
+
+
 def htop(bench: Bench, size: tuple[int, int]) -> Figures | None:
     """htop at 10 refreshes a second; None where it is not installed."""
     if shutil.which("htop") is None:
@@ -243,6 +255,7 @@ def measure(bench: Bench, size: tuple[int, int]) -> Figures:
         "low_screens": low_screens(bench, size),
         "slow": slow(bench, size),
         "hello": hello(bench, size),
+        "as much": hello_as_much(bench, size),
         "htop": htop(bench, size),
     }
 
@@ -313,9 +326,13 @@ def show(console: Console, size: str, figures: Figures) -> None:
 
 def show_ratios(console: Console, size: str, figures: Figures) -> None:
     """Print what is asked of the panel as ratios to its peers in the same run."""
-    ours, bare, peer = figures["10 Hz"], figures["hello"], figures["htop"]
-    for name, words in (("key", "a text that changes"), ("help", "opening and closing help")):
-        median, of_bare = ours[name]["median_ms"], bare[name]["median_ms"]
+    ours, peer = figures["10 Hz"], figures["htop"]
+    for bare, name, words in (
+        ("as much", "key", "a text that changes"),
+        ("hello", "key", "the same, where one line changes there"),
+        ("hello", "help", "opening and closing help"),
+    ):
+        median, of_bare = ours[name]["median_ms"], figures[bare][name]["median_ms"]
         if median is None or of_bare is None:
             console.print(f"{size}: {words}: keys were lost")
             continue
