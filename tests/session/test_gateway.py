@@ -263,6 +263,19 @@ async def test_a_client_that_is_gone_commands_nothing_and_all_are_told(bench: Ma
     assert "10.0.0.9:5000, which commanded this drive, has gone" in said[0]
 
 
+async def test_a_second_client_that_commands_the_drive_is_told_of(bench: Make) -> None:
+    made = bench(commands=True)
+    said: list[str] = []
+    made.line.facts.on_text(lambda _, text: said.append(text))
+    assert await made.write(LFR, 300) == 0
+    assert await made.write(LFR, 310) == 0
+    assert said == []
+    made.client = TcpClient(2, "10.0.0.10:5000")
+    assert await made.write(LFR, 320) == 0
+    (text,) = said
+    assert "10.0.0.10:5000 commands this drive now, as client 10.0.0.9:5000 did" in text
+
+
 async def test_a_drive_without_a_profile_is_only_read(bench: Make) -> None:
     leroy = DriveSpec("powerdrive", 1)
     made = bench(leroy, writes=allowed_codes("all"), commands=True)

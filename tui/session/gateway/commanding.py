@@ -68,7 +68,11 @@ class GatewayCommanding:
         if why := self._line.facts.claim(device):
             return why
         with self._lock:
-            self._by[device] = client
+            before, self._by[device] = self._by.get(device), client
+        if before not in (None, client):
+            text = f"Modbus TCP client {client} commands this drive now, as client {before} did."
+            log.warning("drive %s: %s", device, text)
+            self._line.facts.tell_all(device, text)
         return ""
 
     def stop(self, device: int, client: str) -> None:
