@@ -364,11 +364,11 @@ def test_numbers_references_and_addresses_take_no_space() -> None:
         "blocks/pick_parameter.py": {"Field"},
         "frames/screen.py": {"Field"},
     }
-    asked = {
-        ast.unparse(call.args[0]): any(keyword.arg == "number" for keyword in call.keywords)
+    numbers = {
+        ast.unparse(call.args[0])
         for _, call in calls_of("Ask", SOURCES)
+        if any(keyword.arg == "number" for keyword in call.keywords)
     }
-    numbers = {question for question, number in asked.items() if number}
     assert numbers == {
         "'Rated current in A'",
         "question",  # the inputs of a simulated drive
