@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from tests.programs import DRIVEPANEL, drivepanel, port_of, served
-from tui.cli.commands.status import status_json
 from tui.cli.documents.json_schema import DOCUMENTS, document_of, documents_schema
 from tui.cli.main import COMMANDS
+from tui.cli.shared.drive_status import status_json
 
 from . import test_fault_status as fault_status
 from .commands import ended, invoked, tcp_line

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tui.cli.commands.status import Status, status_json, status_of_drive, status_table
+from tui.cli.shared.drive_status import Status, status_json, status_of_drive, status_table
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, demo_line
 from tui.session.drive import DriveSession

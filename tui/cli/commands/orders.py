@@ -89,7 +89,7 @@ async def watched(
     """
     from tui.session.fleet import Fleet
 
-    from .status import shown_codes
+    from ..shared.drive_status import shown_codes
 
     session = await connect_drive(opened, target)
     journal = told_journal()

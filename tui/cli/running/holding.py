@@ -6,9 +6,10 @@ import asyncio
 import math
 import signal
 import sys
-from collections.abc import AsyncIterator, Callable, Sequence
-from contextlib import asynccontextmanager, suppress
+from collections.abc import AsyncIterator, Callable, Iterator, Sequence
+from contextlib import ExitStack, asynccontextmanager, contextmanager, suppress
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING
 
 import click
@@ -85,13 +86,26 @@ async def hold_on(
 
     Raises Exit with 128 and the number of the signal that ended it before.
     """
+    await hold_lines_on([("", opened, sessions)], seconds)
+
+
+async def hold_lines_on(
+    lines: Sequence[tuple[str, OpenLine, Sequence[DriveSession]]], seconds: float | None
+) -> None:
+    """The same for drives of several lines, each with what the line is called."""
     if seconds is None:
         return
     sys.stdout.flush()  # what was printed is for now, whoever reads it
-    async with kept_asked(opened, _complain) as (holding, ending):
-        for session in sessions:
-            holding.take(session)
-        await holding.until(ending, seconds)
+    ending = Ending()
+    with ending.by_signals(), ExitStack() as stack:
+        held = []
+        for name, opened, sessions in lines:
+            holding = stack.enter_context(_asked_by(opened, partial(_complain, name)))
+            for session in sessions:
+                holding.take(session)
+            held.append(holding.until(ending, seconds))
+        await asyncio.gather(*held)
+    _exit_by_signal(ending)
 
 
 @asynccontextmanager
@@ -100,19 +114,30 @@ async def kept_asked(opened: OpenLine, tell: Tell) -> AsyncIterator[tuple[Holdin
 
     Raises Exit with 128 and the number of the signal, once the block has ended.
     """
+    ending = Ending()
+    with ending.by_signals(), _asked_by(opened, tell) as holding:
+        yield holding, ending
+    _exit_by_signal(ending)
+
+
+@contextmanager
+def _asked_by(opened: OpenLine, tell: Tell) -> Iterator[Holding]:
+    """Whoever asks the drives of a line on, until the block ends."""
     from tui.session.fleet import Fleet
     from tui.session.journal import Journal
 
-    fleet, ending = Fleet(opened.line, Journal()), Ending()
-    with ending.by_signals():
-        try:
-            yield Holding(fleet, tell), ending
-        finally:
-            fleet.forget()
+    fleet = Fleet(opened.line, Journal())
+    try:
+        yield Holding(fleet, tell)
+    finally:
+        fleet.forget()
+
+
+def _exit_by_signal(ending: Ending) -> None:
     name = ending.why.removeprefix("ended by ")
     if name in signal.Signals.__members__:
         raise click.exceptions.Exit(BY_SIGNAL + signal.Signals[name])
 
 
-def _complain(_event: str, _device: int, text: str) -> None:
-    complain(text)
+def _complain(line_name: str, _event: str, _device: int, text: str) -> None:
+    complain(f"{line_name}: {text}" if line_name else text)

@@ -21,8 +21,8 @@ from ..commands.orders import (
     watch_of,
     watched,
 )
-from ..commands.status import fault_text
 from ..shared.control import GIVE_BACK_OPTION, taking_of, way_to_take
+from ..shared.drive_status import fault_text
 from ..shared.errors import DRIVE_REFUSED, REFUSED_HERE, Failure
 from ..shared.options import Target
 from .ending import Ending

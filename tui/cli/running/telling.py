@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..commands.orders import complain
-from ..commands.status import shown_values, values_json
+from ..shared.drive_status import shown_values, values_json
 from ..shared.left_alone import timeout_json
 
 if TYPE_CHECKING:

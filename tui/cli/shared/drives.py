@@ -50,3 +50,9 @@ def failed(target: Target, text: str, status: int, line_name: str = "") -> dict[
     who = "" if text.startswith(f"Device {target.device}") else f"Device {target.device}: "
     say(f"drivepanel: {where}{who}{text}", err=True)
     return {"line": target.line_text, "device": target.device, "error": text, "status": status}
+
+
+def failed_line(line_text: str, line_name: str, text: str, status: int) -> dict[str, Any]:
+    """Tell what is wrong with one of several lines; the same as an object, without a device."""
+    say(f"drivepanel: {line_name}: {text}", err=True)
+    return {"line": line_text, "error": text, "status": status}

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 from .drives import failed
 from .errors import DONE, failure_of
-from .options import Target, about_silence, connect_drive
+from .options import Target, connect_drive, silence_hint
 from .output import print_json
 from .several_lines import LineWish, connected
 
@@ -70,22 +70,12 @@ class _Finding:
                 raise
             failure = failure_of(error)
             self.worst = max(self.worst, failure.status)
-            text = failure.message + self._hint(error, opened, wish)
+            text = failure.message + silence_hint(error, opened, wish.drives[0])
             for drive in drives:
                 told = failed(drive, text, failure.status, wish.name if self._several else "")
                 if self._as_json:
                     print_json(told, compact=True)
             return None
-
-    @staticmethod
-    def _hint(error: Exception, opened: OpenLine, wish: LineWish) -> str:
-        from tui.bus.errors import NoAnswer
-
-        if not isinstance(error, NoAnswer):
-            return ""
-        by_profile = wish.drives[0].profile_id is not None
-        hint = about_silence(opened, wish.text, by_profile=by_profile)
-        return f" {hint}" if hint else ""
 
 
 async def _there(opened: OpenLine, wish: LineWish) -> bool:

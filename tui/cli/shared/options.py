@@ -216,6 +216,17 @@ def about_silence(opened: OpenLine, text: str, *, by_profile: bool) -> str:
     )
 
 
+def silence_hint(error: Exception, opened: OpenLine, target: Target) -> str:
+    """The same behind an error, with a space; empty for any other error than silence."""
+    from tui.bus.errors import NoAnswer
+
+    if not isinstance(error, NoAnswer):
+        return ""
+    by_profile = target.profile_id is not None
+    hint = about_silence(opened, target.line_text, by_profile=by_profile)
+    return f" {hint}" if hint else ""
+
+
 async def connect_drive(opened: OpenLine, target: Target) -> DriveSession:
     """The wanted drive with its profile: the named one, else that of its identity.
 

@@ -10,9 +10,9 @@ import os
 import re
 from collections.abc import Callable, Coroutine, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import takewhile
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.core import ParameterSource
@@ -25,6 +25,8 @@ from .say import say
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine
+
+T = TypeVar("T")
 
 CONNECTION_LOOK = 0.02
 _FIRST_WORD = "drivepanel.first-line"
@@ -59,6 +61,8 @@ class LineWish:
     drives: tuple[Target, ...]
     all_drives: bool = False
     """Whether a simulated line is meant with all its drives."""
+    addresses: str = ""
+    """What stood behind its `@`; empty for nothing."""
 
     @property
     def text(self) -> str:
@@ -70,6 +74,11 @@ class LineWish:
         if not self.all_drives:
             return self.drives
         return tuple(self.drives[0]._replace(device=one) for one in opened.devices)
+
+    def with_profile(self, profile_id: str | None) -> LineWish:
+        """The same line, with this profile for each of its drives."""
+        drives = tuple(one._replace(profile_id=profile_id) for one in self.drives)
+        return replace(self, drives=drives)
 
 
 def split_addresses(word: str) -> tuple[str, str]:
@@ -133,7 +142,8 @@ def _wish_of(ctx: click.Context, word: str, target: Target, *, several: bool) ->
     simulated = text.casefold().startswith(_SIMULATED)
     wanted = target._replace(line_text=text, profile_id=profile, others=())
     drives = tuple(wanted._replace(device=one) for one in dict.fromkeys(devices or (1,)))
-    return LineWish(name, drives, all_drives=several and simulated and not devices)
+    every = several and simulated and not devices
+    return LineWish(name, drives, all_drives=every, addresses=addresses)
 
 
 def _was_typed(ctx: click.Context, option: str) -> bool:
@@ -145,22 +155,23 @@ def _joined(one: LineWish, more: LineWish) -> LineWish:
     drives = {drive.device: drive for drive in (*more.drives, *one.drives)}
     in_order = dict.fromkeys(drive.device for drive in (*one.drives, *more.drives))
     all_drives = one.all_drives or more.all_drives
-    return LineWish(one.name, tuple(drives[device] for device in in_order), all_drives)
+    where = ",".join(each.addresses for each in (one, more) if each.addresses)
+    return LineWish(one.name, tuple(drives[device] for device in in_order), all_drives, where)
 
 
 def on_lines(
     wishes: Sequence[LineWish],
-    work: Callable[[Sequence[OpenLine]], Coroutine[Any, Any, None]],
+    work: Callable[[Sequence[OpenLine]], Coroutine[Any, Any, T]],
     *,
     read_only: bool,
-) -> None:
+) -> T:
     """Open lines, do the work, close them whatever happens.
 
     None of them is waited for here: see connected().
     """
     with ExitStack() as stack:
         opened = [stack.enter_context(_line_of(one, read_only=read_only)) for one in wishes]
-        asyncio.run(to_its_end(opened, lambda: work(opened)))
+        return asyncio.run(to_its_end(opened, lambda: work(opened)))
 
 
 @contextmanager

@@ -42,8 +42,12 @@ class Several:
 
     def who(self, one: WatchedDrive) -> str:
         """Which drive on which line, as far as that is a question."""
-        line = one.line_name if self.lines else ""
-        drive = f"device {one.session.device}" if self.drives else ""
+        return self.named(one.line_name, one.session.device)
+
+    def named(self, line_name: str, device: int) -> str:
+        """The same of a drive that is told by its line, as typed, and its address."""
+        line = line_name if self.lines else ""
+        drive = f"device {device}" if self.drives else ""
         return "  ".join(part for part in (line, drive) if part)
 
     def cells(self, one: WatchedDrive) -> list[str]:

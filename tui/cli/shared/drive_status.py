@@ -1,0 +1,231 @@
+"""What a drive does, who commands it, and what it would do left alone: read, and told."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from tui.drive.values import NOT_AVAILABLE
+
+from .control import control_json, control_row
+from .fault_output import FaultFinding, alarm_json, fault_json, fault_rows, find_out
+from .watch_rows import watch_json, watch_text
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+    from tui.drive.profile.schema import Quantity
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
+    from tui.session.drive_state import DriveState
+    from tui.session.reading import Reading
+    from tui.session.timeout_told import TimeoutWatch
+
+SHOWN_QUANTITIES: dict[Quantity, str] = {
+    "output_frequency": "Output frequency",
+    "frequency_reference": "Reference",
+    "motor_current": "Current",
+}
+"""What tells how a motor turns, and how it is called here."""
+LINE_FIGURES = ("Output frequency", "Current")
+"""What of them stands in the one line of a drive."""
+CHANNEL_NAMES: dict[Quantity, str] = {
+    "command_channel": "Commanded by",
+    "reference_channel": "Reference from",
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Status:
+    """All that `status` tells of one drive."""
+
+    session: DriveSession
+    state: DriveState
+    readings: Mapping[str, Reading]
+    channels: Mapping[str, str]
+    switches: Sequence[str]
+    """What can bring another channel into force, as sentences."""
+    refused: str
+    """Why a run command from here would have no effect; empty where it would have one."""
+    watch: TimeoutWatch | None
+    finding: FaultFinding | None = None
+    """What its fault or its alarm points at; None where it has neither."""
+
+
+def shown_codes(profile: Profile) -> list[str]:
+    """Codes of what is SHOWN, as far as the profile has them, and of what was taught."""
+    found = (profile.quantity(quantity) for quantity in SHOWN_QUANTITIES)
+    codes = [parameter.code for parameter in found if parameter is not None]
+    return [*codes, *(code for code in profile.taught if code not in codes)]
+
+
+def shown_values(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, str]:
+    """What is SHOWN by its name, with units; `-----` where it was not read just now."""
+    values = {}
+    for quantity, name in SHOWN_QUANTITIES.items():
+        parameter = profile.quantity(quantity)
+        if parameter is not None:
+            values[name] = _text(readings.get(parameter.code))
+    for code in profile.taught:
+        values[code] = f"{profile[code].name} {_text(readings.get(code))}"
+    return values
+
+
+def _text(reading: Reading | None) -> str:
+    if reading is None or reading.raw is None or reading.quality != "good":
+        return "-----"
+    mark = " taught" if reading.value is not None and reading.value.taught else ""
+    return f"{reading.text} {reading.unit}".strip() + mark
+
+
+def fault_text(state: DriveState) -> str:
+    """The fault that a drive is in, with its name; empty where it is in none."""
+    return f"{state.fault.code}, {state.fault.name}" if state.fault else ""
+
+
+async def status_of_drive(session: DriveSession, opened: OpenLine) -> Status:
+    """Read all that `status` tells. Raises the line's errors."""
+    from tui.drive.channel import switch_texts
+    from tui.session.drive_state import drive_state
+    from tui.session.fleet import Fleet
+    from tui.session.journal import Journal
+
+    from ..commands.orders import watch_of
+
+    profile = session.profile
+    fleet = Fleet(opened.line, Journal())
+    console = fleet.take(session)
+    try:
+        readings = await console.read(_codes(profile))
+        watch = await watch_of(fleet, console)
+        state = drive_state(profile, readings)
+        finding = await find_out(console, state, readings)
+    finally:
+        fleet.forget()
+    channels = _channels(profile, readings, state)
+    switches = switch_texts(profile, session.image.raws)
+    refused = _refused(session)
+    return Status(session, state, readings, channels, switches, refused, watch, finding)
+
+
+def _codes(profile: Profile) -> list[str]:
+    from tui.drive.chart import watched_codes
+    from tui.drive.hints import alarm_words
+    from tui.drive.orders import deciding_codes, interlock_codes
+
+    channels = [profile.quantity(quantity) for quantity in CHANNEL_NAMES]
+    codes = [*watched_codes(profile), profile.data.faults.parameter, *shown_codes(profile)]
+    codes += [parameter.code for parameter in channels if parameter is not None]
+    codes += alarm_words(profile)
+    codes += deciding_codes(profile)
+    for chart in profile.data.charts:
+        codes += interlock_codes(chart)
+    return list(dict.fromkeys(code for code in codes if code))
+
+
+def _channels(
+    profile: Profile, readings: Mapping[str, Reading], state: DriveState
+) -> dict[str, str]:
+    from tui.session.drive_state import channel_text
+
+    found = {}
+    for quantity, name in CHANNEL_NAMES.items():
+        parameter = profile.quantity(quantity)
+        found[name] = channel_text(parameter, readings.get(parameter.code)) if parameter else ""
+    # some families tell who commands by several words
+    found["Commanded by"] = state.channel or found["Commanded by"]
+    found["Reference from"] = state.reference or found["Reference from"]
+    return found
+
+
+def _refused(session: DriveSession) -> str:
+    from tui.drive.held_back import held_back, state_refusal
+    from tui.drive.orders import chart_in_force
+    from tui.session.command.way_out import told_anywhere
+
+    raws = session.image.raws
+    chart = chart_in_force(session.profile, raws)
+    if chart is None:
+        return "What decides about its commands could not be read."
+    if not chart.orders:
+        return f"This drive is not commanded from here: {chart.name}."
+    if session.line.read_only:
+        return "The line is read-only: nothing is written."
+    held = held_back(session.profile, chart, "forward", raws)
+    if held is not None:
+        return told_anywhere(held)
+    return state_refusal(session.profile, chart, "forward", raws)
+
+
+def status_json(line_text: str, status: Status) -> dict[str, Any]:
+    """The object that `status --json` prints."""
+    from .output import drive_json
+
+    state, watch = status.state, status.watch
+    return {
+        **drive_json(line_text, status.session),
+        "state": {"id": state.id, "name": state.name, "kind": state.kind},
+        "direction": state.direction,
+        "fault": fault_json(state, status.finding),
+        "alarms": [bit.name for bit in state.alarms],
+        "alarm": alarm_json(status.finding),
+        "commanded_by": status.channels["Commanded by"] or None,
+        "reference_from": status.channels["Reference from"] or None,
+        "switched_by": list(status.switches),
+        "commandable": not status.refused,
+        "why_not": status.refused or None,
+        "control": control_json(status.session),
+        "watch": watch_json(watch),
+        "values": values_json(status.session.profile, status.readings),
+    }
+
+
+def values_json(profile: Profile, readings: Mapping[str, Reading]) -> dict[str, Any]:
+    """What is SHOWN, by quantity; null where the family does not tell it or it was not read.
+
+    What was taught stands there by its code.
+    """
+    from .output import reading_json
+
+    values: dict[str, Any] = {}
+    for quantity in SHOWN_QUANTITIES:
+        parameter = profile.quantity(quantity)
+        reading = readings.get(parameter.code) if parameter else None
+        values[quantity] = reading_json(reading) if reading is not None else None
+    for code in profile.taught:
+        values[code] = reading_json(readings[code]) if code in readings else None
+    return values
+
+
+def status_table(status: Status) -> list[tuple[str, str]]:
+    """Titles and texts of `status` for a person."""
+    state, profile = status.state, status.session.profile
+    found = fault_rows(status.finding)
+    of_alarm = status.finding is not None and bool(status.finding.alarm)
+    return [
+        ("Device", f"{status.session.device}, {profile.name}"),
+        ("State", f"{state.headline} ({state.name})"),
+        ("Direction", state.direction or ""),
+        ("Fault", fault_text(state) or "none"),
+        *([] if of_alarm else found),
+        ("Alarms", ", ".join(bit.name for bit in state.alarms) or "none"),
+        *(found if of_alarm else []),
+        *status.channels.items(),
+        *(("Besides", text) for text in status.switches),
+        ("From here", status.refused or "commands can have an effect"),
+        ("Comm. time-out", watch_text(status.watch)),
+        *control_row(status.session),
+        *shown_values(profile, status.readings).items(),
+    ]
+
+
+def drive_in_a_line(status: Status) -> str:
+    """A drive in one line: address, model, state, figures, and the fault if it is in one."""
+    session, state = status.session, status.state
+    shown = shown_values(session.profile, status.readings)
+    figures = "  ".join(f"{shown.get(name, NOT_AVAILABLE):>9}" for name in LINE_FIGURES)
+    name = session.known_identity.reference or session.profile.name
+    fault = fault_text(state)
+    return (
+        f"{session.device:>3}  {name:<18.18}  {state.headline:<18.18}  {figures}  {fault}".rstrip()
+    )

@@ -1,0 +1,128 @@
+"""`status` over several lines, side by side: what one of them lacks keeps no other back."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from tui.drive.plain import plain
+
+from .drive_status import Status, drive_in_a_line, status_json, status_of_drive, status_table
+from .drives import failed, failed_line
+from .errors import DONE, failure_of
+from .every_drive import every_drive
+from .options import Target, connect_drive, silence_hint
+from .output import print_json
+from .say import say, say_row
+from .several_lines import LineWish, connected
+from .watch_outputs import Several
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+
+STATUS_TITLES = 18
+"""Width of the column of titles, with its gap."""
+
+
+@dataclass(frozen=True, slots=True)
+class StatusWish:
+    """What `status` is asked for, beside lines and drives."""
+
+    every: bool
+    """Whether every drive that answers is told, a line each."""
+    addresses: str | None
+    hold: float | None
+    """Seconds for which the drives are asked on."""
+    as_json: bool
+
+    def where(self, wish: LineWish) -> str | None:
+        """Addresses of a line that are searched; those behind its `@` go before all others."""
+        return wish.addresses or self.addresses
+
+
+@dataclass(slots=True)
+class LineTold:
+    """What is told of one line."""
+
+    found: list[Status] = field(default_factory=list)
+    documents: list[dict[str, Any]] = field(default_factory=list)
+    worst: int = DONE
+
+
+def say_status(status: Status) -> None:
+    """Tell a person all of one drive."""
+    for title, text in status_table(status):
+        say_row(title, plain(text) or "-----", STATUS_TITLES)
+
+
+async def status_of_lines(lines: Sequence[tuple[OpenLine, LineWish]], wanted: StatusWish) -> int:
+    """Tell the drives of several lines, in order; what is wrong with one is told as it is seen.
+
+    Returns the highest exit status. Raises what nobody foresaw.
+    """
+    from ..running.holding import hold_lines_on
+
+    each = await asyncio.gather(*(_of_line(opened, wish, wanted) for opened, wish in lines))
+    if wanted.as_json:
+        print_json([document for one in each for document in one.documents])
+    else:
+        names = [wish.name for _, wish in lines]
+        for name, one in zip(names, each, strict=True):
+            for status in one.found:
+                _say(status, name, max(map(len, names)), wanted)
+    await hold_lines_on(
+        [
+            (wish.name, opened, [status.session for status in one.found])
+            for (opened, wish), one in zip(lines, each, strict=True)
+        ],
+        wanted.hold,
+    )
+    return max(one.worst for one in each)
+
+
+def _say(status: Status, name: str, width: int, wanted: StatusWish) -> None:
+    if wanted.every:
+        say(f"{plain(name):<{width}}  {plain(drive_in_a_line(status))}")
+    else:
+        several = Several(lines=True, drives=True)
+        say(f"{several.named(name, status.session.device)}:")
+        say_status(status)
+
+
+async def _of_line(opened: OpenLine, wish: LineWish, wanted: StatusWish) -> LineTold:
+    """The drives of one line."""
+    told = LineTold()
+    try:
+        await connected(opened, wish.name)
+        drives: Sequence[Target] = wish.on(opened)
+        if wanted.every:
+            drives = (await every_drive(opened, wish.drives[0], wanted.where(wish))).each()
+    except Exception as error:
+        failure = failure_of(error)
+        told.worst = failure.status
+        if wanted.every:  # which drives it has is not known
+            told.documents = [failed_line(wish.text, wish.name, failure.message, failure.status)]
+        else:
+            told.documents = [
+                failed(drive, failure.message, failure.status, wish.name) for drive in wish.drives
+            ]
+        return told
+    for drive in drives:
+        await _of_drive(opened, wish, drive, told)
+    return told
+
+
+async def _of_drive(opened: OpenLine, wish: LineWish, drive: Target, told: LineTold) -> None:
+    try:
+        session = await connect_drive(opened, drive)
+        status = await status_of_drive(session, opened)
+    except Exception as error:
+        failure = failure_of(error)
+        text = failure.message + silence_hint(error, opened, drive)
+        told.documents.append(failed(drive, text, failure.status, wish.name))
+        told.worst = max(told.worst, failure.status)
+        return
+    told.found.append(status)
+    told.documents.append(status_json(wish.text, status))
