@@ -57,6 +57,14 @@ def test_a_motor_that_was_left_running_is_told_so() -> None:
     assert text == ("runs since 17:34, left running on purpose by a program that ended")
 
 
+def test_a_program_that_lives_has_not_ended() -> None:
+    silent = "a program that does not answer on this line (pid 7)"
+    text = offer(RECORD, IDENTITY, True, NOW, lives=True)
+    assert text == TODAY.replace("ended", "does not answer on this line (pid 7)")
+    left = offer(replace(RECORD, left_running=True), IDENTITY, True, NOW, lives=True)
+    assert left == f"runs since 17:34, left running on purpose by {silent}"
+
+
 def test_a_time_that_is_none_is_left_out() -> None:
     text = offer(replace(RECORD, wall="soon"), IDENTITY, True, NOW)
     assert text == "runs by a command from here, that program ended"

@@ -25,10 +25,11 @@ from hypothesis import strategies as st
 
 from tests.programs import PATIENCE, wait_until
 from tui.bus.fake import FakeLine
+from tui.bus.program import Program
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.line_key import line_key
 from tui.session.starts.errors import StartNotRecorded, StartOvertaken
-from tui.session.starts.keeper import StartKeeper
+from tui.session.starts.keeper import NothingToTakeOver, StartKeeper
 from tui.session.starts.processes import Processes
 from tui.session.starts.record import StartRecord
 from tui.session.starts.starts import Starts
@@ -258,6 +259,23 @@ def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
     keeper.take_over(session)
     (mine,) = [one for one in starts._files.records() if one.pid == os.getpid()]
     assert mine.left_running is meant
+
+
+def test_the_motor_of_a_program_that_lives_is_offered_until_it_is_back(starts: Starts) -> None:
+    frozen, line = Program("frozen", "run", LIVING), FakeLine({})
+    line.facts.set_programs((line.facts.me, frozen))
+    line.facts.set_programs((line.facts.me,))
+    starts.begin(start(LIVING))
+    keeper = StartKeeper("panel", starts)
+    session: Any = SimpleNamespace(
+        line_text=LINE, line=line, device=2, identity=None, commanded=False
+    )
+    keeper.look(session)
+    assert f"does not answer on this line (pid {LIVING})" in keeper.offered(session, runs=True)
+    line.facts.set_programs((line.facts.me, frozen))
+    assert keeper.offered(session, runs=True) == ""
+    with pytest.raises(NothingToTakeOver):
+        keeper.take_over(session)
 
 
 def test_a_rest_read_before_the_run_frame_does_not_take_the_record(starts: Starts) -> None:

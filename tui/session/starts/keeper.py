@@ -70,6 +70,8 @@ class StartKeeper:
         self._begun: dict[int, StartRecord] = {}
         self._sent: dict[int, float] = {}
         self._left: dict[int, StartRecord] = {}
+        self._silent: frozenset[int] = frozenset()
+        """Devices of which a program that lives, but is not on the line, has started the motor."""
         self._runs_on: frozenset[int] = frozenset()
         """Devices whose motor was started before the start that was begun last."""
 
@@ -149,18 +151,28 @@ class StartKeeper:
         absent = pids_absent(session.line.facts)
         found = self._starts.found(session.line_text, session.device, absent)
         if found is not None:
+            lives = {session.device} if self._starts.is_alive(found) else set()
+            self._silent = self._silent - {session.device} | lives
             self._left = {**self._left, session.device: found}
 
     def offered(self, session: Startable, *, runs: bool) -> str:
         """What to tell of a motor that an earlier program has started; empty where nothing."""
-        record = self._left.get(session.device)
+        record = self._left_of(session)
         if record is None or session.commanded:
             return ""
-        return offer(record, session.identity, runs)
+        return offer(record, session.identity, runs, lives=session.device in self._silent)
+
+    def _left_of(self, session: Startable) -> StartRecord | None:
+        """The start that is offered; None once its program is back on the line."""
+        record = self._left.get(session.device)
+        if record is None or session.device not in self._silent:
+            return record
+        back = any(one.pid == record.pid for one in session.line.facts.programs)
+        return None if back else record
 
     def take_over(self, session: Startable) -> None:
         """Put an earlier program's start on record as this program's. Raises StartNotRecorded."""
-        record = self._left.get(session.device)
+        record = self._left_of(session)
         if record is None:
             raise NothingToTakeOver("No start of an earlier program is known of this drive.")
         mine = self._starts.taken_over(

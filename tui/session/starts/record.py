@@ -50,18 +50,25 @@ def offer(
     identity: DriveIdentity | None,
     runs: bool,
     now: datetime | None = None,
+    *,
+    lives: bool = False,
 ) -> str:
-    """What to tell a person of a motor that a program which ended has started; empty if nothing.
+    """What to tell a person of a motor that a program which is gone has started; empty if nothing.
 
-    Nothing where the drive does not run, or is another than the one that was started; what
-    either of them left unsaid counts as the same.
+    A program that `lives` is frozen, or has left the line. Nothing where the drive does not run,
+    or is another than the one that was started; what either of them left unsaid counts as the
+    same.
     """
     if not runs or (identity is not None and not _same(record, identity)):
         return ""
     since = _since(record.begun, now or datetime.now().astimezone())
     if record.left_running:
-        return f"runs{since}, left running on purpose by a program that ended"
-    return f"runs{since} by a command from here, that program ended"
+        return f"runs{since}, left running on purpose by a program that {_gone(record, lives)}"
+    return f"runs{since} by a command from here, that program {_gone(record, lives)}"
+
+
+def _gone(record: StartRecord, lives: bool) -> str:
+    return f"does not answer on this line (pid {record.pid})" if lives else "ended"
 
 
 def _same(record: StartRecord, identity: DriveIdentity) -> bool:
