@@ -14,12 +14,13 @@ import pytest
 from textual import _wait
 from textual.events import Key
 from textual.pilot import Pilot
-from textual.widgets import Input, OptionList
+from textual.widgets import Input, OptionList, Static
 
 from tests.programs import rtu_tcp
 from tests.sources import calls_of
 from tests.sweeps import kept
 from tui.app import DrivePanelApp
+from tui.bus.program import Program
 from tui.screens.command.options import OptionsScreen
 from tui.screens.connection.screen import ConnectionScreen
 from tui.screens.control.screen import ControlSourceScreen
@@ -413,8 +414,14 @@ async def test_leaving_with_a_motor_of_ours(key: str, turns: bool) -> None:
         await made.running()
         app = made.app
         await made.commanded()
+        assert app.fleet is not None
+        line = app.fleet.line
+        line.facts.set_programs((line.facts.me, Program("watch", "watch", 78)))
+        line.pace.others = {1: 0.1}
         await made.pilot.press("q")
         await until(made.pilot, lambda: isinstance(app.screen, Leave))
+        assert "Watch (pid 78) asks it on" in str(app.screen.query_one("#follows", Static).render())
+        line.facts.set_programs((line.facts.me,))
         await made.pilot.press("escape")
         await until(made.pilot, lambda: isinstance(app.screen, MonitorScreen))
         assert made.speed() > 2

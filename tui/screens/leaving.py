@@ -39,7 +39,8 @@ class Leaving(Panel):
         if any(isinstance(screen, Leave) for screen in self.screen_stack):
             return
         if running := self._motors():
-            asked = Leave("\n".join(self._told(self.fleets)), MotorsNow(self, running))
+            told = self._told(self.fleets, on_purpose=True)
+            asked = Leave("\n".join(told), MotorsNow(self, running))
             self.push_screen(asked, self._leave_motors)
             return
         if self._asked in self.screen_stack:
@@ -54,24 +55,32 @@ class Leaving(Panel):
         """Drives of all lines commanded from here whose motors do not surely stand."""
         return [one for fleet in self.fleets for one in fleet.line_watch.under_command()]
 
-    def _told(self, fleets: Sequence[Fleet]) -> list[str]:
-        """What becomes of the drives of lines that are left; of several lines each by its name."""
+    def _told(self, fleets: Sequence[Fleet], *, on_purpose: bool = False) -> list[str]:
+        """What becomes of the drives of lines that are left; of several lines each by its name.
+
+        `on_purpose`: motors that run are put on record as left running.
+        """
         told = []
         for fleet in fleets:
             running = fleet.line_watch.under_command()
-            here = [self._left_running(fleet, running)] if running else []
+            here = self._left_running(fleet, running, on_purpose=on_purpose)
             here += [*self._tripping(fleet, running), *self._unfinished(fleet)]
             label = next((o.opened.label for o in self.panel_lines if o.fleet is fleet), "")
             told += [f"{label}:", *here] if here and len(self.panel_lines) > 1 else here
         return told
 
-    def _left_running(self, fleet: Fleet, sessions: list[DriveSession]) -> str:
-        """Which motors run, and what each drive does when nobody asks it any more."""
+    def _left_running(
+        self, fleet: Fleet, sessions: list[DriveSession], *, on_purpose: bool
+    ) -> list[str]:
+        """Which motors run, what each drive does left alone, and what others on its line do."""
         from tui.session.monitor.timeout import left_alone_text
+        from tui.session.sharing.leaving import left_to_others
 
-        return "\n".join(
-            left_alone_text(one, watch=fleet.line_watch.watch(one.device)) for one in sessions
-        )
+        told = []
+        for one in sessions:
+            told.append(left_alone_text(one, watch=fleet.line_watch.watch(one.device)))
+            told += [others] if (others := left_to_others(one, on_purpose=on_purpose)) else []
+        return told
 
     def _tripping(self, fleet: Fleet, but: Sequence[DriveSession] = ()) -> list[str]:
         """Which drives act on their communication time-out once they are left, and when."""

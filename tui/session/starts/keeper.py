@@ -138,6 +138,11 @@ class StartKeeper:
         """Whether a motor that was started here is not yet known to stand."""
         return device in self._begun
 
+    def stopped_by_others(self, device: int) -> bool:
+        """Whether a motor started here is not meant to go on where this program is gone."""
+        record = self._begun.get(device)
+        return record is not None and not record.left_running
+
     def give_away(self, session: Startable) -> None:
         """Another program looks after the motor from now on."""
         if session.device in self._begun:

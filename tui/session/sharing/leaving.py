@@ -1,0 +1,35 @@
+"""What becomes of a motor that this program leaves on a line which others share, in a sentence."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .guardian import LONGEST_GRACE
+
+if TYPE_CHECKING:
+    from ..drive import DriveSession
+
+OTHERS_ASK = "Other programs on the line ask"
+
+
+def left_to_others(session: DriveSession, *, on_purpose: bool) -> str:
+    """What other programs on the line do with a motor that is left; empty where it is nothing.
+
+    `on_purpose`: it is put on record as left running. Otherwise a motor that was started here is
+    stopped by whoever owns the line then, as Guardian does it.
+    """
+    others, starts = session.line.facts.others, session.starts
+    if not others:
+        return ""
+    one = others[0].text if len(others) == 1 else ""
+    if not on_purpose and starts is not None and starts.stopped_by_others(session.device):
+        who = f"{one[0].upper()}{one[1:]} is" if one else "Other programs are"
+        taken = "it is taken over there, or " if any(o.name == "panel" for o in others) else ""
+        return (
+            f"{who} on the line, too: the motor is stopped on its ramp within {LONGEST_GRACE:g} s,"
+            f" unless {taken}the line is opened here again."
+        )
+    if session.device not in session.line.pace.others:
+        return ""
+    who, do = (f"{one[0].upper()}{one[1:]} asks", "it does") if one else (OTHERS_ASK, "they do")
+    return f"{who} it on: while {do}, the motor runs on."
