@@ -20,8 +20,9 @@ def main() -> None:
         alone()
         return
     from tui.cli.main import main as command
+    from tui.cli.shared.typed import ONE_COMMAND
 
-    command(prog_name="drivepanel")
+    command(prog_name="drivepanel", obj=ONE_COMMAND)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
@@ -15,8 +16,9 @@ from tui.bus.errors import LineError, LineLost, RequestRefused
 from tui.bus.line import Line
 from tui.bus.program import Program
 from tui.bus.share.messages import StopGiven
+from tui.bus.share.place import owner_of
 from tui.bus.share.stops_past import StopsPast
-from tui.bus.stop_counts import StopCounts
+from tui.bus.stop_counts import STOPS_KEPT, StopCounts
 
 from .conftest import Share
 from .peer import PtyPeer, Step, eventually, honest, reply
@@ -342,3 +344,48 @@ async def test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew(
             await asyncio.sleep(1.6)
         assert (await reading).time >= peer.departures[-1] - 0.05
         assert len(peer.requests) == 2
+
+
+async def test_who_comes_after_a_stop_is_told_when_it_was_given(share: Share) -> None:
+    """A command that was typed before the stop, and comes to the line after it, must know."""
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        panel = lines.open("panel")
+        before = time.monotonic()
+        panel.facts.give_stop([1], "the stop key")
+        late = lines.open("run")
+        assert before < late.facts.stops.times[1] < time.monotonic()
+        assert late.facts.stops.times == panel.facts.stops.times
+        # an owner that has ended tells it to the next one, whoever that is
+        late.close()
+        panel.close()
+        next_owner = lines.open("next")
+        assert next_owner.facts.stops.times == panel.facts.stops.times
+        assert 2 not in next_owner.facts.stops.times
+
+
+async def test_the_lock_tells_of_stops_where_the_owner_is_killed(share: Share) -> None:
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        panel, place = lines.open("panel"), place_in(lines.folder)
+        panel.facts.give_stop([1], "the stop key")
+
+        def is_told() -> bool:
+            owner = owner_of(place)
+            return owner is not None and owner.stopped == panel.facts.stops.times
+
+        await asyncio.to_thread(eventually, is_told)
+
+
+def test_a_time_to_come_is_none_of_this_run_of_the_machine() -> None:
+    counts = StopCounts()
+    counts.give("a", (1,), "the stop key")
+    given = counts.times[1]
+    counts.learn_times({1: given - 5, 2: given - 3, 3: time.monotonic() + 1000})
+    assert counts.times == {1: given, 2: given - 3}
+    assert counts.late_times == counts.times
+    counts.learn_times({4: time.monotonic() - STOPS_KEPT - 1})
+    assert 4 not in counts.late_times
+    # a stop that is told again was given when it was given
+    counts.note("a", (1,), (1,), "the stop key")
+    assert counts.times[1] == given

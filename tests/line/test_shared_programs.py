@@ -6,6 +6,7 @@ import json
 import os
 import signal
 import socket
+import subprocess
 import sys
 import threading
 import time
@@ -355,3 +356,28 @@ def test_a_motor_of_a_panel_that_goes_is_stopped_and_the_other_panel_goes_on(
         assert made.simulation.drive(1).fault is None
         made.simulation.drive(1).run(30.0)
         other.wait_for("FORWARD")
+
+
+@pytest.mark.parametrize("first", ["alone", "watch"])
+def test_a_command_that_comes_late_to_the_line_knows_of_a_stop_before(
+    programs: ExitStack, first: str
+) -> None:
+    """On a machine that swaps a stop typed last may be through before the run is on the line."""
+    with bench() as (simulation, line):
+        if first == "watch":
+            programs.enter_context(served(records(line), ready="{"))
+        slow = subprocess.Popen(
+            runs_a_motor(line), stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        )
+        programs.callback(slow.kill)
+        slow.send_signal(signal.SIGSTOP)
+        done = drivepanel("stop", line, "-p", "atv71")
+        assert done.returncode == 0, done.stderr
+        before = simulation.drive(1).raw("CMD")
+        slow.send_signal(signal.SIGCONT)
+        _, said = slow.communicate(timeout=PATIENCE)
+        assert slow.returncode == 5
+        assert "Device 1: it was stopped after this command was typed" in said
+        assert simulation.drive(1).raw("CMD") == before
+        # the next one is typed after the stop
+        assert drivepanel("reference", line, "20", "-p", "atv71", "--arm").returncode == 0

@@ -6,12 +6,15 @@ A write carries the count that its program knew of: one that is older than a sto
 from __future__ import annotations
 
 import threading
+import time
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
 GivenStops = Mapping[int, Mapping[str, int]]
 """Counts of stops, by device and program."""
 
+STOPS_KEPT = 600.0
+"""Seconds for which the next owner of a line is told when a device was stopped."""
 GIVEN_BY_NOBODY = ""
 """Under which the stops of programs are counted that have left."""
 
@@ -28,6 +31,8 @@ class StopCounts:
         self.given: GivenStops = MappingProxyType({})
         self.by: Mapping[int, str] = MappingProxyType({})
         """Who gave the last one of each device, as people are told."""
+        self.times: Mapping[int, float] = MappingProxyType({})
+        """When the last one of each device was given (monotonic), by whichever program."""
         self._lock = threading.RLock()
 
     def stamp(self, device: int) -> int:
@@ -45,17 +50,48 @@ class StopCounts:
             self.note(program, devices, counts, by)
 
     def note(
-        self, program: str, devices: tuple[int, ...], counts: tuple[int, ...], by: str
+        self,
+        program: str,
+        devices: tuple[int, ...],
+        counts: tuple[int, ...],
+        by: str,
+        when: float | None = None,
     ) -> tuple[int, ...]:
-        """A program has stopped devices, each for so many times by now.
+        """A program has stopped devices, each for so many times by now, the last time at `when`.
 
         Returns the devices of which this is news.
         """
         with self._lock:
             self.by = MappingProxyType({**self.by, **dict.fromkeys(devices, by)})
-            return self.learn(
+            news = self.learn(
                 {one: {program: count} for one, count in zip(devices, counts, strict=False)}
             )
+            self.learn_times(dict.fromkeys(news, when or time.monotonic()))
+            return news
+
+    def learn_times(self, told: Mapping[int, float]) -> None:
+        """Take over when devices were stopped; a time to come is of an earlier run of the machine.
+
+        It decides about commands that were typed before a stop and came to the line after it.
+        """
+        now = time.monotonic()
+        with self._lock:
+            known = dict(self.times)
+            for device, when in told.items():
+                if when <= now:
+                    known[device] = max(when, known.get(device, when))
+            self.times = MappingProxyType(known)
+
+    @property
+    def plain(self) -> dict[int, dict[str, int]]:
+        """The counts as they are told to others."""
+        return {device: dict(counts) for device, counts in self.given.items()}
+
+    @property
+    def late_times(self) -> dict[int, float]:
+        """When devices were stopped of late."""
+        since = time.monotonic() - STOPS_KEPT
+        return {device: when for device, when in self.times.items() if when > since}
 
     def learn(self, told: GivenStops) -> tuple[int, ...]:
         """Take over counts that are higher than those known; returns the devices of which some are.

@@ -13,6 +13,7 @@ import tui
 from .shared.errors import plain_errors
 from .shared.lines import is_line
 from .shared.logs import start_logging
+from .shared.typed import note_typed
 
 if TYPE_CHECKING:
     from click.shell_completion import CompletionItem
@@ -106,6 +107,7 @@ class Commands(click.Group):
                 info_name, [*verbose, *rest, *args[end:]], parent, **extra
             )
         context.meta[AS_JSON] = as_json
+        note_typed(context)
         return context
 
     def invoke(self, ctx: click.Context) -> Any:

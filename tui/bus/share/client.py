@@ -81,6 +81,8 @@ class ShareClient:
         self._gone, self._told = False, ""
         self.again = False
         """Whether this program was attached to the line before."""
+        self.taken_in = False
+        """Whether it was attached to this owner."""
         self.heard = inside.clock()
         """When the owner last gave a sign of life."""
         self.quiet_until = 0.0
@@ -129,8 +131,8 @@ class ShareClient:
         facts = self._inside.facts
         # first: what is given from here on is told by itself, what was before in the greeting
         facts.voice = ProgramVoice(facts, self._soon)
-        given = {device: dict(counts) for device, counts in facts.stops.given.items()}
-        self._tell(Hello(VERSION, facts.me, label(self._inside.link), given))
+        given, times = facts.stops.plain, facts.stops.late_times
+        self._tell(Hello(VERSION, facts.me, label(self._inside.link), given, times))
 
     async def _attached(self, reader: asyncio.StreamReader) -> None:
         await self._welcomed(reader)
@@ -149,7 +151,7 @@ class ShareClient:
         self._note = f"Shared with {message.owner.text}."
         if not message.asked:
             self._note += f" It is open as {message.label}."
-        self._gone = message.gone
+        self._gone, self.taken_in = message.gone, True
         self._claim()
 
     def _claim(self) -> None:
@@ -257,7 +259,8 @@ class ShareClient:
             case Told(device=device, text=text):
                 facts.hear_text(device, text)
             case StopGiven(devices=devices, by=by, program=program):
-                facts.stops.note(program.id, devices, message.counts, f"{by}, {program.text}")
+                counts, who = message.counts, f"{by}, {program.text}"
+                facts.stops.note(program.id, devices, counts, who, message.when)
                 facts.hear_stop(devices, by, program)
                 inside.dispatcher.void()
             case Denied(device=device, holder=holder):
@@ -272,6 +275,7 @@ class ShareClient:
 
     def _hear_facts(self, told: Facts) -> None:
         facts = self._inside.facts
+        facts.stops.learn_times(told.stopped)
         unheard = facts.learn(told.programs, told.commanders, told.stops, told.hushed)
         if unheard and self.again:
             # given while this program was with no owner

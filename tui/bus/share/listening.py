@@ -10,7 +10,7 @@ from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from pathlib import Path
 
-from ..program import Program
+from ..shared_facts import SharedFacts
 from .messages import VERSION
 from .place import PRIVATE_FILE, SHARED_FILE, Owner, OwnerLock, SharePlace, make_private, short_path
 
@@ -22,10 +22,13 @@ TakeIn = Callable[[asyncio.StreamReader, asyncio.StreamWriter], Awaitable[None]]
 class Listening:
     """Listens for programs of one line; lives in the line's loop."""
 
-    def __init__(self, place: SharePlace, lock: OwnerLock, me: Program, welcome: TakeIn) -> None:
+    def __init__(
+        self, place: SharePlace, lock: OwnerLock, facts: SharedFacts, welcome: TakeIn
+    ) -> None:
         self._place = place
         self._lock = lock
-        self._me = me
+        self._facts = facts
+        self._stopped: dict[int, float] = {}
         self._welcome = welcome
         self._server: asyncio.Server | None = None
         self._path: Path | None = None
@@ -64,7 +67,7 @@ class Listening:
                 path.unlink()
             raise
         self._path = path
-        self._lock.tell(Owner(VERSION, self._me, str(path)))
+        self._tell()
 
     async def keep(self) -> None:
         """Note a sign of life on the socket; made anew where its folder was taken away.
@@ -74,6 +77,9 @@ class Listening:
         if not self._lock.stands:
             await self._renew_lock()
         if self._path is not None:
+            if self._facts.stops.late_times != self._stopped:
+                with suppress(OSError):
+                    self._tell()
             with suppress(OSError):
                 os.utime(self._path)  # the last sign of life, should this program be killed
                 return
@@ -86,7 +92,12 @@ class Listening:
         with suppress(OSError):
             if self._lock.renew() and self._path is not None:
                 log.error("the lock of the line was taken away, and is made anew")
-                self._lock.tell(Owner(VERSION, self._me, str(self._path)))
+                self._tell()
+
+    def _tell(self) -> None:
+        """Write down where this program listens, and what was stopped, for who comes after it."""
+        self._stopped = self._facts.stops.late_times
+        self._lock.tell(Owner(VERSION, self._facts.me, str(self._path), 0.0, self._stopped))
 
     def close(self) -> None:
         """Listen no more, and leave no socket behind."""

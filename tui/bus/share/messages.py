@@ -47,6 +47,8 @@ class Hello(Message, frozen=True):
     """The line as it was meant, with its settings."""
     stops: dict[int, dict[str, int]]
     """The stops that it knows of, by device and program."""
+    stopped: dict[int, float] = {}
+    """When each device was stopped last, as far as it knows."""
 
 
 class Welcome(Message, frozen=True):
@@ -123,6 +125,8 @@ class StopGiven(Message, frozen=True):
     """How often the program has stopped each of them by now."""
     by: str
     program: Program
+    when: float | None = None
+    """When; None: just now."""
 
 
 class RollCall(Message, frozen=True):
@@ -205,6 +209,8 @@ class Facts(Message, frozen=True):
     """How many stops each device was given, by program."""
     hushed: dict[int, tuple[str, str]]
     """Who leaves which device alone, and why."""
+    stopped: dict[int, float] = {}
+    """When each device was stopped last."""
 
 
 class News(Message, frozen=True):

@@ -87,4 +87,5 @@ class PastOwner:
         if devices and self._noted.get(device) != counts:
             self._noted[device] = counts
             by = facts.stops.by.get(devices[0], "")
-            self._stops_past.note(StopGiven(devices, counts, by, facts.me))
+            when = max(facts.stops.times.get(one, 0.0) for one in devices)
+            self._stops_past.note(StopGiven(devices, counts, by, facts.me, when))

@@ -27,8 +27,8 @@ log = logging.getLogger(__name__)
 PRIVATE_FOLDER, PRIVATE_FILE, SHARED_FILE = 0o700, 0o600, 0o660
 LONGEST_SOCKET_PATH = 100
 OPEN_FOLDERS = Path("/proc/self/fd")
-LONGEST_LOCK = 4096
-"""Bytes of a lock file that are read; ours hold some hundred."""
+LONGEST_LOCK = 1 << 14
+"""Bytes of a lock file that are read; ours hold some hundred, and some ten for each stop."""
 
 
 class Owner(msgspec.Struct, frozen=True):
@@ -40,6 +40,8 @@ class Owner(msgspec.Struct, frozen=True):
     """Where it listens; empty where it does not yet, or has ended."""
     quiet_until: float = 0.0
     """Monotonic time until which a reply to an owner that has ended may come."""
+    stopped: dict[int, float] = {}
+    """When each device was stopped of late (monotonic)."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -59,7 +59,7 @@ class ShareServer:
         self._loop = asyncio.get_running_loop()
         self._clients: dict[str, Client] = {}
         self._group = place.group
-        self._listening = Listening(place, lock, inside.facts.me, self._welcome)
+        self._listening = Listening(place, lock, inside.facts, self._welcome)
         self._commanding = Commanding(inside.facts, self._clients, self._tell_facts)
         self._signs = SignsOfLife(
             inside, self._all, self._tell_news, self._stopped, StopsPast(place)
@@ -156,6 +156,7 @@ class ShareServer:
         facts.set_programs((*others, client.program))
         client.frames = inside.around.trace.count
         log.info("%s shares the line", client.program.text)
+        facts.stops.learn_times(message.stopped)
         if unheard := facts.stops.learn(message.stops):
             # given while nobody owned the line
             self._hear_stops(unheard, "a stop while nobody owned the line", client.program)
@@ -202,9 +203,9 @@ class ShareServer:
 
     def _tell_facts(self) -> None:
         facts = self._inside.facts
-        given = {device: dict(counts) for device, counts in facts.stops.given.items()}
+        given, times = facts.stops.plain, facts.stops.late_times
         hushed = dict(facts.hushed)
-        self._tell_all(Facts(facts.programs, dict(facts.commanders), given, hushed))
+        self._tell_all(Facts(facts.programs, dict(facts.commanders), given, hushed, times))
 
     # What clients say
 
@@ -273,7 +274,7 @@ class ShareServer:
         """Another program stops devices; told twice it counts once."""
         facts, program = self._inside.facts, stop.program
         by = f"{stop.by}, {program.text}"
-        if new := facts.stops.note(program.id, stop.devices, stop.counts, by):
+        if new := facts.stops.note(program.id, stop.devices, stop.counts, by, stop.when):
             self._hear_stops(new, stop.by, program)
 
     def _hear_stops(self, devices: tuple[int, ...], by: str, program: Program) -> None:

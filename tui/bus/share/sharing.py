@@ -87,11 +87,12 @@ class Sharing:
         inside, place = self._inside, self._place
         past = PastOwner(inside, StopsPast(place), Turn(place), owner.program)
         self._client = client = ShareClient(inside, owner, say, past)
-        client.again, self._attached = self._attached, True
+        client.again = self._attached
         try:
             await client.serve()
         finally:
             self._client = None
+            self._attached = self._attached or client.taken_in
         log.info("%s does not own the line any more", owner.program.text)
         self._quiet_until = max(self._quiet_until, client.quiet_until)
 
@@ -99,10 +100,12 @@ class Sharing:
         """Listen as the owner, and wait until no reply to an owner before may come."""
         inside = self._inside
         if (before := owner_of(self._place)) is not None:
+            inside.facts.stops.learn_times(before.stopped)
             left = _left_of(before, inside.timing.late_reply, inside.clock())
             self._quiet_until = max(self._quiet_until, inside.clock() + left)
         # should this program end before it listens
-        self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until))
+        stopped = inside.facts.stops.late_times
+        self._lock.tell(Owner(VERSION, inside.facts.me, "", self._quiet_until, stopped))
         self._server = server = ShareServer(self._place, self._lock, inside)
         try:
             await server.start(served.program if served is not None else None)
@@ -123,8 +126,9 @@ class Sharing:
             await self._server.close(quiet)
             self._server = None
         # whoever comes next may not have been attached
-        me = self._inside.facts.me
-        self._lock.give_back(Owner(VERSION, me, "", now + quiet) if quiet > 0 else None)
+        me, stopped = self._inside.facts.me, self._inside.facts.stops.late_times
+        last = Owner(VERSION, me, "", now + quiet if quiet > 0 else 0.0, stopped)
+        self._lock.give_back(last if quiet > 0 or stopped else None)
 
 
 def _left_of(before: Owner, lateness: float, now: float) -> float:

@@ -17,8 +17,9 @@ class ProgramVoice:
 
     def stop_given(self, devices: tuple[int, ...], by: str) -> None:
         """Devices are stopped by this program."""
-        me = self._facts.me
-        self._send(StopGiven(devices, self._facts.stops.of(me.id, devices), by, me))
+        me, stops = self._facts.me, self._facts.stops
+        when = max(stops.times.get(one, 0.0) for one in devices) if devices else None
+        self._send(StopGiven(devices, stops.of(me.id, devices), by, me, when))
 
     def claim(self, device: int, take: bool) -> None:
         """This program commands a device now, or no longer."""

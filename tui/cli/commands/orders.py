@@ -19,6 +19,7 @@ from ..shared.options import (
     connect_drive,
 )
 from ..shared.say import say
+from ..shared.typed import refuse_if_stopped
 
 if TYPE_CHECKING:
     from tui.session.command.commander import Commander
@@ -121,18 +122,23 @@ async def _first_look(console: DriveConsole) -> None:
 def permit_of(session: DriveSession) -> Permit:
     """The right to write to a drive for as long as this command lasts; --arm was given.
 
-    Raises OrderRefused on a read-only line.
+    Raises OrderRefused on a read-only line, Failure where the drive was stopped since.
     """
     session.arming.arm(seconds=math.inf)
+    refuse_if_stopped(session)
     return session.work.permit()
 
 
 def arm_drive(console: DriveConsole) -> None:
-    """Let commands to a drive through for as long as this command lasts. Raises OrderRefused."""
+    """Let commands to a drive through for as long as this command lasts.
+
+    Raises OrderRefused, and Failure where the drive was stopped since this command was typed.
+    """
     latest = console.latest
     if latest is None or latest.error or latest.state.kind == "unknown":
         raise OrderRefused("The state of the drive is not known; nothing is commanded.")
     console.session.arming.arm(seconds=math.inf)
+    refuse_if_stopped(console.session)
 
 
 async def carried_out(commander: Commander, give: Callable[[], None]) -> Outcome:

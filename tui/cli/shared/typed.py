@@ -1,0 +1,68 @@
+"""When the command was typed: a stop that was given since is the last word about its drive."""
+
+from __future__ import annotations
+
+import os
+import time
+from typing import TYPE_CHECKING
+
+import click
+
+from .errors import REFUSED_HERE, Failure
+
+if TYPE_CHECKING:
+    from tui.session.drive import DriveSession
+
+ONE_COMMAND = object()
+"""The `obj` of a context whose process is there for this command alone."""
+_TYPED = "drivepanel.typed"
+
+
+def note_typed(context: click.Context) -> None:
+    """A command was typed just now; with its process where that has no other task."""
+    context.meta[_TYPED] = time.monotonic()
+
+
+def typed_at(context: click.Context) -> float | None:
+    """When a command was typed (monotonic); None where that is not known."""
+    if context.obj is ONE_COMMAND:
+        return process_began()
+    found: float | None = context.meta.get(_TYPED)
+    return found
+
+
+def process_began() -> float:
+    """When this process was begun (monotonic); now where that is not told.
+
+    A program that a busy machine loads for seconds was typed before all that.
+    """
+    from tui.session.starts.processes import Processes
+
+    now = time.monotonic()
+    try:
+        ticks = int(Processes().started(os.getpid()) or "")
+        boot: int = getattr(time, "CLOCK_BOOTTIME")  # noqa: B009 - Linux only
+        age = time.clock_gettime(boot) - ticks / os.sysconf("SC_CLK_TCK")
+    except (OSError, ValueError, AttributeError):
+        return now
+    return now - max(0.0, age)
+
+
+def refuse_if_stopped(session: DriveSession) -> None:
+    """Raise Failure where the drive was stopped after this command was typed.
+
+    Such a stop came before the command was on the line, and could void nothing of it.
+    """
+    context, device = click.get_current_context(silent=True), session.device
+    stops = session.line.facts.stops
+    if context is None or (stopped := stops.times.get(device)) is None:
+        return
+    if (typed := typed_at(context)) is None or stopped <= typed:
+        return
+    session.arming.disarm()
+    by = f" ({by})" if (by := stops.by.get(device, "")) else ""
+    raise Failure(
+        f"Device {device}: it was stopped after this command was typed{by}. Nothing was sent."
+        " Type it again if it is meant.",
+        REFUSED_HERE,
+    )
