@@ -35,6 +35,8 @@ def test_a_link_that_leads_elsewhere_now_is_another_line(tmp_path: Path) -> None
         ("tcp:Gateway.Plant", " TCP:gateway.plant.:502,timeout=2"),
         ("tcp:[::1]", "tcp:[0:0:0:0:0:0:0:1]:502"),
         ("rtu-tcp:MOXA:4001", "rtu-tcp:moxa:4001"),
+        ("tcp:127.0.0.1", "tcp:127.1"),
+        ("tcp:127.0.0.1", "tcp:[::ffff:127.0.0.1]:502"),
         ("sim:atv71@2,atv21", "SIM: atv21@1, ATV71@2"),
     ],
 )
@@ -55,6 +57,22 @@ def test_spellings_of_one_line(one: str, other: str) -> None:
 )
 def test_different_lines(one: str, other: str) -> None:
     assert line_key(one) != line_key(other)
+
+
+def test_a_name_of_the_hosts_file_is_its_number(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hosts = tmp_path / "hosts"
+    monkeypatch.setattr("tui.session.connect.host_names.HOSTS", hosts)
+    assert line_key("tcp:pump:502") == "tcp:pump:502"
+    hosts.write_text("# tcp\n::1 pump\n10.0.0.7\tPump.plant  pump # 10.0.0.9 fan\n\n", "utf-8")
+    assert line_key("tcp:PUMP.") == line_key("tcp:pump.plant") == line_key("tcp:10.0.0.7")
+    assert line_key("rtu-tcp:pump:4001") == "rtu-tcp:10.0.0.7:4001"
+    assert line_key("tcp:fan") == "tcp:fan:502"
+    hosts.write_text("10.0.0.71 pump\n", "utf-8")
+    assert line_key("tcp:pump") == "tcp:10.0.0.71:502"
+    hosts.write_bytes(b"\xff\xfe10.0.0.7 pump")
+    assert line_key("tcp:pump") == "tcp:pump:502"
 
 
 @pytest.mark.parametrize("text", ["", "  ", "sim:", "sim:atv71@2,atv21@2", "tcp:", "nonsense:1"])

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import re
-from ipaddress import ip_address
 
 from tui.bus.errors import LinkSyntaxError
+
+from .host_names import host_key
 
 SIMULATED_PREFIX = "sim:"
 _LABEL_SETTINGS = re.compile(r"\s\d+(\s8[NEO][12](\stimeout=\S+)?)?$", re.IGNORECASE)
@@ -17,8 +18,8 @@ def line_key(text: str) -> str:
     """The line without its spelling: a port's lasting name, a host in small letters, no settings.
 
     Takes what a person typed, or a line's label. A port is called by its adapter where that has a
-    name of its own, else by its real path, as links lead now; names of hosts are not looked up. A
-    text that is no line is its own key.
+    name of its own, else by its real path, as links lead now; a host by its number where the hosts
+    file has its name. A text that is no line is its own key.
     """
     from tui.bus.link import RtuTcpLink, SerialLink, TcpLink, parse_link
 
@@ -33,9 +34,9 @@ def line_key(text: str) -> str:
         case SerialLink(path=path):
             return f"serial:{_port(path)}"
         case TcpLink(host=host, port=port):
-            return f"tcp:{_host(host)}:{port}"
+            return f"tcp:{host_key(host)}:{port}"
         case RtuTcpLink(host=host, port=port):
-            return f"rtu-tcp:{_host(host)}:{port}"
+            return f"rtu-tcp:{host_key(host)}:{port}"
 
 
 def _port(path: str) -> str:
@@ -44,13 +45,6 @@ def _port(path: str) -> str:
     from tui.bus.transport.port_names import lasting_name
 
     return lasting_name(_LABEL_SETTINGS.sub("", path)).path
-
-
-def _host(host: str) -> str:
-    try:
-        return f"[{ip_address(host)}]" if ":" in host else str(ip_address(host))
-    except ValueError:
-        return host.casefold().rstrip(".")
 
 
 def _simulated(text: str) -> str:

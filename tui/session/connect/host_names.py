@@ -1,0 +1,70 @@
+"""Which computer a host's name or number means, as far as this machine knows it by itself.
+
+No name server is asked: one that is away would hold up a stop. Names are those of the hosts file.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+from functools import lru_cache
+from ipaddress import IPv4Address, IPv6Address, ip_address
+from pathlib import Path
+
+HOSTS = Path("/etc/hosts")
+
+
+def host_key(host: str) -> str:
+    """The host without its spelling: a number, in brackets where it is one of IPv6, or a name."""
+    name = host.casefold().rstrip(".")
+    number = _number(name) or _number(_names().get(name, ""))
+    if number is None:
+        return name
+    return f"[{number}]" if isinstance(number, IPv6Address) else str(number)
+
+
+def _number(text: str) -> IPv4Address | IPv6Address | None:
+    try:
+        found = ip_address(text)
+    except ValueError:
+        return _short_number(text)
+    mapped = found.ipv4_mapped if isinstance(found, IPv6Address) else None
+    return mapped or found
+
+
+def _short_number(text: str) -> IPv4Address | None:
+    """What the system takes for a number, too: 127.1 is 127.0.0.1."""
+    if not text[:1].isdigit():
+        return None
+    try:
+        return IPv4Address(socket.inet_aton(text))
+    except OSError:
+        return None
+
+
+def _names() -> dict[str, str]:
+    """Numbers by name, of the hosts file as it is now."""
+    try:
+        found = os.stat(HOSTS)
+    except OSError:
+        return {}
+    return _read(HOSTS, found.st_mtime_ns, found.st_size)
+
+
+@lru_cache(maxsize=2)
+def _read(path: Path, _changed: int, _size: int) -> dict[str, str]:
+    from tui.drive.small_file import read_small_text
+
+    names: dict[str, str] = {}
+    try:
+        lines = read_small_text(path).splitlines()
+    except (OSError, UnicodeDecodeError):
+        return names
+    for line in lines:
+        number, *called = line.partition("#")[0].split() or [""]
+        for name in called:
+            key = name.casefold().rstrip(".")
+            # a name with a number of each kind is reached by the older kind, as most devices are
+            if key not in names or (":" in names[key] and ":" not in number):
+                names[key] = number
+    return names
