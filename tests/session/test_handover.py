@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import json
 import os
 from collections.abc import AsyncIterator
 from pathlib import Path
@@ -18,7 +19,7 @@ from tui.session.drive import DriveSession
 from tui.session.events import EventLog
 from tui.session.fleet import Fleet
 from tui.session.journal import Journal
-from tui.session.sharing.handover import ANSWER_WITHIN, Handover
+from tui.session.sharing.handover import ANSWER_WITHIN, TAKEN_LOOK, TAKEN_WITHIN, Handover
 from tui.session.starts.keeper import StartKeeper
 from tui.session.starts.starts import Starts
 
@@ -170,22 +171,26 @@ async def test_a_stop_of_another_program_ends_arming_and_work_and_is_told(bench:
 async def test_a_question_is_shown_and_answered_by_a_person(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.hear_question(1, REMOTE)
-    assert bench.handover.requests[1].program == REMOTE
+    request = bench.handover.requests[1]
+    assert request.program == REMOTE
     assert any("asks for this drive. G answers" in one for one in bench.told)
-    bench.handover.answer(1, yes=True)
+    bench.handover.answer(bench.handover.requests[1], yes=True)
     assert bench.handover.requests == {}
     assert bench.answers == [("reply", 1, REMOTE.id, True)]
     assert not bench.session.arming.armed
     assert "Given to panel" in bench.session.arming.refusal()
     # a second answer answers nothing
-    bench.handover.answer(1, yes=False)
+    bench.handover.answer(request, yes=False)
     assert len(bench.answers) == 1
+    bench.handover.answer(request, yes=True)
+    assert len(bench.answers) == 1
+    assert bench.told[-1] == "Not given: the question of panel on pts/9 (pid 77) is over."
 
 
 async def test_a_person_may_keep_the_drive(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.hear_question(1, REMOTE)
-    bench.handover.answer(1, yes=False)
+    bench.handover.answer(bench.handover.requests[1], yes=False)
     assert bench.answers == [("reply", 1, REMOTE.id, False)]
     assert bench.session.arming.armed
 
@@ -210,7 +215,7 @@ async def test_an_unanswered_question_is_a_no_unless_the_motor_surely_stands(
 async def test_an_answered_question_does_not_expire_into_another_answer(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.hear_question(1, REMOTE)
-    bench.handover.answer(1, yes=False)
+    bench.handover.answer(bench.handover.requests[1], yes=False)
     bench.facts.hear_question(1, REMOTE)
     await expires(bench)
     await asyncio.sleep(0.05)
@@ -234,17 +239,55 @@ async def test_a_question_about_a_drive_that_is_not_known_here_is_a_no(bench: Be
     assert bench.answers == [("reply", 4, REMOTE.id, False)]
 
 
-async def test_a_drive_that_is_given_away_is_not_stopped_by_the_end_of_this_program(
-    bench: Bench,
-) -> None:
-    await asyncio.to_thread(bench.starts.begin, bench.session, "forward")
-    bench.starts.sent(bench.session)
-    records = bench.starts_files
-    assert len(records()) == 1
+async def test_the_question_of_a_program_that_has_gone_is_over(bench: Bench) -> None:
     bench.session.arming.arm()
     bench.facts.hear_question(1, REMOTE)
-    bench.handover.answer(1, yes=True)
-    await asyncio.to_thread(eventually, lambda: not records())
+    request = bench.handover.requests[1]
+    bench.facts.set_programs((bench.facts.me,))
+    assert bench.handover.requests == {}
+    bench.handover.answer(request, yes=True)
+    assert bench.answers == []
+    assert bench.session.arming.armed
+    assert bench.told[-1].startswith("Not given: ")
+    # the answer to it is none to the next question
+    bench.facts.set_programs((bench.facts.me, REMOTE))
+    bench.facts.hear_question(1, REMOTE)
+    bench.handover.answer(request, yes=True)
+    assert bench.answers == []
+
+
+async def given_while_it_runs(bench: Bench) -> None:
+    await asyncio.to_thread(bench.starts.begin, bench.session, "forward")
+    bench.starts.sent(bench.session)
+    bench.session.arming.arm()
+    bench.session.note_command()
+    bench.facts.hear_question(1, REMOTE)
+    bench.handover.answer(bench.handover.requests[1], yes=True)
+    assert not bench.session.arming.armed
+
+
+async def test_a_motor_that_is_given_away_is_not_stopped_by_the_end_of_this_program(
+    bench: Bench,
+) -> None:
+    await given_while_it_runs(bench)
+    (mine,) = bench.starts_files()
+    assert bench.session.commanded
+    record = json.loads(mine.read_text())
+    mine.with_name("other.json").write_text(json.dumps({**record, "pid": REMOTE.pid}))
+    await asyncio.sleep(0.05)
+    bench.clock.advance(TAKEN_LOOK)
+    await asyncio.to_thread(eventually, lambda: not mine.exists())
+    assert not bench.session.commanded
+
+
+async def test_a_motor_that_nobody_took_stays_this_programs_to_stop(bench: Bench) -> None:
+    await given_while_it_runs(bench)
+    await asyncio.sleep(0.05)
+    bench.clock.advance(TAKEN_WITHIN + TAKEN_LOOK)
+    await asyncio.to_thread(eventually, lambda: "has not taken the motor over" in bench.told[-1])
+    assert len(bench.starts_files()) == 1
+    assert bench.session.commanded
+    assert bench.starts.stopped_by_others(1)
 
 
 # Asked elsewhere
@@ -263,7 +306,7 @@ async def test_what_another_program_commands_does_not_run_by_a_command_from_here
     assert not bench.session.commanded
     bench.session.note_command()
     bench.facts.hear_question(1, REMOTE)
-    bench.handover.answer(1, yes=True)
+    bench.handover.answer(bench.handover.requests[1], yes=True)
     assert not bench.session.commanded
 
 

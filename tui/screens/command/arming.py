@@ -126,7 +126,7 @@ class ArmingKeys(PanelScreen):
             return
 
         def give(_stamp: int) -> None:
-            fleet.handover.answer(device, yes=True)
+            fleet.handover.answer(request, yes=True)
 
         self._ask(
             f"Give drive {device} away?",
@@ -135,7 +135,7 @@ class ArmingKeys(PanelScreen):
             "gives it",
             "keeps it",
             give,
-            refused=lambda: fleet.handover.answer(device, yes=False),
+            refused=lambda: fleet.handover.answer(request, yes=False),
         )
 
     def action_disarm(self) -> None:

@@ -25,6 +25,8 @@ if TYPE_CHECKING:
 
 ANSWER_WITHIN = 15.0
 """Seconds after which a question that nobody answers is a no, or a yes where the motor stands."""
+TAKEN_WITHIN, TAKEN_LOOK = 5.0, 0.1
+"""Seconds in which a program puts a motor on record that it was given, and between two looks."""
 SEEN_WITHIN = 2.0
 """Seconds in which a motor must have been seen to stand."""
 SURELY_STANDING = ("stopped", "ready", "blocked")
@@ -120,7 +122,8 @@ class Handover:
             return
         request = DriveRequest(device, program, self._clock.monotonic() + ANSWER_WITHIN)
         self.requests = MappingProxyType({**self.requests, device: request})
-        self._say(device, f"{program.text} asks for this drive. G answers; unanswered it stays"
+        who = f"{program.text[0].upper()}{program.text[1:]}"
+        self._say(device, f"{who} asks for this drive. G answers; unanswered it stays"
                   " here while its motor runs.")  # fmt: skip
         self._spawn(partial(self._expire, request), f"question about {device}")
 
@@ -130,12 +133,13 @@ class Handover:
             self._forget(request.device)
             self._decide(request.device, request.program)
 
-    def answer(self, device: int, *, yes: bool) -> None:
-        """A person's answer to the question about a drive."""
-        request = self.requests.get(device)
-        if request is not None:
-            self._forget(device)
-            self._reply(device, request.program, yes=yes)
+    def answer(self, request: DriveRequest, *, yes: bool) -> None:
+        """A person's answer to a question; one that is over is told so."""
+        if self.requests.get(request.device) is request:
+            self._forget(request.device)
+            self._reply(request.device, request.program, yes=yes)
+        elif yes:
+            self._say(request.device, f"Not given: the question of {request.program.text} is over.")
 
     def _decide(self, device: int, program: Program) -> None:
         """Without an answer: no while the motor runs, or may run."""
@@ -147,11 +151,32 @@ class Handover:
         session = self._session_of(device)
         if yes and session is not None:
             session.arming.disarm(f"Given to {program.text}: no longer armed here.")
-            if session.starts is not None:
-                session.starts.give_away(session)
-            session.note_given()
+            starts = session.starts
+            if starts is not None and starts.holds(device):
+                work = partial(self._hand_over, session, starts, program)
+                self._spawn(work, f"motor of {device} to {program.text}")
+            else:
+                session.note_given()
         self._line.facts.answer(device, program.id, yes=yes)
         self._say(device, f"{'Given to' if yes else 'Not given to'} {program.text}.")
+
+    async def _hand_over(
+        self, session: DriveSession, starts: StartKeeper, program: Program
+    ) -> None:
+        """Look after a motor that was started here until it is on record as the other program's.
+
+        That may end before it has taken it: then nobody else would stop the motor.
+        """
+        device, end = session.device, self._clock.monotonic() + TAKEN_WITHIN
+        while starts.holds(device) and self._clock.monotonic() < end:
+            if await asyncio.to_thread(starts.started_by, session, program.pid):
+                starts.give_away(session)
+                session.note_given()
+                return
+            await self._clock.sleep(TAKEN_LOOK)
+        if starts.holds(device):
+            self._say(device, f"{program.text} has not taken the motor over: it stays this"
+                      " program's to stop. a arms it.")  # fmt: skip
 
     def _forget(self, device: int) -> None:
         rest = {d: one for d, one in self.requests.items() if d != device}
@@ -177,11 +202,18 @@ class Handover:
         for id, text in self._names.items():
             if id not in names:
                 self._say(None, f"{text[0].upper()}{text[1:]} has left the line.")
+                self._void_questions_of(id)
         for device, id in facts.commanders.items():
             if id in names and self._commanders.get(device) != id:
                 self._say(device, f"{names[id][0].upper()}{names[id][1:]} commands this drive now.")
                 self._is_anothers(self._session_of(device))
         self._names, self._commanders = names, facts.commanders
+
+    def _void_questions_of(self, id: str) -> None:
+        """A program that asked has gone: there is nobody to be given a drive."""
+        for device, request in self.requests.items():
+            if request.program.id == id:
+                self._forget(device)
 
     def _is_anothers(self, session: DriveSession | None) -> None:
         """Another program commands a drive; a motor started here stays this program's to stop."""

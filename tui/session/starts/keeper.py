@@ -143,6 +143,10 @@ class StartKeeper:
         record = self._begun.get(device)
         return record is not None and not record.left_running
 
+    def started_by(self, session: Startable, pid: int) -> bool:
+        """Whether a program has the motor on record as its own; reads files."""
+        return self._starts.is_on_record(session.line_text, session.device, pid)
+
     def give_away(self, session: Startable) -> None:
         """Another program looks after the motor from now on."""
         if session.device in self._begun:

@@ -201,6 +201,14 @@ class Starts:
         newest = {one.device: one for one in here if one.device not in alive | going}
         return [newest[device] for device in sorted(newest)]
 
+    def is_on_record(self, line: str, device: int, pid: int) -> bool:
+        """Whether a program has a start of a drive on record. Reads files."""
+        key = line_key(line)
+        return any(
+            one.device == device and one.pid == pid and line_key(one.line) == key
+            for one in self._files.records()
+        )
+
     def profiles(self, line: str) -> dict[int, str]:
         """By device, the profile of the last start on record, whose program lives or not.
 
