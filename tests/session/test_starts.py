@@ -26,8 +26,10 @@ from hypothesis import strategies as st
 from tests.programs import PATIENCE, wait_until
 from tui.bus.fake import FakeLine
 from tui.bus.program import Program
+from tui.drive.profile import library
 from tui.session.connect.identify import DriveIdentity
 from tui.session.connect.line_key import line_key
+from tui.session.drive import DriveSession
 from tui.session.starts.errors import StartNotRecorded, StartOvertaken
 from tui.session.starts.keeper import NothingToTakeOver, StartKeeper
 from tui.session.starts.processes import Processes
@@ -41,6 +43,7 @@ LIVING, ENDED = 900_001, 900_002
 PROGRAM = """
 import sys
 from pathlib import Path
+from tui.drive.profile import library
 from tui.session.connect.identify import DriveIdentity
 from tui.session.starts.starts import Starts
 starts = Starts(Path(sys.argv[1]))
@@ -259,6 +262,28 @@ def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
     keeper.take_over(session)
     (mine,) = [one for one in starts._files.records() if one.pid == os.getpid()]
     assert mine.left_running is meant
+
+
+def test_a_line_that_was_closed_and_opened_again_has_the_motor_that_was_started_here(
+    starts: Starts, tmp_path: Path
+) -> None:
+    profile = library.load("atv71")
+    session = DriveSession(FakeLine({2: {}}), 2, profile, IDENTITY)
+    StartKeeper("panel", starts).begin(session, "forward")
+    again = DriveSession(FakeLine({2: {}}), 2, profile, IDENTITY)
+    keeper = StartKeeper("panel", Starts(starts.folder.parent, MadeUp()))
+    keeper.look(again)
+    assert keeper.holds(2)
+    assert again.commanded
+    assert keeper.stopped_by_others(2)
+    keeper.standing(again, time.monotonic() + 1)
+    keeper.close()
+    assert files(starts) == []
+    # and another drive's start is not this one's
+    other = DriveSession(FakeLine({3: {}}), 3, profile)
+    keeper.look(other)
+    assert not keeper.holds(3)
+    assert not other.commanded
 
 
 def test_the_motor_of_a_program_that_lives_is_offered_until_it_is_back(starts: Starts) -> None:

@@ -50,6 +50,10 @@ class Startable(Protocol):
         """Whether this program has commanded it."""
         ...
 
+    def note_command(self) -> None:
+        """A command was sent from here."""
+        ...
+
 
 class StartKeeper:
     """Knows which motors this program has started, and which an earlier one left running.
@@ -156,7 +160,16 @@ class StartKeeper:
     # What an earlier program left
 
     def look(self, session: Startable) -> None:
-        """Find what an earlier program has started of this drive; reads files."""
+        """Find what an earlier program has started of this drive; reads files.
+
+        A motor that this very program has started stays its own: its line was closed since.
+        """
+        if session.device not in self._begun and (
+            own := self._starts.own(session.line_text, session.device)
+        ):
+            self._begun = {**self._begun, session.device: own}
+            self._sent = {**self._sent, session.device: self._clock.monotonic()}
+            session.note_command()
         absent = pids_absent(session.line.facts)
         found = self._starts.found(session.line_text, session.device, absent)
         if found is not None:

@@ -188,36 +188,45 @@ class Starts:
         `absent` are numbers of programs that count as ended: they left the line, or are frozen.
         """
         key = line_key(line)
-        with self._changed:
-            tasks = [*self._waiting, *([self._current] if self._current else [])]
-        going = {
-            task.drive[1]
-            for task in tasks
-            if task.record is None and line_key(task.drive[0]) == key
-        }
-        here = [one for one in self._files.records() if line_key(one.line) == key]
+        going = self._going(key)
+        here = self._of(line)
         alive = {one.device for one in here if one.pid not in absent and self.is_alive(one)}
-        here.sort(key=lambda one: one.begun.timestamp() if one.begun else 0.0)
         newest = {one.device: one for one in here if one.device not in alive | going}
         return [newest[device] for device in sorted(newest)]
 
     def is_on_record(self, line: str, device: int, pid: int) -> bool:
         """Whether a program has a start of a drive on record. Reads files."""
+        return any(one.device == device and one.pid == pid for one in self._of(line))
+
+    def own(self, line: str, device: int) -> StartRecord | None:
+        """The start of a drive that this very program has on record. Reads files."""
+        if device in self._going(line_key(line)):
+            return None
+        here = (one for one in self._of(line) if one.device == device)
+        return next((one for one in here if self._own(one)), None)
+
+    def _going(self, key: str) -> set[int]:
+        """The drives of a line whose records are being taken away."""
+        with self._changed:
+            tasks = [*self._waiting, *([self._current] if self._current else [])]
+        return {
+            task.drive[1]
+            for task in tasks
+            if task.record is None and line_key(task.drive[0]) == key
+        }
+
+    def _of(self, line: str) -> list[StartRecord]:
+        """The starts of a line, the newest last."""
         key = line_key(line)
-        return any(
-            one.device == device and one.pid == pid and line_key(one.line) == key
-            for one in self._files.records()
-        )
+        here = [one for one in self._files.records() if line_key(one.line) == key]
+        return sorted(here, key=lambda one: one.begun.timestamp() if one.begun else 0.0)
 
     def profiles(self, line: str) -> dict[int, str]:
         """By device, the profile of the last start on record, whose program lives or not.
 
         Reads files.
         """
-        key = line_key(line)
-        here = [one for one in self._files.records() if line_key(one.line) == key]
-        here.sort(key=lambda one: one.begun.timestamp() if one.begun else 0.0)
-        return {one.device: one.profile for one in here}
+        return {one.device: one.profile for one in self._of(line)}
 
     def close(self, timeout: float = 1.0) -> bool:
         """Wait for what is still to be written or removed, so many seconds; False if it was not."""
