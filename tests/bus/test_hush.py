@@ -9,8 +9,8 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.errors import RequestRefused
 
-from .conftest import OpenLine
-from .peer import PtyPeer, honest
+from .conftest import OpenLine, Share
+from .peer import PtyPeer, eventually, honest
 
 
 async def test_only_a_stop_asks_a_device_that_is_left_alone(open_line: OpenLine) -> None:
@@ -27,3 +27,19 @@ async def test_only_a_stop_asks_a_device_that_is_left_alone(open_line: OpenLine)
         assert (await line.read(2, 6)).words == (6,)
         line.facts.unhush(1)
         assert (await asyncio.wait_for(line.read(1, 7), 10.0)).words == (7,)
+
+
+@pytest.mark.parametrize("stopper", ["panel", "prove", "watch"])
+async def test_a_stop_ends_what_a_device_is_left_alone_for(share: Share, stopper: str) -> None:
+    """Whoever stops it looks at it until it stands, and does not wait for who leaves it alone."""
+    with PtyPeer(honest) as peer:
+        lines = share(peer.path)
+        programs = {name: lines.open(name) for name in ("panel", "prove", "watch")}
+        programs["prove"].facts.hush(1, "It is being proved.")
+        programs["prove"].facts.hush(2, "It is being proved.")
+        await asyncio.to_thread(eventually, lambda: 1 in programs["watch"].facts.hushed)
+        programs[stopper].facts.give_stop([1], "the stop key")
+        assert (await programs[stopper].read(1, 5)).words == (5,)
+        await asyncio.to_thread(
+            eventually, lambda: all({*one.facts.hushed} == {2} for one in programs.values())
+        )

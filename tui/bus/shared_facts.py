@@ -40,6 +40,7 @@ class SharedFacts(FactsHeard):
         self.voice: LineVoice | None = None
         """None while nobody else hears of it."""
         self._lock = threading.RLock()
+        self.on_stop(lambda devices, _by, _program: self._leave_alone_no_more(devices))
 
     # Who is there
 
@@ -112,6 +113,11 @@ class SharedFacts(FactsHeard):
             rest = {d: one for d, one in self.hushed.items() if d != device}
             self.hushed = MappingProxyType({**rest, device: (program, why)} if why else rest)
 
+    def _leave_alone_no_more(self, devices: Iterable[int]) -> None:
+        """A stop ends what a device was left alone for: it is looked at until it stands."""
+        for device in devices:
+            self.note_hush(device, "", "")
+
     # Stops
 
     def give_stop(self, devices: Iterable[int], by: str) -> None:
@@ -119,6 +125,7 @@ class SharedFacts(FactsHeard):
         stopped = tuple(devices)
         # counted before the voice is looked for: who finds one later tells the counts
         self.stops.give(self.me.id, stopped, by)
+        self._leave_alone_no_more(stopped)
         if self.voice is not None:
             self.voice.stop_given(stopped, by)
 

@@ -155,8 +155,8 @@ async def found_at(
     from tui.session.connect.identify import identify_drive
 
     priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
-    if opened.line.state.status is LineStatus.LOST:
-        # the program that owns the line is frozen: nothing else goes past it
+    if opened.line.state.status is LineStatus.LOST or device in opened.line.facts.hushed:
+        # nothing else goes past an owner that is frozen, or to a drive that is left alone
         priority = Priority.STOP
     try:
         identity = await identify_drive(opened.line, device, priority=priority)
