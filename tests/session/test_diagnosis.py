@@ -28,6 +28,7 @@ from tests.bus.peer import (
 from tests.misheard import misheard
 from tui.bus.api import ModbusLine, Priority, Reply
 from tui.bus.errors import (
+    OWNER_SILENT,
     ChecksumFault,
     DeviceException,
     ExchangeError,
@@ -161,6 +162,10 @@ def test_a_port_that_a_program_has() -> None:
     other = of(replace(busy, trouble=PortBusy(PORT, "minicom (pid 12)")))
     assert other.text == f"{PORT} is in use by minicom (pid 12)."
     assert of(replace(busy, trouble=NotShared("It is another user's. So be it."))).rung == "busy"
+    frozen = of(replace(busy, trouble=LineLost(f"run (pid 7) {OWNER_SILENT}. Stops go out.")))
+    assert frozen.rung == "busy"
+    assert frozen.text.startswith(f"run (pid 7) {OWNER_SILENT}.")
+    assert "kill -9" in frozen.steps[0]
 
 
 def test_a_program_that_listens_on_the_same_port() -> None:

@@ -56,6 +56,10 @@ class LineLost(LineError):
     """The line went away or cannot be reached; it is tried again by itself."""
 
 
+OWNER_SILENT = "owns the line and does not answer"
+"""What a LineLost says of a frozen program of Drive Panel that has the line."""
+
+
 class LineBusy(LineError):
     """Too many requests wait for the line; this one was not queued."""
 

@@ -10,7 +10,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from ..errors import NotShared
+from ..errors import OWNER_SILENT, NotShared
 from ..link import label
 from ..model import LineState, LineStatus
 from ..schedule.inside import LineInside
@@ -239,7 +239,7 @@ class ShareClient:
         for job in self._inside.dispatcher.take_all():
             self._asked.send(job)
         if silent > SILENT_OWNER + WAITED_ENOUGH:
-            text = f"{self._owner.program.text} owns the line and does not answer."
+            text = f"{self._owner.program.text} {OWNER_SILENT}."
             self._asked.give_up_older(self._inside.clock() - WAITED_ENOUGH, text)
 
     # What the owner says

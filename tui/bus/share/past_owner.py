@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Callable
 from contextlib import suppress
 
+from ..errors import OWNER_SILENT
 from ..model import Priority
 from ..program import Program
 from ..requests import BROADCAST
@@ -39,7 +40,7 @@ class PastOwner:
         if self._direct is not None and self._direct.trouble:
             return self._direct.trouble
         who = self._owner.text
-        return f"{who} owns the line and does not answer. Stops go out past it; all else waits."
+        return f"{who} {OWNER_SILENT}. Stops go out past it; all else waits."
 
     def begin(self) -> None:
         """The owner does not answer: take stops from now on."""

@@ -52,6 +52,9 @@ def get_permission(sight: Sight) -> Iterator[str]:
 
 def free_port(sight: Sight) -> Iterator[str]:
     """A port that another program has."""
+    if sight.owner_frozen:
+        yield "Let that program go on, or end it: kill -9 and its pid. Then the line is free."
+        return
     yield "Close that program. Programs of Drive Panel share a line by themselves, others do not."
 
 

@@ -51,7 +51,7 @@ def _says_renumbered(sight: Sight) -> str:
 
 
 def _busy(sight: Sight) -> bool:
-    if isinstance(sight.trouble, PortBusy | NotShared):
+    if isinstance(sight.trouble, PortBusy | NotShared) or sight.owner_frozen:
         return True
     port = sight.port
     if port is None:
@@ -65,7 +65,7 @@ def _says_busy(sight: Sight) -> str:
     if isinstance(sight.trouble, PortBusy):
         by = sight.trouble.holder or (port.holder if port else "") or "another program"
         return f"{sight.path} is in use by {by}."
-    if isinstance(sight.trouble, NotShared) or port is None:
+    if isinstance(sight.trouble, NotShared) or port is None or sight.owner_frozen:
         return _sentence(str(sight.trouble))
     if port.others:
         return f"{port.others} has {sight.path} open too, and takes what the drive answers."

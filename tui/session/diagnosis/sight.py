@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from tui.bus.errors import LineError
+from tui.bus.errors import OWNER_SILENT, LineError, LineLost
 from tui.bus.link import Link, SerialLink
 from tui.bus.transport.port_errors import PortErrors
 from tui.bus.transport.port_seen import PortSeen
@@ -51,6 +51,11 @@ class Sight:
     """The usual time from the end of a request to the start of its answer."""
     neighbours: tuple[int, ...] = ()
     """Other addresses of this line that answer."""
+
+    @property
+    def owner_frozen(self) -> bool:
+        """Whether a program of Drive Panel owns the line, and does not answer."""
+        return isinstance(self.trouble, LineLost) and OWNER_SILENT in str(self.trouble)
 
     @property
     def path(self) -> str:
