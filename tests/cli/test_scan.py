@@ -161,6 +161,7 @@ def test_a_master_that_begins_later_ends_it_too_and_what_was_found_stays() -> No
     assert "Address 40: read of register 3201 on, 4 words" in done.stderr
     (end,) = events(done.stdout, "ended")
     assert (end["done"], end["found"]) == (False, 1)
+    assert "1 drive found at addresses 1-20, not all of which were asked" in end["text"]
     assert max(request[0] for request in peer.requests) < 20
 
 

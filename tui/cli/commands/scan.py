@@ -122,7 +122,8 @@ def _end(scans: list[Scan], addresses: str) -> str:
     (scan,) = scans
     count = len(scan.hits)
     drives = f"{count or 'No'} drive{'' if count == 1 else 's'} found"
-    text = f"{drives} at addresses {addresses}{_settings_text(scan)}."
+    early = "" if scan.done else ", not all of which were asked"
+    text = f"{drives} at addresses {addresses}{early}{_settings_text(scan)}."
     ended: dict[str, Any] = {
         "done": scan.done,
         "found": count,
