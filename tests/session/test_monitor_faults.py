@@ -256,3 +256,13 @@ def test_values_that_no_request_brings_are_not_owed_for_ever() -> None:
         due.turn("ab", lambda codes: [])
         due.came()
     assert due.turn("ab", lambda codes: []) == ()
+
+
+async def test_a_drive_that_is_held_back_is_not_asked_and_says_why(bench: Bench) -> None:
+    await bench.run(2)
+    bench.monitor.held_back = lambda: "Left alone."
+    told = await bench.run(FORGOTTEN_AFTER + 2)
+    assert [asked for _, asked in told[1:]] == [[]] * (len(told) - 1)
+    assert told[-1][0].error == "Left alone."
+    bench.monitor.held_back = lambda: ""
+    assert not (await bench.run(3))[-1][0].error

@@ -42,6 +42,10 @@ RATE_OVER = 6
 Listener = Callable[[Snapshot], None]
 
 
+class NotAsked(DriveError):
+    """A drive was left alone on purpose, and why."""
+
+
 SHARED_AGE = 0.5
 """Age up to which a value that was read for another program is taken, as a share of the cycle:
 two monitors of one period then read each value once, however they lie to each other."""
@@ -57,6 +61,8 @@ class Monitor:
         self.profile = session.profile
         self.period = 0.5
         """Target cycle time in seconds; read anew at each."""
+        self.held_back: Callable[[], str] = lambda: ""
+        """Asked before each cycle, in the line's thread: why the drive must not be asked now."""
         self.reader = Reader(session)
         self.restarts = 0
         """How often watching failed by an error of its own, and was begun anew."""
@@ -173,6 +179,8 @@ class Monitor:
                     self._all_due, self._learn_due = False, True
                     due.add(rates.seldom)
                 try:
+                    if why := self.held_back():
+                        raise NotAsked(why)
                     seldom = (*rates.seldom, *self.session.followed)
                     turn = due.turn(seldom, self.reader.groups)
                     readings.update(await self._cycle(rates, readings, turn))

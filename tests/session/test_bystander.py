@@ -1,0 +1,123 @@
+"""Who looks on at a drive keeps no motor running whose commander has died."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from tui.session.drive import DriveSession
+from tui.session.sharing.bystander import (
+    ACTED_AFTER,
+    COMMANDER_SILENT,
+    UNKNOWN_TIMEOUT_ACTED,
+    Bystander,
+)
+from tui.session.timeout_told import Timeout, TimeoutWatch
+
+TTO = 10.0
+
+
+@dataclass
+class Bench:
+    """A drive that is looked on at, at a time that the test tells."""
+
+    time: float = 100.0
+    sign: float | None = None
+    """When the client that started the motor was last heard."""
+    heard: float = 100.0
+    latest: Any = None
+    timeout: Timeout | None = field(
+        default_factory=lambda: Timeout(known=True, watch=TimeoutWatch(TTO, None))
+    )
+
+    def __post_init__(self) -> None:
+        line = SimpleNamespace(device_state=lambda _: SimpleNamespace(heard=self.heard))
+        session = SimpleNamespace(line=line, device=1)
+        self.session = session
+        self.looks_on = Bystander(
+            cast(DriveSession, session), lambda: self.sign, lambda: self.latest, lambda: self.time
+        )
+
+    def asks(self, after: float = 1.0) -> bool:
+        """Whether the drive is asked some seconds later; it answers then."""
+        self.time += after
+        self.session.timeout = self.timeout
+        why = self.looks_on.held_back()
+        assert why in ("", COMMANDER_SILENT)
+        assert self.looks_on.waits == bool(why)
+        if not why:
+            self.heard = self.time
+        return not why
+
+    def saw(self, motion: str, error: str = "") -> None:
+        """What the last cycle brought, now."""
+        state = SimpleNamespace(motion=motion)
+        self.latest = SimpleNamespace(state=state, error=error, time=self.time)
+
+
+def test_a_drive_that_nobody_commands_is_asked() -> None:
+    bench = Bench()
+    assert all(bench.asks() for _ in range(5))
+
+
+def test_a_drive_is_asked_once_for_each_sign_of_its_commander() -> None:
+    bench = Bench()
+    bench.saw("running")
+    for _ in range(3):
+        bench.sign = bench.time
+        assert bench.asks()
+    assert not bench.asks(), "the client has died"
+    # nothing feeds its time-out; once it must have acted, it is looked at
+    assert not bench.asks(TTO - 2.0)
+    assert bench.asks(ACTED_AFTER + 2.0)
+    assert not bench.asks()
+
+
+def test_a_motor_that_was_seen_to_stand_is_asked_on() -> None:
+    bench = Bench()
+    bench.sign = bench.time
+    assert bench.asks()
+    bench.saw("stopped")
+    assert bench.asks()
+    assert bench.asks()
+    bench.saw("stopped", error="No answer.")
+    assert not bench.asks()
+    bench.saw("stopped")
+    bench.time += 1
+    bench.sign = bench.time
+    assert bench.asks(), "it was told something since"
+    assert not bench.asks(), "and was not seen since"
+
+
+@pytest.mark.parametrize(
+    ("timeout", "silence"),
+    [(None, UNKNOWN_TIMEOUT_ACTED), (Timeout(known=False), UNKNOWN_TIMEOUT_ACTED)],
+)
+def test_a_time_out_that_is_not_known_is_taken_for_long(
+    timeout: Timeout | None, silence: float
+) -> None:
+    bench = Bench(timeout=timeout, sign=0.0)
+    assert not bench.asks(silence - 1.0)
+    assert bench.asks(2.0)
+
+
+def test_a_drive_without_a_time_out_is_asked_on() -> None:
+    bench = Bench(timeout=Timeout(known=True), sign=0.0)
+    assert bench.asks()
+    assert bench.asks()
+
+
+def test_a_motor_that_an_ended_program_left_is_not_fed() -> None:
+    bench = Bench()
+    bench.looks_on.orphan = True
+    bench.saw("running")
+    assert not bench.asks()
+    assert bench.asks(TTO + ACTED_AFTER)
+    bench.saw("stopped")
+    assert bench.asks()
+    assert not bench.looks_on.orphan
+    bench.saw("running")
+    assert bench.asks(), "somebody else has started it since"

@@ -1,0 +1,87 @@
+"""When a drive may be asked by who only looks on, for hours, without a person before it.
+
+Each request feeds the drive's communication time-out: asked on, the motor of a commander that has
+died would run for ever.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from ..drive import DriveSession
+
+if TYPE_CHECKING:
+    from ..monitor.snapshot import Snapshot
+
+COMMANDER_SILENT = "Not asked: whoever started its motor gives no sign of life."
+UNKNOWN_TIMEOUT_ACTED = 60.0
+"""Seconds of silence after which a drive has acted that does not tell its time-out."""
+ACTED_AFTER = 1.0
+"""Seconds beyond its time-out after which a drive has begun to act."""
+SEEN_STANDING = ("stopped", "ready", "blocked")
+
+
+class Bystander:
+    """Looks on at one drive, and keeps no motor running whose commander has died.
+
+    `sign` tells when whoever started its motor was last heard (monotonic), or None where nobody
+    is known to have. The drive is asked once for each such sign, until its motor was seen to
+    stand; one that was silent for longer than its time-out has acted: it is looked at once.
+    """
+
+    def __init__(
+        self,
+        session: DriveSession,
+        sign: Callable[[], float | None],
+        latest: Callable[[], Snapshot | None],
+        now: Callable[[], float] = time.monotonic,
+    ) -> None:
+        self.orphan = False
+        """Whether a program that has ended started the motor, and nobody has seen it stand."""
+        self.waits = False
+        """Whether the drive was left alone when it was to be asked last."""
+        self._session = session
+        self._sign = sign
+        self._latest = latest
+        self._now = now
+        self._asked = now()
+
+    def held_back(self) -> str:
+        """Why the drive must not be asked now, or nothing: then it counts as asked."""
+        self.waits = not self._may_ask()
+        if self.waits:
+            return COMMANDER_SILENT
+        self._asked = self._now()
+        return ""
+
+    def _may_ask(self) -> bool:
+        sign = self._sign()
+        if sign is None and not self.orphan:
+            return True
+        sign = -math.inf if sign is None else sign
+        if sign >= self._asked or self._stands(sign):
+            return True
+        return self._silence() > self._limit()
+
+    def _stands(self, since: float) -> bool:
+        """Whether it stood when it was last looked at, and was told nothing since."""
+        seen = self._latest()
+        if seen is None or seen.error or seen.time < since:
+            return False
+        stands = seen.state.motion in SEEN_STANDING
+        self.orphan = self.orphan and not stands
+        return stands
+
+    def _silence(self) -> float:
+        heard = self._session.line.device_state(self._session.device).heard
+        return self._now() - (heard if heard is not None else self._asked)
+
+    def _limit(self) -> float:
+        """Seconds of silence after which the drive has acted; 0 for one that never does."""
+        told = self._session.timeout
+        if told is None or not told.known:
+            return UNKNOWN_TIMEOUT_ACTED
+        return told.watch.timeout + ACTED_AFTER if told.watch is not None else 0.0
