@@ -67,7 +67,7 @@ def test_the_commands_of_a_section(
         elif words[:1] == ["hold"]:
             with served([*DRIVEPANEL, *words], ready="Device 1"):
                 pass
-        elif words[:1] in (["simulate"], ["serve"]):
+        elif words[:1] in (["simulate"], ["serve"], ["publish"]):
             with served([*DRIVEPANEL, *words], ready="Ready"):
                 pass
         elif not words or words[0] in PANEL:

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tests.programs import DRIVEPANEL, drivepanel, port_of, served
+from tests.programs import DRIVEPANEL, drivepanel, free_port, port_of, served
 from tui.cli.documents.json_schema import DOCUMENTS, document_of, documents_schema
 from tui.cli.main import COMMANDS
 from tui.cli.shared.drive_status import status_json
@@ -161,11 +161,20 @@ def test_a_simulated_line() -> None:
 
 
 def test_lines_that_are_served() -> None:
-    serve = [*DRIVEPANEL, "serve", "sim:atv71@2", "--tcp", ":0", "--allow-writes", "all", "--json"]
-    with served(serve, ready="{") as program:
+    options = ["--tcp", ":0", "--allow-writes", "all", "--metrics", ":0", "--json"]
+    with served([*DRIVEPANEL, "serve", "sim:atv71@2", *options], ready="{") as program:
         (told,) = documents(program.ready)
     assert port_of(told["tcp"])
     assert (told["lines"], told["writes"], told["commands"]) == (["sim:atv71@2"], ["all"], False)
+    assert told["metrics"].startswith("http://127.0.0.1:")
+    assert told["mqtt"] is None
+
+
+def test_values_that_are_published() -> None:
+    url = f"mqtt://127.0.0.1:{free_port()}/plant"
+    with served([*DRIVEPANEL, "publish", *DRIVE, "--mqtt", url, "--json"], ready="{") as program:
+        (told,) = documents(program.ready)
+    assert told["mqtt"] == url
 
 
 def test_every_command_has_json() -> None:
@@ -173,6 +182,7 @@ def test_every_command_has_json() -> None:
         "run",
         "reset",
         "serve",
+        "publish",
         "simulate",
         "hold",
         "prove",

@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import socket
+from pathlib import Path
 
+import click
 import pytest
 
+from tui.cli.commands.serve import with_named
+from tui.cli.plant.wish import read_drives
+from tui.cli.running.serving import GatewayWish
 from tui.cli.shared.host_port import host_port, written_host_port
+from tui.cli.shared.served_lines import served_lines
+from tui.session.gateway.rules import GatewayRules
 
 from .commands import refused
 
@@ -24,6 +31,10 @@ from .commands import refused
         (["sim:atv71", "sim:atv31", "--tcp", ":1"], "Several lines have the same ids"),
         (["sim:atv71", "--tcp", ":1", "--map", "1=2"], "there is no line 2"),
         (["sim:atv71", "sim:atv71"], "named twice"),
+        (["sim:atv71", "-d", "1", "-p", "atv71"], "go with --tcp, --metrics and --mqtt"),
+        (["sim:atv71", "--every", "2"], "goes with --metrics and --mqtt"),
+        (["sim:atv71", "--metrics", "here"], "write HOST:PORT"),
+        (["tcp:10.0.0.1", "sim:atv71", "--metrics", ":1", "-d", "1", "-p", "atv71"], "which line"),
     ],
 )
 def test_what_makes_no_sense_is_usage(typed: list[str], told: str) -> None:
@@ -44,3 +55,72 @@ def test_a_place_without_a_host_is_loopback() -> None:
     assert host_port("[::1]:502") == ("::1", 502)
     assert host_port("0.0.0.0:502") == ("0.0.0.0", 502)
     assert written_host_port("::1", 502) == "[::1]:502"
+
+
+# Which drives are meant
+
+
+SETTINGS = """
+[lines]
+bare = "tcp:10.0.0.3"
+[lines.pump]
+line = "tcp:10.0.0.1"
+device = 2
+profile = "powerdrive"
+[lines.fan]
+line = "tcp:10.0.0.1:502"
+device = 5
+profile = "varmeca"
+[lines.belt]
+line = "tcp:10.0.0.2"
+profile = "proxidrive"
+"""
+
+
+@pytest.fixture
+def settings(tmp_path: Path) -> None:
+    file = tmp_path / "config" / "settings.toml"
+    file.parent.mkdir()
+    file.write_text(SETTINGS, "utf-8")
+
+
+@pytest.mark.usefixtures("settings")
+def test_a_name_brings_its_drive_and_the_profiles_of_its_line() -> None:
+    both = {2: "powerdrive", 5: "varmeca"}
+    (pump,) = served_lines(["pump"])
+    assert (pump.name, pump.devices, pump.profiles) == ("pump", (2,), both)
+    (pump,) = served_lines(["pump@1,2"])
+    assert (pump.devices, pump.profiles) == ((1, 2), both)
+    (pump,) = served_lines(["pump", "fan"])
+    assert (pump.devices, pump.profiles) == ((2, 5), both)
+    # the line, written out, is the same line
+    (line,) = served_lines(["tcp:10.0.0.1@7"])
+    assert (line.devices, line.profiles) == ((7,), both)
+    (belt,) = served_lines(["belt@3"])
+    assert (belt.devices, belt.profiles) == ((3,), {3: "proxidrive"})
+    assert belt.usual_profile == "proxidrive"
+
+
+@pytest.mark.usefixtures("settings")
+def test_drives_are_read_by_their_profiles() -> None:
+    (pump,) = served_lines(["pump@1,2"])
+    assert [(one.device, one.profile_id) for one in read_drives(pump, ())] == [
+        (1, None),
+        (2, "powerdrive"),
+    ]
+    (bare,) = served_lines(["bare"])
+    with pytest.raises(click.UsageError, match="Write bare@1,2"):
+        read_drives(bare, ())
+    (simulated,) = served_lines(["sim:atv71@1,atv31@4"])
+    assert [one.device for one in read_drives(simulated, (1, 4))] == [1, 4]
+
+
+@pytest.mark.usefixtures("settings")
+def test_drives_of_d_are_ids_of_the_gateway() -> None:
+    lines = served_lines(["bare", "belt"])
+    wish = GatewayWish("", 0, {101: (1, 3)}, GatewayRules())
+    found = with_named(lines, wish, (101,), "varmeca")
+    assert (found[0].devices, found[1].devices) == ((), (3,))
+    assert found[1].profiles == {3: "varmeca"}
+    with pytest.raises(click.UsageError, match="on which line"):
+        with_named(lines, None, (1,), "varmeca")

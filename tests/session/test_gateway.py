@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import struct
-from collections.abc import AsyncIterator, Callable
+from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from tui.bus.line import Line
 from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.gateway.gateway import Gateway
-from tui.session.gateway.line import GatewayLine
+from tui.session.gateway.line import NONE_NAMED, GatewayLine
 from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
 from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
@@ -83,10 +83,11 @@ async def bench(start: Start, journal: Journal) -> AsyncIterator[Make]:
     """A gateway with these rules, on an Altivar 71 at address 1 unless told otherwise."""
     gateways: list[Gateway] = []
 
-    def make(*specs: DriveSpec, **rules: object) -> Bench:
+    def make(*specs: DriveSpec, profiles: Mapping[int, str] = NONE_NAMED, **rules: object) -> Bench:
         simulation, line = start(*(specs or [DriveSpec("atv71", 1, sets={"CHCF": 1})]))
         kept = GatewayRules(**rules)  # type: ignore[arg-type]
-        gateways.append(Gateway([GatewayLine(line, journal)], unit_map(1, ()), kept))
+        gate = GatewayLine(line, journal, profiles=profiles)
+        gateways.append(Gateway([gate], unit_map(1, ()), kept))
         return Bench(simulation, line, gateways[-1], journal, TcpClient(1, "10.0.0.9:5000"))
 
     yield make
@@ -357,3 +358,34 @@ def test_ids_that_make_no_sense_are_refused(lines: int, texts: list[str]) -> Non
         unit_map(lines, texts)
     with pytest.raises(RulesError):
         allowed_codes(" , ")
+
+
+async def test_a_broadcast_reaches_nobody(bench: Make) -> None:
+    made = bench(writes=allowed_codes("all"), commands=True)
+    assert await made.read(ETA, unit=1) != 10
+    before = len(made.line.trace)
+    for word in (0, 7, 15):
+        assert await made.write(CMD, word, unit=0) == 10
+    assert await made.read(ETA, unit=0) == 10
+    assert len(made.line.trace) == before
+
+
+async def test_a_sign_of_life_is_that_of_the_client_that_commands(
+    start: Start, journal: Journal
+) -> None:
+    simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 1}))
+    gate = GatewayLine(line, journal)
+    gateway = Gateway([gate], unit_map(1, ()), GatewayRules(commands=True))
+    made = Bench(simulation, line, gateway, journal, TcpClient(1, "10.0.0.9:5000"))
+    assert gate.sign(1) is None
+    for word in (6, 7, 15):
+        assert await made.write(CMD, word) == 0
+    started = gate.sign(1)
+    assert started is not None
+    await made.gateway.answer(TcpClient(2, "10.0.0.8:1"), 1, struct.pack(">BHH", 3, ETA, 1))
+    assert gate.sign(1) == started
+    await made.read(ETA)
+    seen = gate.sign(1)
+    assert seen is not None
+    assert seen > started
+    await gateway.close()

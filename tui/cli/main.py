@@ -32,6 +32,7 @@ COMMANDS = {
     "ports": ("ports", "List the serial ports of this machine."),
     "profiles": ("profiles", "List the profiles, show one, or check a file."),
     "prove": ("prove", "Prove that a drive reacts to a silent line."),
+    "publish": ("publish", "Publish values of drives to an MQTT broker."),
     "read": ("read", "Read parameters of a drive."),
     "reference": ("single_orders", "Set a drive's reference."),
     "report": ("report", "Write a report on a drive to a file."),

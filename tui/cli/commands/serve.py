@@ -7,30 +7,26 @@ import os
 import signal
 import sys
 from contextlib import ExitStack
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
 import click
 
+from ..plant.broker import mqtt_password_option
+from ..plant.wish import PlantWish, check_names, plant_wish, read_drives
 from ..running.holding import BY_SIGNAL
 from ..running.service import Service
-from ..running.serving import GatewayWish, served_until_signal
+from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
 from ..shared.completion import complete_line, complete_profile
 from ..shared.devices import devices_option
 from ..shared.errors import told
 from ..shared.host_port import host_port
-from ..shared.line_argument import (
-    LINE_VARIABLE,
-    line_options,
-    mind_the_line,
-    named_line_of,
-)
+from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
 from ..shared.looking_after import guard_motors
-from ..shared.options import CONNECT_WITHIN, json_option
+from ..shared.options import CONNECT_WITHIN, json_option, usual_settings
 from ..shared.output import print_json
 from ..shared.say import say
-
-if TYPE_CHECKING:
-    from tui.session.connect.open_line import OpenLine
+from ..shared.served_lines import ServedLine, served_lines
 
 
 @click.command()
@@ -61,6 +57,23 @@ if TYPE_CHECKING:
     is_flag=True,
     help="Modbus TCP clients may start motors and give references, while no panel does.",
 )
+@click.option(
+    "--metrics",
+    metavar="HOST:PORT",
+    help="Serve the values of the drives for Prometheus there; loopback where no host is named.",
+)
+@click.option(
+    "--mqtt",
+    metavar="URL",
+    help="Publish the values of the drives to a broker: mqtt://[USER@]HOST[:PORT][/TOPIC], mqtts:.",
+)
+@mqtt_password_option
+@click.option(
+    "--every",
+    type=click.FloatRange(min=0.05),
+    metavar="S",
+    help="Cycle time in seconds of what goes to --metrics and --mqtt; 1 unless told otherwise.",
+)
 @devices_option("Id of a drive that does not say who it is; -p names its profile.")
 @click.option(
     "-p",
@@ -79,6 +92,10 @@ def serve(
     fresh: float,
     allow_writes: str | None,
     allow_commands: bool,
+    metrics: str | None,
+    mqtt: str | None,
+    password_file: Path | None,
+    every: float | None,
     devices: tuple[int, ...],
     profile_id: str | None,
     as_json: bool,
@@ -87,37 +104,72 @@ def serve(
 
     With --tcp programs of others reach the drives by Modbus TCP. They read; what else they may do
     is allowed by options. A word that can only stop a motor always passes.
-    """
-    texts = _written_out(lines)
-    wish = _wish(len(texts), tcp, maps, fresh, allow_writes, allow_commands, devices, profile_id)
-    service = Service()
 
-    def ready(tcp: str | None) -> str:
-        text = f"{', '.join(texts)}{'' if wish is None else f'; Modbus TCP at {tcp}, {_may(wish)}'}"
+    With --metrics and --mqtt the drives are read cycle by cycle, as by watch: those of a name of
+    the settings file, of LINE@1,2, and of -d.
+    """
+    served = served_lines(_words(lines))
+    plant = plant_wish(metrics, mqtt, password_file, every)
+    if bool(devices) != (profile_id is not None):
+        raise click.UsageError("-d names drives, -p their profile: both, or none.")
+    if tcp is None:
+        if maps or fresh or allow_writes or allow_commands:
+            raise click.UsageError(
+                "--map, --fresh, --allow-writes, --allow-commands go with --tcp."
+            )
+        if devices and plant is None:
+            raise click.UsageError("-d and -p go with --tcp, --metrics and --mqtt.")
+    wish = _wish(len(served), tcp, maps, fresh, allow_writes, allow_commands)
+    served = with_named(served, wish, devices, profile_id)
+    if plant is not None and plant.broker is not None:
+        check_names(plant.broker, [one.name for one in served])
+    service, texts = Service(), [one.text for one in served]
+
+    def ready(places: ServedAt) -> str:
+        text = ", ".join(texts) + _reached(places, wish)
         if as_json:
-            print_json(_ready_json(texts, tcp, wish), compact=True)
+            print_json(_ready_json(texts, places, wish), compact=True)
         else:
             say(f"Ready: {text}. Ctrl-C ends it.")
             sys.stdout.flush()
         return text
 
     with ExitStack() as stack:
-        opened = [_opened(stack, text) for text in texts]
-        ending = asyncio.run(served_until_signal(opened, wish, service, ready))
+        opened = [_opened(stack, one, plant) for one in served]
+        ending = asyncio.run(served_until_signal(opened, wish, plant, service, ready))
     if ending == signal.SIGTERM:
         return
     raise click.exceptions.Exit(BY_SIGNAL + ending)
 
 
-def _written_out(lines: tuple[str, ...]) -> list[str]:
-    """The lines, names resolved; that of the environment where none is typed."""
-    typed = lines or tuple(filter(None, [os.environ.get(LINE_VARIABLE)]))
-    if not typed:
+def _words(typed: tuple[str, ...]) -> tuple[str, ...]:
+    """The LINEs as they were typed, that of the environment where there is none."""
+    words = typed or tuple(filter(None, [os.environ.get(LINE_VARIABLE)]))
+    if not words:
         raise click.UsageError("Missing argument 'LINE...'.")
-    texts = [named.line if (named := named_line_of(text)) else text for text in typed]
-    if len(set(texts)) < len(texts):
-        raise click.UsageError("A line is named twice.")
-    return texts
+    return words
+
+
+def with_named(
+    served: list[ServedLine],
+    wish: GatewayWish | None,
+    devices: tuple[int, ...],
+    profile_id: str | None,
+) -> list[ServedLine]:
+    """The lines with the drives of -d: ids of the gateway, else addresses on the only line."""
+    if profile_id is None:
+        return served
+    from tui.drive.profile import library
+
+    library.load(profile_id)
+    if wish is None and len(served) > 1:
+        raise click.UsageError("-d is on which line? Write LINE@1,2, or name lines and drives.")
+    units = wish.units if wish is not None else {device: (0, device) for device in devices}
+    for number in devices:
+        if (place := units.get(number)) is not None:
+            line, device = place
+            served[line] = served[line].with_drives([device], {device: profile_id})
+    return served
 
 
 def _wish(
@@ -127,44 +179,46 @@ def _wish(
     fresh: float,
     allow_writes: str | None,
     allow_commands: bool,
-    devices: tuple[int, ...],
-    profile_id: str | None,
 ) -> GatewayWish | None:
     """The gateway that the options describe; None without --tcp."""
     if tcp is None:
-        if maps or fresh or allow_writes or allow_commands or devices or profile_id:
-            raise click.UsageError(
-                "--map, --fresh, --allow-writes, --allow-commands, -d and -p go with --tcp."
-            )
         return None
-    if bool(devices) != (profile_id is not None):
-        raise click.UsageError("-d names drives, -p their profile: both, or none.")
-    from tui.drive.profile import library
     from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
 
-    if profile_id is not None:
-        library.load(profile_id)
     host, port = host_port(tcp)
     try:
         units = unit_map(count, maps)
         writes = frozenset[str]() if allow_writes is None else allowed_codes(allow_writes)
     except RulesError as error:
         raise click.UsageError(str(error)) from error
-    profiles = dict.fromkeys(devices, profile_id or "")
-    return GatewayWish(host, port, units, GatewayRules(fresh, writes, allow_commands, profiles))
+    return GatewayWish(host, port, units, GatewayRules(fresh, writes, allow_commands))
 
 
-def _opened(stack: ExitStack, text: str) -> OpenLine:
+def _opened(stack: ExitStack, served: ServedLine, plant: PlantWish | None) -> OpenedLine:
     """A line, opened for as long as this runs."""
     from tui.session.connect.open_line import open_line
 
-    opened = open_line(text, wait=CONNECT_WITHIN, program="serve")
+    usual = usual_settings(served.usual_profile)
+    opened = open_line(served.text, wait=CONNECT_WITHIN, usual=usual, program="serve")
     stack.callback(opened.close)
     if opened.line.facts.voice is not None and opened.line.facts.others:
         say(f"drivepanel: {opened.line.state.reason}", err=True)
     guard_motors(opened)
     mind_the_line(opened)
-    return opened
+    drives = read_drives(served, opened.devices) if plant is not None else []
+    return OpenedLine(served.name, opened, served.profiles, drives)
+
+
+def _reached(places: ServedAt, wish: GatewayWish | None) -> str:
+    """Where what is served can be reached, in a few words."""
+    parts = [""]
+    if wish is not None:
+        parts.append(f"Modbus TCP at {places.tcp}, {_may(wish)}")
+    if places.metrics is not None:
+        parts.append(f"metrics at {places.metrics}")
+    if places.mqtt is not None:
+        parts.append(f"values to {places.mqtt}")
+    return "; ".join(parts)
 
 
 def _may(wish: GatewayWish) -> str:
@@ -177,11 +231,13 @@ def _may(wish: GatewayWish) -> str:
     return " and ".join([", ".join(may[:-1]), may[-1]]) if may[1:] else "reads only"
 
 
-def _ready_json(texts: list[str], tcp: str | None, wish: GatewayWish | None) -> dict[str, Any]:
+def _ready_json(texts: list[str], places: ServedAt, wish: GatewayWish | None) -> dict[str, Any]:
     return {
         "event": "ready",
         "lines": texts,
-        "tcp": tcp,
+        "tcp": places.tcp,
+        "metrics": places.metrics,
+        "mqtt": places.mqtt,
         "writes": [] if wish is None else sorted(wish.rules.writes),
         "commands": wish is not None and wish.rules.commands,
     }

@@ -40,6 +40,7 @@ from .of_others import (
     ProfileFolder,
     ProfileShown,
     ProfileTold,
+    PublishReady,
     ServeReady,
     SimulationReady,
     WiringTold,
@@ -65,6 +66,7 @@ DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
     ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,
     ServeReady,
+    PublishReady,
     JournalTold, LinesTold, HeardExchangeTold, HeardSummaryTold, WhyTold, CountersTold,
 )  # fmt: skip
 """Every document; a list of them is printed for ports, profiles, checks and several drives."""

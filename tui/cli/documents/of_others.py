@@ -125,14 +125,27 @@ class SimulationReady(DocumentTold, kw_only=True):
 
 
 class ServeReady(DocumentTold, kw_only=True):
-    """`serve`: the lines are open; `tcp` is the LINE by which others reach them, null without."""
+    """`serve`: the lines are open; `tcp` is the LINE by which others reach them, null without.
+
+    `metrics` is the URL of the metrics, `mqtt` that of the broker with the topic.
+    """
 
     command: Literal["serve"]
     event: Literal["ready"]
     lines: list[str]
     tcp: str | None
+    metrics: str | None
+    mqtt: str | None
     writes: list[str]
     commands: bool
+
+
+class PublishReady(DocumentTold, kw_only=True):
+    """`publish`: publishing has begun; `mqtt` is the URL of the broker with the topic."""
+
+    command: Literal["publish"]
+    event: Literal["ready"]
+    mqtt: str
 
 
 class InputsTold(DocumentTold, kw_only=True):

@@ -1,18 +1,21 @@
-"""Serving lines, and a gateway to them, until a signal ends it."""
+"""Serving lines, a gateway to them and their values for the plant, until a signal ends it."""
 
 from __future__ import annotations
 
 import asyncio
-import ipaddress
 import signal
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from collections.abc import AsyncIterator, Callable, Mapping, Sequence
+from contextlib import AsyncExitStack, asynccontextmanager
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from ..commands.orders import close_journal, told_journal
+from ..plant.wish import PlantWish, is_loopback
 from ..shared.errors import LINE_TROUBLE, Failure
 from ..shared.host_port import written_host_port
+from ..shared.left_alone import say_farewells
 from ..shared.line_argument import mind_the_drive
+from ..shared.options import Target
 from ..shared.say import say
 from .ending import Ending
 from .line_pulse import LinePulse
@@ -22,6 +25,7 @@ if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity
     from tui.session.connect.open_line import OpenLine
     from tui.session.gateway.drives import Note
+    from tui.session.gateway.line import GatewayLine
     from tui.session.gateway.rules import GatewayRules
     from tui.session.journal import Journal
 
@@ -36,45 +40,118 @@ class GatewayWish:
     rules: GatewayRules
 
 
-Ready = Callable[[str | None], str]
-"""Says that all is served, with the LINE of the gateway; gives it in one line for systemd."""
+@dataclass(frozen=True, slots=True)
+class OpenedLine:
+    """A line that is served, with what is told of its drives."""
+
+    name: str
+    opened: OpenLine
+    profiles: Mapping[int, str]
+    """By device, those that a person has named."""
+    drives: Sequence[Target] = ()
+    """Those that are read for the plant."""
+
+
+@dataclass(frozen=True, slots=True)
+class ServedAt:
+    """Where what is served can be reached; None for what is not."""
+
+    tcp: str | None = None
+    metrics: str | None = None
+    mqtt: str | None = None
+
+
+Ready = Callable[[ServedAt], str]
+"""Says that all is served, and where; gives it in one line for systemd."""
 
 
 async def served_until_signal(
-    opened: list[OpenLine], wish: GatewayWish | None, service: Service, ready: Ready
+    lines: Sequence[OpenedLine],
+    gateway: GatewayWish | None,
+    plant: PlantWish | None,
+    service: Service,
+    ready: Ready,
 ) -> int:
     """Serve until a signal comes; its number."""
     ending, journal = Ending(), told_journal()
-    pulses = [LinePulse(one.line) for one in opened]
+    pulses = [LinePulse(one.opened.line) for one in lines]
     with ending.by_signals():
         watch = asyncio.create_task(service.watch(lambda: all(one.alive for one in pulses)))
         try:
-            await _gateway(opened, wish, journal, service, ending, ready)
+            async with AsyncExitStack() as stack:
+                places = await _served(stack, lines, gateway, plant, journal)
+                service.ready(ready(places))
+                await ending.event.wait()
+                service.stopping()
         finally:
             watch.cancel()
     await asyncio.to_thread(close_journal, journal)
     return int(signal.Signals[ending.why.removeprefix("ended by ")])
 
 
-async def _gateway(
-    opened: list[OpenLine],
+async def _served(
+    stack: AsyncExitStack,
+    lines: Sequence[OpenedLine],
     wish: GatewayWish | None,
+    plant: PlantWish | None,
     journal: Journal,
-    service: Service,
-    ending: Ending,
-    ready: Ready,
-) -> None:
-    if wish is None:
-        service.ready(ready(None))
-        await ending.event.wait()
-        service.stopping()
-        return
+) -> ServedAt:
+    """Begin all that is wanted; it ends with the stack, the gateway last."""
+    gates: Sequence[GatewayLine] = ()
+    places = ServedAt()
+    for one in lines:
+        stack.push_async_callback(say_farewells, one.opened)
+    if wish is not None:
+        gates, places = await stack.enter_async_context(_gateway(lines, wish, journal))
+    if plant is not None:
+        places = await _published(stack, lines, plant, gates, places)
+    return places
+
+
+async def _published(
+    stack: AsyncExitStack,
+    lines: Sequence[OpenedLine],
+    plant: PlantWish,
+    gates: Sequence[GatewayLine],
+    places: ServedAt,
+) -> ServedAt:
+    """Read the drives, and hand their values out."""
+    from ..plant.drives import PlantDrive, PlantLine, Sign, no_sign
+    from ..plant.publishing import Changes, metrics_at, published_to, reading
+
+    changes = Changes()
+    signs: list[Sign] = [gate.sign for gate in gates] or [no_sign for _ in lines]
+    read = [
+        PlantLine(
+            one.name,
+            one.opened,
+            tuple(PlantDrive(one.opened, t, (), plant.every, changes, sign) for t in one.drives),
+        )
+        for one, sign in zip(lines, signs, strict=True)
+    ]
+    if plant.metrics is not None:
+        at = await stack.enter_async_context(metrics_at(read, *plant.metrics))
+        places = replace(places, metrics=at)
+    if plant.broker is not None:
+        at = await stack.enter_async_context(published_to(read, plant.broker, changes))
+        places = replace(places, mqtt=at)
+    await stack.enter_async_context(reading(read))
+    return places
+
+
+@asynccontextmanager
+async def _gateway(
+    lines: Sequence[OpenedLine], wish: GatewayWish, journal: Journal
+) -> AsyncIterator[tuple[Sequence[GatewayLine], ServedAt]]:
+    """While inside, Modbus TCP is served; its lines, and where it is."""
     from tui.bus.gateway.server import TcpGateway
     from tui.session.gateway.gateway import Gateway
     from tui.session.gateway.line import GatewayLine
 
-    lines = [GatewayLine(one.line, journal, _noting(one)) for one in opened]
-    gateway = Gateway(lines, wish.units, wish.rules)
+    gates = [
+        GatewayLine(one.opened.line, journal, _noting(one.opened), one.profiles) for one in lines
+    ]
+    gateway = Gateway(gates, wish.units, wish.rules)
     server = TcpGateway(gateway.answer, gateway.gone)
     try:
         try:
@@ -84,10 +161,8 @@ async def _gateway(
             why = error.strerror or str(error)
             raise Failure(f"Nothing can be served at {place}: {why}.", LINE_TROUBLE) from error
         _warn(wish, host, port)
-        service.ready(ready(f"tcp:{written_host_port(host, port)}"))
-        await ending.event.wait()
+        yield gates, ServedAt(tcp=f"tcp:{written_host_port(host, port)}")
     finally:
-        service.stopping()
         await server.close()
         for told in await gateway.close():
             say(f"drivepanel: {told.head if told.failed else 'Stopped:'} {told.text}", err=True)
@@ -102,7 +177,7 @@ def _noting(opened: OpenLine) -> Note:
 
 def _warn(wish: GatewayWish, host: str, port: int) -> None:
     """Say what it means to listen where other computers reach it."""
-    if _is_loopback(host):
+    if is_loopback(host):
         return
     more = ", and may do what the options allow" if _allows(wish.rules) else ""
     say(
@@ -115,10 +190,3 @@ def _warn(wish: GatewayWish, host: str, port: int) -> None:
 
 def _allows(rules: GatewayRules) -> bool:
     return bool(rules.writes) or rules.commands
-
-
-def _is_loopback(host: str) -> bool:
-    try:
-        return ipaddress.ip_address(host).is_loopback
-    except ValueError:
-        return host == "localhost"

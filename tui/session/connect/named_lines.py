@@ -132,6 +132,17 @@ def profile_named(line_key_of: str, device: int) -> str | None:
     return None
 
 
+def profiles_of_line(line_key_of: str) -> dict[int, str]:
+    """By device, the profiles that the settings give drives of a line, by the line's key."""
+    from .line_key import line_key
+
+    return {
+        one.device: one.profile
+        for one in named_lines().values()
+        if one.profile and one.device is not None and line_key(one.line) == line_key_of
+    }
+
+
 @lru_cache(maxsize=2)
 def _read(path: Path, _stamp: tuple[int, int, int]) -> LineSettings:
     try:

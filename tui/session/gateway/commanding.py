@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import math
 import threading
+import time
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
 from typing import Any
@@ -43,6 +45,8 @@ class GatewayCommanding:
         """The client that commands, by device."""
         self._stopped: dict[int, str] = {}
         """Devices that were stopped from elsewhere since a client's last stop: by whom."""
+        self._signs: dict[int, float] = {}
+        """When the client that commands was last heard, by device (monotonic)."""
         facts = line.facts
         self._leave = (
             facts.on_stop(self._stopped_elsewhere),
@@ -69,11 +73,23 @@ class GatewayCommanding:
             return why
         with self._lock:
             before, self._by[device] = self._by.get(device), client
+            self._signs[device] = time.monotonic()
         if before not in (None, client):
             text = f"Modbus TCP client {client} commands this drive now, as client {before} did."
             log.warning("drive %s: %s", device, text)
             self._line.facts.tell_all(device, text)
         return ""
+
+    def heard(self, device: int, client: str) -> None:
+        """A client asks for a drive: a sign of life, if it is the one that commands it."""
+        with self._lock:
+            if self._by.get(device) == client:
+                self._signs[device] = time.monotonic()
+
+    def last_sign(self, device: int) -> float:
+        """When a client that commands the drive was last heard (monotonic); never is -inf."""
+        with self._lock:
+            return self._signs.get(device, -math.inf)
 
     def stop(self, device: int, client: str) -> None:
         """A client stops a drive: what was meant for it before is void, and nobody commands it."""

@@ -37,9 +37,9 @@ Note = Callable[[int, DriveIdentity | None, str], None]
 class GatewayDrives:
     """The drives of one line, for one loop; a line that was lost may have others afterwards."""
 
-    def __init__(self, line: ModbusLine, note: Note = lambda *_: None) -> None:
+    def __init__(self, line: ModbusLine, note: Note, named: Mapping[int, str]) -> None:
         self.line = line
-        self.named: dict[int, str] = {}
+        self._named = named
         """Profiles that a person has named, by device."""
         self._note = note
         self._found: dict[int, DriveSession | None] = {}
@@ -119,7 +119,7 @@ class GatewayDrives:
             log.info("who device %s is was not found out: %s", device, error)
 
     async def _identify(self, device: int) -> DriveSession | None:
-        named = self.named.get(device)
+        named = self._named.get(device)
         identity: DriveIdentity | None
         if named is not None:
             identity = await own_words(self.line, device, library.load(named))

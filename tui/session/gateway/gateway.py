@@ -57,9 +57,6 @@ class Gateway:
         self._lines = lines
         self._units = units
         self._rules = rules
-        for unit, profile in rules.profiles.items():
-            if (place := units.get(unit)) is not None:
-                lines[place[0]].drives.named[place[1]] = profile
 
     async def close(self) -> list[StopSummary]:
         """Leave all lines alone; what became of the motors that had to be stopped."""
@@ -77,6 +74,7 @@ class Gateway:
         if place is None:
             return exception_pdu(function, NO_PATH)
         line, device = self._lines[place[0]], place[1]
+        line.commanding.heard(device, client.peer)
         try:
             return await self._answer(line, device, client, gateway_asked(pdu))
         except Unanswerable as refused:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
+
 from tui.bus.api import ModbusLine
 from tui.bus.errors import LineError
 from tui.drive.chart import read_chart
@@ -13,16 +16,23 @@ from .commanding import GatewayCommanding
 from .drives import GatewayDrives, Note
 from .started import StartedMotors
 
+NONE_NAMED: Mapping[int, str] = MappingProxyType({})
 STANDING_STILL = ("stopped", "ready", "blocked")
 
 
 class GatewayLine:
     """One line of a gateway: its drives, and who commands them."""
 
-    def __init__(self, line: ModbusLine, journal: Journal, note: Note = lambda *_: None) -> None:
+    def __init__(
+        self,
+        line: ModbusLine,
+        journal: Journal,
+        note: Note = lambda *_: None,
+        profiles: Mapping[int, str] = NONE_NAMED,
+    ) -> None:
         self.line = line
         self.journal = journal
-        self.drives = GatewayDrives(line, note)
+        self.drives = GatewayDrives(line, note, profiles)
         self.started = StartedMotors(line, journal)
         self.commanding = GatewayCommanding(line, self._stands, self.started)
 
@@ -32,6 +42,13 @@ class GatewayLine:
         self.commanding.close()
         self.drives.close()
         return summary
+
+    def sign(self, device: int) -> float | None:
+        """When the client that started a motor was last heard (monotonic); None for no such motor.
+
+        For any thread.
+        """
+        return self.commanding.last_sign(device) if self.started.holds(device) else None
 
     async def _stands(self, device: int) -> bool:
         """Whether a motor surely stands now, asked for another program that wants the drive."""

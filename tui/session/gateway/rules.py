@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from tui.drive.errors import DriveError
 from tui.drive.foreign_write import ALL
@@ -27,8 +27,6 @@ class GatewayRules:
     """Codes of settings that may be written, or `ALL`."""
     commands: bool = False
     """Whether command words and references may be written."""
-    profiles: Mapping[int, str] = field(default_factory=dict)
-    """Profiles that a person has named, by unit id."""
 
 
 def allowed_codes(text: str) -> frozenset[str]:

@@ -44,6 +44,10 @@ class StartedMotors:
         self._loop = asyncio.get_running_loop()
         self._leave = line.facts.on_stop(lambda devices, *_: self.stopped(*devices))
 
+    def holds(self, device: int) -> bool:
+        """Whether a motor that a client has started is not yet known to stand. For any thread."""
+        return self._keeper.holds(device)
+
     async def begin(self, session: DriveSession, order: StartDirection) -> bool:
         """Put a start on record, before its frame; False where it is already.
 

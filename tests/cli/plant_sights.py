@@ -1,0 +1,87 @@
+"""Lines and drives as the plant is told of them, without a wire."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from decimal import Decimal
+
+from tests.session.fakes import OneDrive, parameter, profile_of
+from tui.bus.model import DeviceCounters, LineCounters, LineState, LineStatus
+from tui.cli.plant.sights import DriveSight, LineSight, drive_sight
+from tui.drive.profile.profile import Profile
+from tui.drive.values import decode
+from tui.session.drive import DriveSession
+from tui.session.drive_state import drive_state
+from tui.session.monitor.snapshot import Snapshot
+from tui.session.reading import Quality, Reading
+
+NOW = 1000.0
+WALL = 1_700_000_000.0
+CONNECTED = LineState(LineStatus.CONNECTED, "", 0.0)
+
+CHART = {
+    "id": "drivecom",
+    "name": "Drivecom",
+    "kind": "drivecom",
+    "status": "ETA",
+    "states": [
+        {"id": "enabled", "name": "Enabled", "kind": "running", "mask": 0x6F, "value": 0x27},
+        {"id": "fault", "name": "Fault", "kind": "fault", "mask": 0x4F, "value": 0x08},
+    ],
+}
+
+
+def small_drive() -> Profile:
+    """A profile with a value of several units, a word and faults."""
+    return profile_of(
+        parameter("ETA", 3201, bits=[{"bit": 7, "name": "warning", "alarm": True}]),
+        parameter("RFR", 3202, scale="0.1", unit="Hz", quantity="output_frequency"),
+        parameter("THD", 3203, unit="%"),
+        parameter("LFT", 7121),
+        charts=[CHART],
+        faults={
+            "parameter": "LFT",
+            "shows_last": True,
+            "codes": [{"raw": 18, "code": "ObF", "name": 'Over"braking\\'}],
+        },
+    )
+
+
+def cycle(profile: Profile, *, quality: Quality = Quality.GOOD, **raws: int) -> Snapshot:
+    """A cycle that has ended half a second ago."""
+    readings = {
+        code: Reading(
+            p, raw, decode(p, raw, profile.names(p), Decimal(p.scale)), quality, NOW - 0.5
+        )
+        for code, raw in raws.items()
+        if (p := profile[code])
+    }
+    state = drive_state(profile, readings)
+    return Snapshot(1, NOW - 0.5, WALL, readings, state, 1.0, "", CONNECTED)
+
+
+def line_of(
+    *drives: DriveSight, name: str = "pump", counters: LineCounters | None = None
+) -> LineSight:
+    """A line with these drives."""
+    return LineSight(name, "tcp:10.0.0.1:502", CONNECTED, counters or LineCounters(), drives)
+
+
+def drive_of(seen: Snapshot, profile: Profile | None = None, now: float = NOW) -> DriveSight:
+    """Drive 2 by this cycle."""
+    session = DriveSession(OneDrive({}, device=2), 2, profile or small_drive())
+    return drive_sight(2, session, seen, now)
+
+
+def failed(seen: Snapshot, error: str) -> Snapshot:
+    """The values of before, as a cycle that failed has them."""
+    readings = {c: replace(r, quality=Quality.STALE) for c, r in seen.readings.items()}
+    state = drive_state(small_drive(), readings)
+    return replace(seen, readings=readings, state=state, error=error)
+
+
+def counted(turnarounds: Sequence[int]) -> LineCounters:
+    """Counters with those of drive 2."""
+    own = DeviceCounters(requests=9, replies=7, exceptions={2: 3}, turnarounds=tuple(turnarounds))
+    return LineCounters(requests=9, replies=7, timeouts=2, devices={2: own})

@@ -1,0 +1,167 @@
+"""Lines and drives in the text format of Prometheus, and the server that tells them."""
+
+from __future__ import annotations
+
+import asyncio
+import re
+from collections.abc import AsyncIterator
+from decimal import Decimal
+from pathlib import Path
+
+import pytest
+import pytest_asyncio
+
+from tui.cli.plant.metrics import BASE_UNITS, METRICS, metrics_text, value_metric
+from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
+from tui.cli.plant.sights import DriveSight, LineSight
+from tui.drive.profile import library
+
+from .plant_sights import NOW, counted, cycle, drive_of, failed, line_of, small_drive
+
+SAMPLE = re.compile(r'drivepanel_[a-z_]+\{([a-z]+="([^"\\]|\\[\\"n])*",?)*\} \S+')
+WHERE = 'line="pump",device="2"'
+
+
+def text_of(*lines: LineSight) -> str:
+    return metrics_text(lines, "1.0", NOW)
+
+
+def samples(*lines: LineSight) -> set[str]:
+    return {line for line in text_of(*lines).splitlines() if not line.startswith("#")}
+
+
+def test_values_stand_in_base_units_with_the_unit_in_the_name() -> None:
+    seen = samples(line_of(drive_of(cycle(small_drive(), ETA=0x27, RFR=499, THD=50))))
+    who = f'{WHERE},code="RFR",quantity="output_frequency"'
+    assert f"drivepanel_value_hertz{{{who}}} 49.9" in seen
+    assert f'drivepanel_value_ratio{{{WHERE},code="THD"}} 0.5' in seen
+    assert f'drivepanel_word{{{WHERE},code="ETA"}} 39' in seen
+    assert f"drivepanel_value_good{{{who}}} 1" in seen
+    assert f"drivepanel_value_age_seconds{{{who}}} 0.5" in seen
+    assert f'drivepanel_drive_state{{{WHERE},state="running"}} 1' in seen
+    assert f'drivepanel_drive_state{{{WHERE},state="fault"}} 0' in seen
+    assert f"drivepanel_drive_up{{{WHERE}}} 1" in seen
+
+
+@pytest.mark.parametrize("why", ["a failed cycle", "no cycle for long"])
+def test_what_is_not_good_has_no_value(why: str) -> None:
+    good = cycle(small_drive(), ETA=0x27, RFR=499)
+    if why == "a failed cycle":
+        drive = drive_of(failed(good, "No answer."))
+    else:
+        drive = drive_of(good, now=NOW + 60)
+        assert "not asked for 60 s" in drive.error
+    seen = text_of(line_of(drive))
+    assert "drivepanel_value_hertz" not in seen
+    assert "drivepanel_word" not in seen
+    assert "drivepanel_drive_state" not in seen
+    assert f'drivepanel_value_good{{{WHERE},code="ETA"}} 0' in seen
+    assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen
+    assert f'drivepanel_value_age_seconds{{{WHERE},code="ETA"}} 0.5' in seen
+
+
+def test_a_fault_is_told_by_its_code_and_its_name_is_escaped() -> None:
+    seen = samples(line_of(drive_of(cycle(small_drive(), ETA=0x88, LFT=18))))
+    told = f'drivepanel_drive_fault_info{{{WHERE},fault="ObF",name="Over\\"braking\\\\"}} 1'
+    assert told in seen
+    assert f"drivepanel_drive_alarm{{{WHERE}}} 1" in seen
+    past = text_of(line_of(drive_of(cycle(small_drive(), ETA=0x27, LFT=18))))
+    assert "fault_info" not in past
+
+
+def test_line_quality_and_turnarounds_add_up() -> None:
+    counters = counted([4, 2, 0, 0, 0, 0, 0, 0, 0, 1])
+    seen = samples(line_of(drive_of(cycle(small_drive(), ETA=0x27)), counters=counters))
+    assert 'drivepanel_line_timeouts_total{line="pump"} 2' in seen
+    assert f'drivepanel_drive_exceptions_total{{{WHERE},exception="02"}} 3' in seen
+    bucket = "drivepanel_drive_turnaround_seconds_bucket"
+    assert f'{bucket}{{{WHERE},le="0.002"}} 4' in seen
+    assert f'{bucket}{{{WHERE},le="1.0"}} 6' in seen
+    assert f'{bucket}{{{WHERE},le="+Inf"}} 7' in seen
+    assert f"drivepanel_drive_turnaround_seconds_count{{{WHERE}}} 7" in seen
+
+
+def test_a_drive_that_was_never_found_is_down_and_nothing_else() -> None:
+    seen = samples(line_of(DriveSight(2, error="Nobody answers.")))
+    assert f"drivepanel_drive_up{{{WHERE}}} 0" in seen
+    assert not [one for one in seen if "value" in one or "info{line" in one]
+
+
+def test_every_line_has_the_form_and_every_metric_its_type_once() -> None:
+    drive = drive_of(cycle(small_drive(), ETA=0x88, RFR=1, THD=2, LFT=18))
+    text = text_of(line_of(drive, counters=counted([1] * 10)), line_of(drive, name='a"b\\c\nd'))
+    assert text.endswith("\n")
+    types = []
+    for line in text.splitlines():
+        if line.startswith("# TYPE "):
+            types.append(line.split()[2])
+        elif not line.startswith("# HELP "):
+            assert SAMPLE.fullmatch(line), line
+            assert line.startswith(types[-1]), "samples of one metric stand together"
+    assert len(types) == len(set(types))
+
+
+def test_every_unit_of_every_profile_makes_a_name() -> None:
+    units = {p.unit for one in library.listings() for p in library.load(one.id).parameters}
+    for unit in units:
+        name, factor = value_metric(unit)
+        assert re.fullmatch(r"[a-z][a-z_0-9]*", name)
+        assert unit in BASE_UNITS or unit == "", f"{unit}: {name}, {factor}"
+    assert value_metric("l/min") == ("value_l_min", Decimal(1))
+    assert value_metric("µ") == ("value_other", Decimal(1))
+    assert value_metric("kHz") == ("value_hertz", Decimal(1000))
+
+
+def test_the_documented_metrics_are_those_that_are_told() -> None:
+    page = (Path(__file__).parents[2] / "docs" / "plant.md").read_text("utf-8")
+    for name in METRICS:
+        assert f"`drivepanel_{name}`" in page, name
+
+
+# The server
+
+
+@pytest_asyncio.fixture
+async def served() -> AsyncIterator[int]:
+    """The port of a server that tells one metric."""
+    server = MetricsServer(lambda: "drivepanel_x 1\n")
+    _, port = await server.listen("127.0.0.1", 0)
+    yield port
+    await server.close()
+
+
+async def asked(port: int, request: bytes) -> bytes:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    writer.write(request)
+    try:
+        return await reader.read()
+    except ConnectionResetError:
+        # it was let go with bytes of its request unread
+        return b""
+    finally:
+        writer.close()
+
+
+async def test_metrics_are_told_and_nothing_else(served: int) -> None:
+    answer = await asked(served, b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n")
+    head, _, body = answer.partition(b"\r\n\r\n")
+    assert head.startswith(b"HTTP/1.1 200 OK\r\nContent-Type: text/plain; version=0.0.4;")
+    assert body == b"drivepanel_x 1\n"
+    assert (await asked(served, b"GET /metrics?a=1 HTTP/1.0\r\n\r\n")).startswith(b"HTTP/1.1 200")
+    head_only = await asked(served, b"HEAD /metrics HTTP/1.1\r\n\r\n")
+    assert head_only.endswith(b"Content-Length: 15\r\nConnection: close\r\n\r\n")
+    assert (await asked(served, b"GET / HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 404")
+    assert (await asked(served, b"POST /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 405")
+    assert (await asked(served, b"\x16\x03\r\n\r\n")).startswith(b"HTTP/1.1 405")
+
+
+async def test_a_client_that_asks_too_much_is_let_go(served: int) -> None:
+    assert await asked(served, b"GET /" + b"x" * 2 * LONGEST_REQUEST) == b""
+    assert (await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")
+
+
+async def test_clients_are_counted(served: int) -> None:
+    idle = [await asyncio.open_connection("127.0.0.1", served) for _ in range(MOST_SCRAPES)]
+    assert await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n") == b""
+    for _, writer in idle:
+        writer.close()

@@ -1,0 +1,99 @@
+"""`drivepanel publish`: values of drives to an MQTT broker, cycle after cycle."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from ..plant.broker import Broker, broker_of, mqtt_password_option
+from ..plant.wish import check_names
+from ..shared.completion import complete_line_or_code
+from ..shared.errors import told
+from ..shared.options import Target, drives_options, json_option
+from ..shared.output import print_json
+from ..shared.say import say
+from ..shared.several_lines import LineWish, further_lines, lines_argument, lines_wished, on_lines
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+
+
+@click.command()
+@lines_argument
+@click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
+@drives_options
+@click.option(
+    "--mqtt",
+    "url",
+    required=True,
+    metavar="URL",
+    help="The broker: mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS.",
+)
+@mqtt_password_option
+@click.option(
+    "--every",
+    type=click.FloatRange(min=0.05),
+    default=1.0,
+    show_default=True,
+    metavar="S",
+    help="Target cycle time in seconds.",
+)
+@json_option
+@told
+def publish(
+    target: Target,
+    codes: tuple[str, ...],
+    url: str,
+    password_file: Path | None,
+    every: float,
+    as_json: bool,
+) -> None:
+    """Publish parameters of drives to an MQTT broker, by default their monitoring set.
+
+    Lines, drives and codes are named as for watch; Ctrl-C ends it. Each cycle of a drive is one
+    retained message. A drive or a broker that is not there is tried on. Nothing that comes from
+    the broker is read, so nothing is written for it.
+    """
+    more, codes = further_lines(codes)
+    wishes = lines_wished(target, more)
+    broker = broker_of(url, password_file)
+    check_names(broker, [one.name for one in wishes])
+
+    async def work(opened: Sequence[OpenLine]) -> None:
+        await _published(wishes, opened, codes, broker, every, as_json=as_json)
+
+    on_lines(wishes, work, read_only=False)
+
+
+async def _published(
+    wishes: Sequence[LineWish],
+    opened: Sequence[OpenLine],
+    codes: Sequence[str],
+    broker: Broker,
+    every: float,
+    *,
+    as_json: bool,
+) -> None:
+    """Publish until this is cancelled."""
+    from ..plant.drives import PlantDrive, PlantLine
+    from ..plant.publishing import Changes, published_to, reading
+
+    changes = Changes()
+    lines = [
+        PlantLine(
+            wish.name,
+            line,
+            tuple(PlantDrive(line, one, codes, every, changes) for one in wish.on(line)),
+        )
+        for wish, line in zip(wishes, opened, strict=True)
+    ]
+    async with published_to(lines, broker, changes) as place, reading(lines):
+        if as_json:
+            print_json({"event": "ready", "mqtt": place}, compact=True)
+        else:
+            say(f"Ready: values to {place}. Ctrl-C ends it.")
+        await asyncio.Event().wait()

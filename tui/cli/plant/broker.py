@@ -1,0 +1,113 @@
+"""Which broker is meant, and by which password: what a person says of MQTT."""
+
+from __future__ import annotations
+
+import os
+import re
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, NamedTuple
+from urllib.parse import unquote, urlsplit
+
+import click
+
+from ..shared.errors import USAGE, Failure
+
+PASSWORD_SETTING = "DRIVEPANEL_MQTT_PASSWORD"
+"""Environment variable: the password for the broker."""
+PORTS = {"mqtt": 1883, "mqtts": 8883}
+SHAPE = "write mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS"
+NO_LEVEL = re.compile(r"[/+#\s\x00-\x1f\x7f]+")
+"""What has a meaning of its own in a topic, or none."""
+
+
+class Broker(NamedTuple):
+    """A broker, and the topic under which everything goes out."""
+
+    host: str
+    port: int
+    tls: bool
+    user: str | None
+    password: str | None
+    root: str
+
+    @property
+    def place(self) -> str:
+        """Scheme, host and port, for a person."""
+        host = f"[{self.host}]" if ":" in self.host else self.host
+        return f"{'mqtts' if self.tls else 'mqtt'}://{host}:{self.port}"
+
+
+mqtt_password_option = click.option(
+    "--mqtt-password-file",
+    "password_file",
+    type=click.Path(exists=True, dir_okay=False, path_type=Path),
+    metavar="FILE",
+    help=f"The password for the broker, on the first line; else that of {PASSWORD_SETTING}.",
+)
+
+
+def broker_of(url: str, password_file: Path | None) -> Broker:
+    """The broker of a URL. Raises UsageError, and Failure where MQTT is not installed.
+
+    A password in it is refused: every user of the computer sees what is typed.
+    """
+    try:
+        parts = urlsplit(url)
+        port = parts.port
+    except ValueError as error:
+        raise click.UsageError(f"{url!r}: {error}; {SHAPE}.") from error
+    if parts.password is not None:
+        raise click.UsageError(
+            "A password in the URL is seen by every user of this computer: put it into a file"
+            f" (--mqtt-password-file) or into {PASSWORD_SETTING}."
+        )
+    if parts.scheme not in PORTS or not parts.hostname or parts.query or parts.fragment:
+        raise click.UsageError(f"{url!r}: {SHAPE}.")
+    user = unquote(parts.username) if parts.username else None
+    password = _password(password_file)
+    if password is not None and user is None:
+        if password_file is not None:
+            raise click.UsageError("A password goes with a user: mqtt://USER@HOST.")
+        password = None
+    need_mqtt()
+    host, tls = parts.hostname, parts.scheme == "mqtts"
+    return Broker(host, port or PORTS[parts.scheme], tls, user, password, _root(parts.path))
+
+
+def _password(file: Path | None) -> str | None:
+    from tui.drive.small_file import read_small_text
+
+    if file is None:
+        return os.environ.get(PASSWORD_SETTING) or None
+    try:
+        return read_small_text(file).partition("\n")[0].rstrip("\r")
+    except (OSError, UnicodeDecodeError) as error:
+        raise click.UsageError(f"{file}: the password cannot be read: {error}.") from error
+
+
+def _root(path: str) -> str:
+    """The topic of a URL; this computer's where none is named. Raises UsageError."""
+    root = unquote(path).strip("/")
+    if not root:
+        return f"drivepanel/{level(socket.gethostname())}"
+    if any(not part or NO_LEVEL.search(part) for part in root.split("/")) or root.startswith("$"):
+        raise click.UsageError(f"{root!r} can be no topic: no +, #, spaces, nor $ in front.")
+    return root
+
+
+def level(text: str) -> str:
+    """A text as one level of a topic."""
+    return NO_LEVEL.sub("_", text).strip("_") or "_"
+
+
+def need_mqtt(load: Callable[[str], Any] = __import__) -> None:
+    """Raise Failure with what to do where the package for MQTT is not installed."""
+    try:
+        load("aiomqtt")
+    except ImportError as error:
+        raise Failure(
+            "MQTT needs the package aiomqtt, which is not here: pip install 'drivepanel[mqtt]'.",
+            USAGE,
+        ) from error

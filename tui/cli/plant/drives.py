@@ -1,0 +1,202 @@
+"""The drives whose values go out to the plant: found, read cycle by cycle, found anew when lost."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
+from typing import TYPE_CHECKING
+
+from ..shared.cycles import Cycles
+from ..shared.errors import failure_of
+from ..shared.options import Target, connect_drive
+from ..shared.say import say
+from .sights import DriveSight, LineSight, drive_sight
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+    from tui.session.drive import DriveSession
+    from tui.session.monitor.snapshot import Snapshot
+
+log = logging.getLogger(__name__)
+
+FIND_AGAIN = 3.0
+"""Seconds between two looks for drives that are not there, one after the other on each line."""
+SILENT_FOR_LONG = 60.0
+"""Seconds without a good cycle after which it is asked anew who the drive is."""
+PLANT_LOOK_INTERVAL = 2.0
+TIMEOUT_READ_AGAIN = 20.0
+"""Seconds after which a drive's communication time-out is read anew."""
+
+Sign = Callable[[int], float | None]
+"""When whoever started the motor of a device was last heard; None where nobody is known to have."""
+
+
+def no_sign(_device: int) -> float | None:
+    """Nobody is known to have started a motor."""
+    return None
+
+
+@dataclass(frozen=True, slots=True)
+class PlantLine:
+    """A line with the drives on it that are read for the plant."""
+
+    name: str
+    opened: OpenLine
+    drives: tuple[PlantDrive, ...]
+
+    def sight(self, now: float) -> LineSight:
+        """What is known of it; `now` is on the monotonic clock."""
+        line = self.opened.line
+        drives = tuple(one.sight(now) for one in self.drives)
+        return LineSight(self.name, self.opened.text, line.state, line.counters, drives)
+
+    async def run(self) -> None:
+        """Read its drives until this is cancelled."""
+        finding = asyncio.Lock()
+        async with asyncio.TaskGroup() as tasks:
+            for one in self.drives:
+                tasks.create_task(one.run(finding), name=f"plant {one.device}")
+
+
+class PlantDrive:
+    """One drive, from before it answers; lives in one loop."""
+
+    def __init__(
+        self,
+        opened: OpenLine,
+        target: Target,
+        codes: Sequence[str],
+        every: float,
+        changed: Callable[[], None],
+        sign: Sign = no_sign,
+    ) -> None:
+        self.device = target.device
+        self._opened = opened
+        self._target = target
+        self._codes = codes
+        self._every = every
+        self._changed = changed
+        self._sign = sign
+        self._session: DriveSession | None = None
+        self._cycle: Snapshot | None = None
+        self._error = f"Device {self.device} was not asked yet."
+        self._good = 0.0
+
+    def sight(self, now: float) -> DriveSight:
+        """What is known of it; `now` is on the monotonic clock."""
+        if self._cycle is None:
+            return DriveSight(self.device, self._session, None, self._error)
+        return drive_sight(self.device, self._session, self._cycle, now)
+
+    async def run(self, finding: asyncio.Lock) -> None:
+        """Find it, read it until it is lost, and again; ends by being cancelled only."""
+        while True:
+            session = await self._found(finding)
+            if self._session is None or session.profile.id != self._session.profile.id:
+                self._cycle = None
+            self._session = session
+            await self._read(session)
+
+    # Who it is
+
+    async def _found(self, finding: asyncio.Lock) -> DriveSession:
+        while True:
+            async with finding:
+                if (session := await self._looked_for()) is not None:
+                    return session
+                await asyncio.sleep(FIND_AGAIN)
+
+    async def _looked_for(self) -> DriveSession | None:
+        """The drive, or None with why not, which is said when it changes."""
+        from tui.bus.api import Priority
+        from tui.session.connect.identify import identify_drive
+
+        if self._sign(self.device) is not None:
+            return None  # its motor runs, and who it is was not asked before: nothing feeds it
+        try:
+            # nobody waits as long for a drive that may not be there: others are on the line
+            await identify_drive(self._opened.line, self.device, priority=Priority.BACKGROUND)
+            session = await connect_drive(self._opened, self._target)
+        except Exception as error:
+            self._tell(failure_of(error).message)
+            return None
+        if self._codes:
+            try:
+                self._shown(session)
+            except Exception as error:
+                self._tell(failure_of(error).message)
+                return None
+        self._tell("")
+        return session
+
+    def _tell(self, error: str) -> None:
+        if error and error != self._error:
+            say(f"drivepanel: device {self.device}: {error} It is tried on.", err=True)
+        self._error = error
+        self._changed()
+
+    def _shown(self, session: DriveSession) -> list[str]:
+        from tui.session.monitor.rates import monitoring_codes
+
+        profile = session.profile
+        return [profile.find(code).code for code in self._codes] or monitoring_codes(profile)
+
+    # Its cycles
+
+    async def _read(self, session: DriveSession) -> None:
+        """Hand on its cycles until it was silent for long."""
+        from tui.session.monitor.monitor import Monitor
+        from tui.session.sharing.bystander import Bystander
+
+        codes, loop = self._shown(session), asyncio.get_running_loop()
+        monitor = Monitor(session)
+        looks_on = Bystander(session, partial(self._sign, self.device), lambda: monitor.latest)
+        looks_on.orphan = await asyncio.to_thread(_is_orphan, session)
+        monitor.held_back = looks_on.held_back
+        leave = monitor.listen(partial(self._take, Cycles(session, codes), loop))
+        self._good, learned = loop.time(), loop.time()
+        monitor.start(codes, self._every)
+        try:
+            while loop.time() - self._good < SILENT_FOR_LONG:
+                await asyncio.sleep(PLANT_LOOK_INTERVAL)
+                if self._cycle is not None and not self._cycle.error:
+                    self._good = loop.time()
+                    if loop.time() - learned > TIMEOUT_READ_AGAIN:
+                        learned = loop.time()
+                        await _learn_timeout(session)
+                elif self._cycle is not None and looks_on.waits:
+                    self._good = loop.time()
+        finally:
+            leave()
+            monitor.stop()
+
+    def _take(self, cycles: Cycles, loop: asyncio.AbstractEventLoop, snapshot: Snapshot) -> None:
+        """Keep a cycle as it was read; in the line's thread."""
+        self._cycle = cycles.as_read(snapshot)
+        loop.call_soon_threadsafe(self._changed)
+
+
+async def _learn_timeout(session: DriveSession) -> None:
+    """Read anew how long the drive waits for the line; what fails is asked again later."""
+    from tui.bus.api import Priority
+    from tui.bus.errors import LineError
+    from tui.session.monitor.timeout import read_timeout
+    from tui.session.read.reader import Reader
+
+    try:
+        session.timeout = await read_timeout(Reader(session), Priority.POLL)
+    except LineError as error:
+        log.info("device %s did not tell its time-out: %s", session.device, error)
+
+
+def _is_orphan(session: DriveSession) -> bool:
+    """Whether a program that has ended started the motor, and did not mean to leave it running."""
+    from tui.session.starts.keeper import pids_absent
+    from tui.session.starts.starts import Starts
+
+    absent = pids_absent(session.line.facts)
+    record = Starts().found(session.line_text, session.device, absent)
+    return record is not None and not record.left_running

@@ -1,0 +1,236 @@
+"""Lines and drives in the text format of Prometheus, version 0.0.4.
+
+A value stands in the base unit of its kind, which its name tells: seconds for ms and h, ratios for
+per cent. One that is not good is left out, so that a graph has a gap there and no old number.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from decimal import Decimal
+from typing import TYPE_CHECKING, NamedTuple, get_args
+
+from tui.bus.api import TURNAROUND_EDGES, DeviceCounters, LineStatus
+from tui.drive.profile.schema import StateKind
+
+from .sights import DriveSight, LineSight
+
+if TYPE_CHECKING:
+    from tui.session.drive import DriveSession
+    from tui.session.reading import Reading
+
+METRICS_TYPE = "text/plain; version=0.0.4; charset=utf-8"
+PREFIX = "drivepanel"
+
+BASE_UNITS: Mapping[str, tuple[str, str]] = {
+    "Hz": ("hertz", "1"),
+    "kHz": ("hertz", "1e3"),
+    "%": ("ratio", "0.01"),
+    "s": ("seconds", "1"),
+    "ms": ("seconds", "1e-3"),
+    "min": ("seconds", "60"),
+    "h": ("seconds", "3600"),
+    "V": ("volts", "1"),
+    "mV": ("volts", "1e-3"),
+    "A": ("amperes", "1"),
+    "mA": ("amperes", "1e-3"),
+    "µA": ("amperes", "1e-6"),
+    "W": ("watts", "1"),
+    "kW": ("watts", "1e3"),
+    "Wh": ("joules", "3.6e3"),
+    "kWh": ("joules", "3.6e6"),
+    "MWh": ("joules", "3.6e9"),
+    "°C": ("celsius", "1"),
+    "rpm": ("rpm", "1"),
+    "Nm": ("newton_meters", "1"),
+    "ohm": ("ohms", "1"),
+    "mH": ("henries", "1e-3"),
+    "m": ("meters", "1"),
+    "m/s": ("meters_per_second", "1"),
+    "bar": ("pascals", "1e5"),
+}
+"""The end of a metric's name, and what its value is multiplied by, for each unit of a profile."""
+_NO_NAME = re.compile(r"[^a-z0-9]+")
+
+Labels = Mapping[str, str]
+
+
+class MetricSample(NamedTuple):
+    """One number of a metric."""
+
+    metric: str
+    labels: Labels
+    value: float
+    suffix: str = ""
+    """Of the sample's own name: the buckets and the count of a histogram."""
+
+
+class MetricHead(NamedTuple):
+    """What a metric is."""
+
+    kind: str
+    help: str
+
+
+METRICS: Mapping[str, MetricHead] = {
+    "build_info": MetricHead("gauge", "The version of Drive Panel."),
+    "line_connected": MetricHead("gauge", "Whether the line can be used."),
+    "line_requests_total": MetricHead("counter", "Frames that were sent."),
+    "line_replies_total": MetricHead("counter", "Whole and right replies."),
+    "line_timeouts_total": MetricHead("counter", "Requests without an answer."),
+    "line_damaged_total": MetricHead("counter", "Replies that came damaged."),
+    "line_wrong_total": MetricHead("counter", "Replies of another request or device."),
+    "line_exceptions_total": MetricHead("counter", "Requests that a drive refused."),
+    "line_repeats_total": MetricHead("counter", "Requests that were sent again."),
+    "line_late_total": MetricHead("counter", "Whole frames that came when none was due."),
+    "line_sent_bytes_total": MetricHead("counter", "Bytes that were sent."),
+    "line_received_bytes_total": MetricHead("counter", "Bytes that came."),
+    "line_busy_seconds_total": MetricHead("counter", "Time in which the line was taken."),
+    "drive_info": MetricHead("gauge", "The profile of the drive, and what it says of itself."),
+    "drive_up": MetricHead("gauge", "Whether the last cycle brought the values of the drive."),
+    "drive_state": MetricHead("gauge", "1 for the state that the drive is in."),
+    "drive_fault_info": MetricHead("gauge", "The fault that the drive is in now."),
+    "drive_alarm": MetricHead("gauge", "Whether the drive tells an alarm."),
+    "drive_requests_total": MetricHead("counter", "Frames that were sent to the drive."),
+    "drive_replies_total": MetricHead("counter", "Whole and right replies of the drive."),
+    "drive_timeouts_total": MetricHead("counter", "Requests that the drive did not answer."),
+    "drive_damaged_total": MetricHead("counter", "Replies of the drive that came damaged."),
+    "drive_exceptions_total": MetricHead("counter", "Refusals of the drive, by their code."),
+    "drive_turnaround_seconds": MetricHead(
+        "histogram", "From a request's end to its reply's start."
+    ),
+    "value_good": MetricHead("gauge", "Whether the value was read in the last cycle."),
+    "value_age_seconds": MetricHead("gauge", "Time since the value was on the wire."),
+    "word": MetricHead("gauge", "A word of bits or names, as it is on the wire."),
+    "value": MetricHead("gauge", "A value without a unit."),
+}
+"""All metrics but those of values with a unit, in the order in which they are told."""
+
+
+def metrics_text(lines: Sequence[LineSight], version: str, now: float) -> str:
+    """All that is known of lines and drives; `now` is on the monotonic clock."""
+    by_metric: dict[str, list[MetricSample]] = {name: [] for name in METRICS}
+    for sample in _samples(lines, version, now):
+        by_metric.setdefault(sample.metric, []).append(sample)
+    parts: list[str] = []
+    for metric, samples in by_metric.items():
+        if samples:
+            kind, help = METRICS.get(metric) or MetricHead(
+                "gauge", f"Values in {_unit_of(metric)}."
+            )
+            parts += [f"# HELP {PREFIX}_{metric} {help}\n# TYPE {PREFIX}_{metric} {kind}\n"]
+            parts += [_written(sample) for sample in samples]
+    return "".join(parts)
+
+
+def value_metric(unit: str) -> tuple[str, Decimal]:
+    """The name of the metric for values of a unit, and what they are multiplied by."""
+    if not unit:
+        return "value", Decimal(1)
+    end, factor = BASE_UNITS.get(unit, ("", "1"))
+    return f"value_{end or _NO_NAME.sub('_', unit.lower()).strip('_') or 'other'}", Decimal(factor)
+
+
+def _unit_of(metric: str) -> str:
+    return metric.removeprefix("value_").replace("_", " ")
+
+
+def _written(sample: MetricSample) -> str:
+    labels = ",".join(f'{name}="{_escaped(text)}"' for name, text in sample.labels.items())
+    number = f"{sample.value:.15g}"
+    return f"{PREFIX}_{sample.metric}{sample.suffix}{{{labels}}} {number}\n"
+
+
+def _escaped(text: str) -> str:
+    """A label's text as the format wants it."""
+    return text.replace("\\", r"\\").replace("\n", r"\n").replace('"', r"\"")
+
+
+def _samples(lines: Iterable[LineSight], version: str, now: float) -> Iterator[MetricSample]:
+    yield MetricSample("build_info", {"version": version}, 1)
+    for line in lines:
+        yield from _of_line(line)
+        for drive in line.drives:
+            where = {"line": line.name, "device": str(drive.device)}
+            yield from _of_counters(where, line.counters.devices.get(drive.device))
+            yield from _of_drive(where, drive, now)
+
+
+def _of_line(line: LineSight) -> Iterator[MetricSample]:
+    where, counted = {"line": line.name}, line.counters
+    yield MetricSample("line_connected", where, line.state.status is LineStatus.CONNECTED)
+    for name, number in (
+        ("requests", counted.requests),
+        ("replies", counted.replies),
+        ("timeouts", counted.timeouts),
+        ("damaged", counted.checksum),
+        ("wrong", counted.wrong),
+        ("exceptions", counted.exceptions),
+        ("repeats", counted.repeats),
+        ("late", counted.stale),
+        ("sent_bytes", counted.bytes_out),
+        ("received_bytes", counted.bytes_in),
+        ("busy_seconds", counted.busy_seconds),
+    ):
+        yield MetricSample(f"line_{name}_total", where, number)
+
+
+def _of_counters(where: Labels, counted: DeviceCounters | None) -> Iterator[MetricSample]:
+    counted = counted or DeviceCounters()
+    for name, number in (
+        ("requests", counted.requests),
+        ("replies", counted.replies),
+        ("timeouts", counted.timeouts),
+        ("damaged", counted.checksum),
+    ):
+        yield MetricSample(f"drive_{name}_total", where, number)
+    for code, number in sorted(counted.exceptions.items()):
+        yield MetricSample("drive_exceptions_total", {**where, "exception": f"{code:02X}"}, number)
+    total = 0
+    for edge, number in zip((*TURNAROUND_EDGES, "+Inf"), counted.turnarounds, strict=True):
+        total += number
+        yield MetricSample("drive_turnaround_seconds", {**where, "le": str(edge)}, total, "_bucket")
+    yield MetricSample("drive_turnaround_seconds", where, total, "_count")
+
+
+def _of_drive(where: Labels, drive: DriveSight, now: float) -> Iterator[MetricSample]:
+    yield MetricSample("drive_up", where, drive.cycle is not None and not drive.error)
+    if drive.session is None:
+        return
+    said = drive.session.known_identity.reference
+    info = {**where, "profile": drive.session.profile.id, "reference": said}
+    yield MetricSample("drive_info", info, 1)
+    if drive.cycle is None:
+        return
+    state = drive.cycle.state
+    if state.headline and not drive.error:
+        for kind in get_args(StateKind):
+            yield MetricSample("drive_state", {**where, "state": kind}, kind == state.kind)
+        yield MetricSample("drive_alarm", where, bool(state.alarm or state.alarms))
+        if state.fault is not None:
+            fault = {**where, "fault": state.fault.code, "name": state.fault.name}
+            yield MetricSample("drive_fault_info", fault, 1)
+    for code, reading in drive.cycle.readings.items():
+        yield from _of_value({**where, **_who(drive.session, code)}, reading, now)
+
+
+def _who(session: DriveSession, code: str) -> Labels:
+    """The code of a value, and the quantity that it is in every family, if it is one."""
+    quantity = session.profile[code].quantity
+    return {"code": code, **({"quantity": quantity} if quantity else {})}
+
+
+def _of_value(who: Labels, reading: Reading, now: float) -> Iterator[MetricSample]:
+    good = reading.quality == "good"
+    yield MetricSample("value_good", who, good)
+    if reading.raw is None:
+        return
+    yield MetricSample("value_age_seconds", who, round(reading.age(now), 3))
+    if not good:
+        return
+    if reading.value is None or reading.value.number is None:
+        yield MetricSample("word", who, reading.raw)
+        return
+    metric, factor = value_metric(reading.unit)
+    yield MetricSample(metric, who, float(reading.value.number * factor))

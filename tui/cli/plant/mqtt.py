@@ -1,0 +1,181 @@
+"""Publishing to a broker: everything retained, a last will, and anew after each connection.
+
+Nothing is subscribed to, and what a broker sends all the same is thrown away: no message that
+comes from there reaches a drive.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hashlib
+import logging
+import socket
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+from ..shared.say import say
+from .broker import Broker
+from .sights import LineSight
+from .topics import OFFLINE, ONLINE, drive_messages, line_messages, status_topic
+
+if TYPE_CHECKING:
+    import aiomqtt
+
+log = logging.getLogger(__name__)
+
+MQTT_KEEPALIVE = 10
+"""Seconds; a broker sends the last will after 1.5 of these at the latest."""
+TRY_AGAIN_FIRST, TRY_AGAIN_LONGEST = 1.0, 30.0
+"""Seconds from a lost connection to the next try; each one that fails doubles it."""
+LINES_EVERY = 10.0
+"""Seconds between two messages about a line that stays as it is; the status goes out with them."""
+LOOKED_EVERY = 2.0
+"""Seconds after which is looked without anything new: what was read last may be too old by now."""
+LAST_WORD_WITHIN = 3.0
+
+Sights = Callable[[], Sequence[LineSight]]
+
+
+class MqttPublisher:
+    """Keeps a broker told of lines and drives; lives in one loop."""
+
+    def __init__(self, broker: Broker, sights: Sights) -> None:
+        self._broker = broker
+        self._sights = sights
+        self._news = asyncio.Event()
+        self._ended = False
+        self._trouble = ""
+        self._there = False
+
+    def news(self) -> None:
+        """Something was read, or the state of a line has changed."""
+        self._news.set()
+
+    def end(self) -> None:
+        """Say that it is over; run() returns."""
+        self._ended = True
+        self._news.set()
+
+    async def run(self) -> None:
+        """Publish until end(); a broker that is lost, or never there, is tried on."""
+        delay = TRY_AGAIN_FIRST
+        while not self._ended:
+            self._there = False
+            try:
+                await self._connected()
+            except Exception as error:
+                if not _is_mqtt(error):
+                    log.exception("publishing failed")
+                self._lost(str(error))
+            delay = TRY_AGAIN_FIRST if self._there else min(2 * delay, TRY_AGAIN_LONGEST)
+            await self._wait_to_try(delay)
+
+    async def _wait_to_try(self, seconds: float) -> None:
+        loop = asyncio.get_running_loop()
+        end = loop.time() + seconds
+        while not self._ended and (left := end - loop.time()) > 0:
+            self._news.clear()
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), left)
+
+    async def _connected(self) -> None:
+        """One connection, from its begin until it is lost or all is over."""
+        async with self._client() as client:
+            self._there = True
+            if self._trouble:
+                say(f"drivepanel: {self._broker.place} is there again.", err=True)
+                self._trouble = ""
+            lost = asyncio.create_task(_until_lost(client))
+            lost.add_done_callback(lambda _: self._news.set())
+            try:
+                await self._publish(client, lost)
+            finally:
+                if not lost.done():
+                    await self._status(client, OFFLINE, timeout=LAST_WORD_WITHIN)
+                lost.cancel()
+                await asyncio.gather(lost, return_exceptions=True)
+
+    def _client(self) -> aiomqtt.Client:
+        import ssl
+
+        import aiomqtt
+
+        broker, will = self._broker, status_topic(self._broker.root)
+        return aiomqtt.Client(
+            broker.host,
+            broker.port,
+            username=broker.user,
+            password=broker.password,
+            identifier=client_id(broker.root),
+            will=aiomqtt.Will(will, OFFLINE, qos=1, retain=True),
+            keepalive=MQTT_KEEPALIVE,
+            tls_context=ssl.create_default_context() if broker.tls else None,
+            max_queued_incoming_messages=1,
+        )
+
+    async def _publish(self, client: aiomqtt.Client, lost: asyncio.Task[None]) -> None:
+        """Publish what has changed; raises what ended the connection."""
+        sent: dict[str, str] = {}
+        loop = asyncio.get_running_loop()
+        told = float("-inf")
+        states: list[object] = []
+        while not self._ended and not lost.done():
+            self._news.clear()
+            sights = self._sights()
+            seen: list[object] = [(one.state.status, one.state.reason) for one in sights]
+            if states != seen or loop.time() - told > LINES_EVERY:
+                states, told = seen, loop.time()
+                await self._status(client, ONLINE)
+                await _send(client, line_messages(self._broker.root, sights), sent)
+            await _send(client, drive_messages(self._broker.root, sights), sent)
+            with suppress(TimeoutError):
+                await asyncio.wait_for(self._news.wait(), LOOKED_EVERY)
+        if lost.done():
+            lost.result()
+
+    async def _status(
+        self, client: aiomqtt.Client, status: str, timeout: float | None = None
+    ) -> None:
+        # answered by the broker, which has then taken all that went before it
+        await client.publish(
+            status_topic(self._broker.root), status, qos=1, retain=True, timeout=timeout
+        )
+
+    def _lost(self, why: str) -> None:
+        """Say once that the broker is not there, and why."""
+        if not self._trouble:
+            say(
+                f"drivepanel: {self._broker.place}: {why or 'the connection is lost'}."
+                " It is tried on.",
+                err=True,
+            )
+        self._trouble = why or "lost"
+
+
+async def _until_lost(client: aiomqtt.Client) -> None:
+    """Throw away whatever comes; raises when the connection is lost."""
+    async for _ in client.messages:
+        pass
+
+
+async def _send(client: aiomqtt.Client, messages: Mapping[str, str], sent: dict[str, str]) -> None:
+    for topic, text in messages.items():
+        if sent.get(topic) != text:
+            await client.publish(topic, text, retain=True)
+            sent[topic] = text
+
+
+def client_id(root: str) -> str:
+    """The same for each run that publishes there.
+
+    A broker then ends what is left of the run before, with its last will, before it takes this one.
+    """
+    text = f"{socket.gethostname()} {root}"
+    return f"drivepanel-{hashlib.sha256(text.encode()).hexdigest()[:10]}"
+
+
+def _is_mqtt(error: Exception) -> bool:
+    import aiomqtt
+
+    return isinstance(error, aiomqtt.MqttError | OSError)

@@ -1,0 +1,90 @@
+"""Values of lines going out to the plant, from the first cycle to the last word."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator, Sequence
+from contextlib import asynccontextmanager, suppress
+from typing import TYPE_CHECKING
+
+import tui
+
+from ..shared.errors import LINE_TROUBLE, Failure
+from ..shared.host_port import written_host_port
+from .broker import Broker
+from .drives import PlantLine
+from .metrics import metrics_text
+from .metrics_server import PATH, MetricsServer
+from .sights import LineSight
+from .wish import warn_of_plain_password, warn_of_strangers
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from .mqtt import MqttPublisher
+
+
+class Changes:
+    """Tells one listener that something was read; set once that is there."""
+
+    def __init__(self) -> None:
+        self.listener: Callable[[], None] = lambda: None
+
+    def __call__(self) -> None:
+        self.listener()
+
+
+def sights_of(lines: Sequence[PlantLine]) -> list[LineSight]:
+    """What is known of each line now."""
+    now = time.monotonic()
+    return [line.sight(now) for line in lines]
+
+
+@asynccontextmanager
+async def reading(lines: Sequence[PlantLine]) -> AsyncIterator[None]:
+    """While inside, the drives of the lines are read; an unforeseen error of that ends it."""
+    async with asyncio.TaskGroup() as tasks:
+        running = [tasks.create_task(line.run(), name=f"plant {line.name}") for line in lines]
+        try:
+            yield
+        finally:
+            for task in running:
+                task.cancel()
+
+
+@asynccontextmanager
+async def metrics_at(lines: Sequence[PlantLine], host: str, port: int) -> AsyncIterator[str]:
+    """While inside, metrics are served; gives their URL. Raises Failure where that cannot be."""
+    server = MetricsServer(
+        lambda: metrics_text(sights_of(lines), tui.__version__, time.monotonic())
+    )
+    try:
+        host, port = await server.listen(host, port)
+    except OSError as error:
+        place, why = written_host_port(host, port), error.strerror or str(error)
+        raise Failure(f"No metrics can be served at {place}: {why}.", LINE_TROUBLE) from error
+    warn_of_strangers(host, port)
+    try:
+        yield f"http://{written_host_port(host, port)}{PATH}"
+    finally:
+        await server.close()
+
+
+@asynccontextmanager
+async def published_to(
+    lines: Sequence[PlantLine], broker: Broker, changes: Changes
+) -> AsyncIterator[str]:
+    """While inside, a broker is kept told; gives what is told where, for a person."""
+    from .mqtt import LAST_WORD_WITHIN, MqttPublisher
+
+    warn_of_plain_password(broker)
+    publisher: MqttPublisher = MqttPublisher(broker, lambda: sights_of(lines))
+    changes.listener = publisher.news
+    task = asyncio.create_task(publisher.run(), name="mqtt")
+    try:
+        yield f"{broker.place}/{broker.root}"
+    finally:
+        publisher.end()
+        with suppress(TimeoutError):
+            await asyncio.wait_for(task, 2 * LAST_WORD_WITHIN)

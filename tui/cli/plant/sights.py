@@ -1,0 +1,62 @@
+"""What is known of lines and their drives at a moment, for who hands it on to the plant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tui.bus.api import LineCounters, LineState
+    from tui.session.drive import DriveSession
+    from tui.session.monitor.snapshot import Snapshot
+
+
+@dataclass(frozen=True, slots=True)
+class DriveSight:
+    """One drive: its last cycle, or why there is none."""
+
+    device: int
+    session: DriveSession | None = None
+    """None while it was not found."""
+    cycle: Snapshot | None = None
+    """As it was read: what was not read in it is not good."""
+    error: str = ""
+    """Why there are no values of now; empty where there are."""
+
+
+@dataclass(frozen=True, slots=True)
+class LineSight:
+    """One line with its drives."""
+
+    name: str
+    """As it was typed: the name of the settings file where that has one."""
+    text: str
+    state: LineState
+    counters: LineCounters
+    drives: tuple[DriveSight, ...]
+
+
+def drive_sight(
+    device: int, session: DriveSession | None, cycle: Snapshot, now: float
+) -> DriveSight:
+    """A drive by its last cycle; one that is too old has no value of now any more.
+
+    `now` is on the monotonic clock.
+    """
+    if session is not None and cycle.is_stale(now):
+        cycle = _outdated(session, cycle, now)
+    return DriveSight(device, session, cycle, cycle.error)
+
+
+def _outdated(session: DriveSession, cycle: Snapshot, now: float) -> Snapshot:
+    """The same without a good value: whoever reads the drive has not come round for long."""
+    from tui.session.drive_state import drive_state
+
+    readings = {code: one.aged(now, -1.0) for code, one in cycle.readings.items()}
+    return replace(
+        cycle,
+        readings=readings,
+        state=drive_state(session.profile, readings),
+        rate=0.0,
+        error=cycle.error or f"Device {session.device} was not asked for {now - cycle.time:.0f} s.",
+    )

@@ -1,0 +1,89 @@
+"""What is to go out to the plant, as options say it."""
+
+from __future__ import annotations
+
+import ipaddress
+from dataclasses import dataclass
+from pathlib import Path
+
+import click
+
+from ..shared.host_port import host_port, written_host_port
+from ..shared.options import Target
+from ..shared.say import say
+from ..shared.served_lines import ServedLine
+from .broker import Broker, broker_of
+from .topics import line_topics
+
+
+@dataclass(frozen=True, slots=True)
+class PlantWish:
+    """Where values go, and how often they are read."""
+
+    metrics: tuple[str, int] | None
+    broker: Broker | None
+    every: float
+
+
+def plant_wish(
+    metrics: str | None, mqtt: str | None, password_file: Path | None, every: float | None
+) -> PlantWish | None:
+    """What the options ask for; None for nothing. Raises UsageError."""
+    if password_file is not None and mqtt is None:
+        raise click.UsageError("--mqtt-password-file goes with --mqtt.")
+    if metrics is None and mqtt is None:
+        if every is not None:
+            raise click.UsageError("--every goes with --metrics and --mqtt.")
+        return None
+    broker = broker_of(mqtt, password_file) if mqtt is not None else None
+    place = host_port(metrics) if metrics is not None else None
+    return PlantWish(place, broker, every if every is not None else 1.0)
+
+
+def check_names(broker: Broker, names: list[str]) -> None:
+    """Raise UsageError where two lines would be published as one."""
+    try:
+        line_topics(broker.root, names)
+    except ValueError as error:
+        raise click.UsageError(f"{str(error)[0].upper()}{str(error)[1:]}.") from error
+
+
+def read_drives(line: ServedLine, simulated: tuple[int, ...]) -> list[Target]:
+    """The drives of a line that are read: those named, else all of a simulated one.
+
+    Raises UsageError where none is known.
+    """
+    devices = line.devices or simulated
+    if not devices:
+        raise click.UsageError(
+            f"Which drives of {line.name} are read for --metrics and --mqtt?"
+            f" Write {line.name}@1,2 with their addresses."
+        )
+    return [Target(line.text, device, line.profiles.get(device)) for device in devices]
+
+
+def warn_of_strangers(host: str, port: int) -> None:
+    """Say what it means that other computers read the metrics."""
+    if not is_loopback(host):
+        say(
+            "drivepanel: metrics know no password: whoever reaches"
+            f" {written_host_port(host, port)} reads these drives. Let a firewall decide who does.",
+            err=True,
+        )
+
+
+def warn_of_plain_password(broker: Broker) -> None:
+    """Say that a password goes out readable."""
+    if broker.password is not None and not broker.tls and not is_loopback(broker.host):
+        say(
+            f"drivepanel: the password goes to {broker.place} unencrypted: mqtts:// is for TLS.",
+            err=True,
+        )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether an address is reached from this computer only."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host == "localhost"
