@@ -91,6 +91,23 @@ def test_the_unit_says_what_the_program_does() -> None:
     assert served["RuntimeDirectoryPreserve"] == "yes"
 
 
+def test_systemd_finds_no_fault_in_the_unit(
+    peer: Callable[[str, str], str], tmp_path: Path
+) -> None:
+    """With a program that is there, and without the manual page, which is not."""
+    text = (UNITS / "drivepanel.service").read_text("utf-8")
+    text = text.replace("/usr/bin/drivepanel", "/bin/true").replace("Documentation=man", "#")
+    (tmp_path / "drivepanel.service").write_text(text, "utf-8")
+    done = subprocess.run(
+        [peer("systemd-analyze", "systemd"), "verify", str(tmp_path / "drivepanel.service")],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE,
+        check=False,
+    )
+    assert (done.returncode, done.stderr) == (0, "")
+
+
 def test_systemd_understands_the_unit_and_finds_it_tight(peer: Callable[[str, str], str]) -> None:
     analyze = peer("systemd-analyze", "systemd")
     unit = str(UNITS / "drivepanel.service")
