@@ -1,0 +1,184 @@
+"""Reads a second through the Modbus TCP of `drivepanel serve`, beside mbpoll alone on the line.
+
+    python -m benchmarks.gateway [--seconds S] [--rounds N]
+
+A simulated drive on a line of 19200 baud in a process of its own notes every exchange. In turn, in
+one run, ten words are read again and again:
+
+- by mbpoll on the serial line itself, which waits 11 ms after each read, its least;
+- by mbpoll through the gateway, so that every read goes to the drive;
+- by clients that wait for nothing but the answer: through to the drive, and from fresh values.
+
+The limit is what the line allows: the characters, the drive's turnaround and the silence.
+"""
+
+from __future__ import annotations
+
+import argparse
+import asyncio
+import json
+import re
+import shutil
+import signal
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from statistics import median
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from benchmarks.masters import MBPOLL_PERIOD_MS
+from benchmarks.wire import ROOT, Record, WireLine
+from tui.simulator import LineTiming
+
+DEVICE, ADDRESS, WORDS = 1, 3201, 10
+REQUEST = struct.pack(">HHHBBHH", 1, 0, 6, DEVICE, 3, ADDRESS, WORDS)
+ANSWER = 7 + 2 + 2 * WORDS
+FRESH = 1.0
+CLIENTS = 8
+ALONE = "mbpoll, alone on the line"
+POLLED = "mbpoll, through the gateway"
+THROUGH = "one client, through to the drive"
+SEVERAL = f"{CLIENTS} clients, through to the drive"
+STORED = f"one client, values fresh for {FRESH:g} s"
+STORED_SEVERAL = f"{CLIENTS} clients, values fresh for {FRESH:g} s"
+
+
+def mbpoll_reads(seconds: float, *where: str) -> int:
+    """How often mbpoll got all words in so many seconds."""
+    options = f"-a {DEVICE} -0 -r {ADDRESS} -c {WORDS} -t 4:hex -l {MBPOLL_PERIOD_MS}".split()
+    process = subprocess.Popen(
+        ["stdbuf", "-oL", "mbpoll", *options, *where], stdout=subprocess.PIPE, text=True
+    )
+    time.sleep(seconds)
+    process.send_signal(signal.SIGTERM)
+    told, _ = process.communicate(timeout=10)
+    return len(re.findall(rf"^\[{ADDRESS}\]:", told, re.MULTILINE))
+
+
+async def client_reads(port: int, clients: int, seconds: float) -> tuple[int, float]:
+    """How many answers so many clients got, each asking as soon as it has one; until when, in s."""
+    begun = time.monotonic()
+    end = begun + seconds
+    counts = await asyncio.gather(*(_one_client(port, end) for _ in range(clients)))
+    return sum(counts), time.monotonic() - begun
+
+
+async def _one_client(port: int, end: float) -> int:
+    reader, writer = await asyncio.open_connection("127.0.0.1", port)
+    count = 0
+    while time.monotonic() < end:
+        writer.write(REQUEST)
+        head = await reader.readexactly(9)
+        if head[7] != 3:
+            raise RuntimeError(f"the gateway answers exception {head[8]}")
+        await reader.readexactly(ANSWER - len(head))
+        count += 1
+    writer.close()
+    return count
+
+
+@contextmanager
+def gateway(line: str, fresh: float) -> Iterator[int]:
+    """`serve` on the line; the port of its Modbus TCP."""
+    with tempfile.TemporaryDirectory() as state:
+        command = [sys.executable, "-m", "tui", "serve", line, "--tcp", ":0", "--json"]
+        process = subprocess.Popen(
+            [*command, "--fresh", f"{fresh:g}"],
+            cwd=ROOT,
+            env={"PATH": "/usr/bin:/bin", "PYTHONPATH": str(ROOT), "DRIVEPANEL_STATE": state},
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        try:
+            assert process.stdout is not None
+            ready: dict[str, Any] = json.loads(process.stdout.readline())
+            yield int(ready["tcp"].rpartition(":")[2])
+        finally:
+            process.terminate()
+            process.communicate(timeout=20)
+
+
+def measured(wire: WireLine, seconds: float, *, with_mbpoll: bool) -> dict[str, dict[str, float]]:
+    """Reads a second of each contestant, and what of it went over the line."""
+    found: dict[str, dict[str, float]] = {}
+
+    def note(name: str, reads: int, span: float) -> None:
+        exchanges = [one for one in wire.take() if one.size]
+        gaps = [gap / wire.times.silence for gap in Record(wire.times, exchanges).gaps()]
+        found[name] = {
+            "reads_a_second": reads / span,
+            "on_the_line": len(exchanges) / span,
+            "broken_silences": sum(gap < 1 for gap in gaps),
+        }
+
+    if with_mbpoll:
+        timing = wire.timing
+        wire.take()
+        reads = mbpoll_reads(seconds, "-m", "rtu", "-b", str(timing.baud), "-P", "none", wire.path)
+        note(ALONE, reads, seconds)
+    for fresh, names in ((0.0, (THROUGH, SEVERAL)), (FRESH, (STORED, STORED_SEVERAL))):
+        with gateway(wire.text, fresh) as port:
+            asyncio.run(client_reads(port, 1, 0.5))  # by then it is known who the drive is
+            if with_mbpoll and not fresh:
+                wire.take()
+                reads = mbpoll_reads(seconds, "-m", "tcp", "-p", str(port), "127.0.0.1")
+                note(POLLED, reads, seconds)
+            for name, clients in zip(names, (1, CLIENTS), strict=True):
+                wire.take()
+                note(name, *asyncio.run(client_reads(port, clients, seconds)))
+    return found
+
+
+def main() -> None:
+    """Measure, print a table, and all figures as JSON in the last line."""
+    parser = argparse.ArgumentParser(description="Reads a second through the gateway.")
+    parser.add_argument("--seconds", type=float, default=5.0)
+    parser.add_argument("--rounds", type=int, default=3)
+    given = parser.parse_args()
+    console = Console()
+    with_mbpoll = shutil.which("mbpoll") is not None
+    if not with_mbpoll:
+        console.print("mbpoll is not installed: no ratio to it.")
+    wire = WireLine()
+    try:
+        wire.set_up({DEVICE: "atv71"}, LineTiming(19200, "8E1", True))
+        limit = 1 / wire.times.read(DEVICE, WORDS)
+        rounds = [
+            measured(wire, given.seconds, with_mbpoll=with_mbpoll) for _ in range(given.rounds)
+        ]
+    finally:
+        wire.close()
+    figures = {}
+    for name in rounds[0]:
+        each = {key: [one[name][key] for one in rounds] for key in rounds[0][name]}
+        figures[name] = {key: median(values) for key, values in each.items()}
+        reads = figures[name]["reads_a_second"]
+        figures[name]["of_the_limit"] = reads / limit
+        alone = [one[ALONE]["reads_a_second"] for one in rounds] if with_mbpoll else []
+        mine = each["reads_a_second"]
+        ratios = [a / b for a, b in zip(mine, alone, strict=True)] if alone else []
+        figures[name]["to_mbpoll"] = median(ratios) if ratios else 0.0
+    table = Table(
+        title=f"Reads of {WORDS} words at 19200 baud; the line allows {limit:.1f} a second"
+    )
+    for title in ("who", "reads/s", "to mbpoll alone", "of the limit", "on the line/s", "broken"):
+        table.add_column(title)
+    for name, one in figures.items():
+        table.add_row(
+            name, f"{one['reads_a_second']:.1f}", f"{one['to_mbpoll']:.2f}",
+            f"{one['of_the_limit']:.3f}", f"{one['on_the_line']:.1f}",
+            f"{one['broken_silences']:.0f}",
+        )  # fmt: skip
+    console.print(table)
+    print(json.dumps({"benchmark": "gateway", "limit_a_second": limit, "figures": figures}))
+
+
+if __name__ == "__main__":
+    main()
