@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import grp
 import os
+import stat
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -11,6 +12,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.programs import DRIVEPANEL, PATIENCE, served
 from tui.simulator import DriveSpec, Simulation
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -122,3 +124,30 @@ def test_a_group_without_a_folder_is_told_what_to_do(tmp_path: Path, tcp_line: s
     told = said(one)
     end(one)
     assert "There is no group no-such-group" in told
+
+
+def test_serve_opens_its_socket_for_the_group_that_it_is_told(
+    tmp_path: Path, tcp_line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One user is enough: the group is one of his own, the rest is what the system does."""
+    groups = [*os.getgroups(), os.getgid()] if os.geteuid() else [grp.getgrnam(GROUP).gr_gid]
+    number = next((one for one in groups if one != os.getgid()), os.getgid())
+    folder = tmp_path / "group"
+    folder.mkdir()
+    os.chown(folder, -1, number)
+    folder.chmod(0o2770)
+    monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(folder))
+    monkeypatch.delenv("XDG_RUNTIME_DIR", raising=False)
+    command = [*DRIVEPANEL, "serve", tcp_line]
+    with served(command, ready="Ready:"):
+        assert not list(folder.iterdir()), "closed to others unless told otherwise"
+    with served([*command, "--share-group", grp.getgrgid(number).gr_name], ready="Ready:") as one:
+        (socket,) = folder.glob("*.sock")
+        told = socket.stat()
+        assert (told.st_gid, stat.S_IMODE(told.st_mode)) == (number, 0o660)
+        watch = [*DRIVEPANEL, "watch", tcp_line, "RFR", "--count", "1", "--json"]
+        done = subprocess.run(watch, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        assert done.returncode == 0
+        assert "Shared with serve" in done.stderr
+        assert one.end()[0] == 0
+    assert not list(folder.glob("*.sock"))
