@@ -115,7 +115,9 @@ class PlantDrive:
         from tui.session.connect.identify import identify_drive
 
         if self._sign(self.device) is not None:
-            return None  # its motor runs, and who it is was not asked before: nothing feeds it
+            # who it is was not asked before: nothing feeds a motor whose client may have died
+            self._error = f"Device {self.device} is not asked who it is: a client runs its motor."
+            return None
         try:
             # nobody waits as long for a drive that may not be there: others are on the line
             await identify_drive(self._opened.line, self.device, priority=Priority.BACKGROUND)

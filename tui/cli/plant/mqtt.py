@@ -47,6 +47,8 @@ class MqttPublisher:
         self._ended = False
         self._trouble = ""
         self._there = False
+        self.connected = False
+        """Whether a broker takes messages now."""
 
     def news(self) -> None:
         """Something was read, or the state of a line has changed."""
@@ -82,7 +84,7 @@ class MqttPublisher:
     async def _connected(self) -> None:
         """One connection, from its begin until it is lost or all is over."""
         async with self._client() as client:
-            self._there = True
+            self._there = self.connected = True
             if self._trouble:
                 say(f"drivepanel: {self._broker.place} is there again.", err=True)
                 self._trouble = ""
@@ -93,6 +95,7 @@ class MqttPublisher:
             finally:
                 if not lost.done():
                     await self._status(client, OFFLINE, timeout=LAST_WORD_WITHIN)
+                self.connected = False
                 lost.cancel()
                 await asyncio.gather(lost, return_exceptions=True)
 

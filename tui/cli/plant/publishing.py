@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import AsyncIterator, Sequence
-from contextlib import asynccontextmanager, suppress
+from contextlib import asynccontextmanager
 from typing import TYPE_CHECKING
 
 import tui
@@ -86,5 +86,8 @@ async def published_to(
         yield f"{broker.place}/{broker.root}"
     finally:
         publisher.end()
-        with suppress(TimeoutError):
-            await asyncio.wait_for(task, 2 * LAST_WORD_WITHIN)
+        if not publisher.connected:
+            task.cancel()
+        _, late = await asyncio.wait({task}, timeout=2 * LAST_WORD_WITHIN)
+        for one in late:
+            one.cancel()

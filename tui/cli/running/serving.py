@@ -96,15 +96,16 @@ async def _served(
     plant: PlantWish | None,
     journal: Journal,
 ) -> ServedAt:
-    """Begin all that is wanted; it ends with the stack, the gateway last."""
-    gates: Sequence[GatewayLine] = ()
+    """Begin all that is wanted; it ends with the stack, the gateway with its motors first."""
     places = ServedAt()
+    gates = _gates(lines, journal) if wish is not None else ()
     for one in lines:
         stack.push_async_callback(say_farewells, one.opened)
-    if wish is not None:
-        gates, places = await stack.enter_async_context(_gateway(lines, wish, journal))
     if plant is not None:
-        places = await _published(stack, lines, plant, gates, places)
+        places = await _published(stack, lines, plant, gates)
+    if wish is not None:
+        place = await stack.enter_async_context(_gateway(gates, wish))
+        places = replace(places, tcp=place)
     return places
 
 
@@ -113,13 +114,12 @@ async def _published(
     lines: Sequence[OpenedLine],
     plant: PlantWish,
     gates: Sequence[GatewayLine],
-    places: ServedAt,
 ) -> ServedAt:
     """Read the drives, and hand their values out."""
     from ..plant.drives import PlantDrive, PlantLine, Sign, no_sign
     from ..plant.publishing import Changes, metrics_at, published_to, reading
 
-    changes = Changes()
+    places, changes = ServedAt(), Changes()
     signs: list[Sign] = [gate.sign for gate in gates] or [no_sign for _ in lines]
     read = [
         PlantLine(
@@ -139,18 +139,20 @@ async def _published(
     return places
 
 
-@asynccontextmanager
-async def _gateway(
-    lines: Sequence[OpenedLine], wish: GatewayWish, journal: Journal
-) -> AsyncIterator[tuple[Sequence[GatewayLine], ServedAt]]:
-    """While inside, Modbus TCP is served; its lines, and where it is."""
-    from tui.bus.gateway.server import TcpGateway
-    from tui.session.gateway.gateway import Gateway
+def _gates(lines: Sequence[OpenedLine], journal: Journal) -> list[GatewayLine]:
     from tui.session.gateway.line import GatewayLine
 
-    gates = [
+    return [
         GatewayLine(one.opened.line, journal, _noting(one.opened), one.profiles) for one in lines
     ]
+
+
+@asynccontextmanager
+async def _gateway(gates: Sequence[GatewayLine], wish: GatewayWish) -> AsyncIterator[str]:
+    """While inside, Modbus TCP is served; the LINE to it. Motors of clients are stopped after."""
+    from tui.bus.gateway.server import TcpGateway
+    from tui.session.gateway.gateway import Gateway
+
     gateway = Gateway(gates, wish.units, wish.rules)
     server = TcpGateway(gateway.answer, gateway.gone)
     try:
@@ -161,7 +163,7 @@ async def _gateway(
             why = error.strerror or str(error)
             raise Failure(f"Nothing can be served at {place}: {why}.", LINE_TROUBLE) from error
         _warn(wish, host, port)
-        yield gates, ServedAt(tcp=f"tcp:{written_host_port(host, port)}")
+        yield f"tcp:{written_host_port(host, port)}"
     finally:
         await server.close()
         for told in await gateway.close():
