@@ -244,10 +244,26 @@ def test_publishing_keeps_no_motor_running_whose_client_died(programs: ExitStack
     options = ["--tcp", "127.0.0.1:0", "--allow-commands", "--metrics", ":0", "--every", "0.2"]
     program = programs.enter_context(served(serving(f"{line}@1", *options), ready="Ready:"))
     made = Gateway(simulation, line, program)
-    wait_until(lambda: "value_good{" in scraped(program), "the drive is read")
+    wait_until(lambda: up(program), "the drive is read")
     started_by_a_client(made)
     wait_until(lambda: not turns(simulation), "its own time-out stops the motor")
-    wait_until(lambda: "drive_up{" in scraped(program) and up(program), "it is read again")
+    wait_until(lambda: up(program), "it is read again")
+
+
+def test_a_serve_that_comes_back_feeds_no_motor_of_the_one_before(programs: ExitStack) -> None:
+    spec = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 30})
+    simulation, line = programs.enter_context(bench(spec))
+    options = ["--tcp", "127.0.0.1:0", "--allow-commands", "--metrics", ":0", "--every", "0.2"]
+    command = serving(f"{line}@1", *options)
+    first = programs.enter_context(served(command, ready="Ready:"))
+    wait_until(lambda: up(first), "the drive is read")
+    started_by_a_client(Gateway(simulation, line, first))
+    first.process.kill()
+    first.process.wait(PATIENCE)
+    again = programs.enter_context(served(command, ready="Ready:"))
+    assert turns(simulation)
+    wait_until(lambda: not turns(simulation), "its own time-out stops the motor")
+    wait_until(lambda: "fault_info{" in scraped(again), "it is read again")
 
 
 def up(program: Served) -> bool:

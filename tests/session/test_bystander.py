@@ -80,6 +80,8 @@ def test_a_motor_that_was_seen_to_stand_is_asked_on() -> None:
     bench = Bench()
     bench.sign = bench.time
     assert bench.asks()
+    bench.saw("fault")
+    assert bench.asks(), "no dead commander resets it"
     bench.saw("stopped")
     assert bench.asks()
     assert bench.asks()

@@ -28,6 +28,7 @@ VARIABLES = (
     ("DRIVEPANEL_LINE", "The LINE, or its name, where none is written."),
     ("DRIVEPANEL_CONFIG", "The configuration folder, in place of that in $XDG_CONFIG_HOME."),
     ("DRIVEPANEL_STATE", "The state folder, in place of that in $XDG_STATE_HOME."),
+    ("DRIVEPANEL_MQTT_PASSWORD", "The password for the broker of serve and publish."),
     ("NO_COLOR", "Draw without colours."),
 )
 CAUTION = (

@@ -136,7 +136,8 @@ class PlantDrive:
 
     def _tell(self, error: str) -> None:
         if error and error != self._error:
-            say(f"drivepanel: device {self.device}: {error} It is tried on.", err=True)
+            who = "" if error.startswith(f"Device {self.device}") else f"Device {self.device}: "
+            say(f"drivepanel: {who}{error} It is tried on.", err=True)
         self._error = error
         self._changed()
 

@@ -11,6 +11,8 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
+from tui.drive.settings.writable import AT_REST
+
 from ..drive import DriveSession
 
 if TYPE_CHECKING:
@@ -21,7 +23,6 @@ UNKNOWN_TIMEOUT_ACTED = 60.0
 """Seconds of silence after which a drive has acted that does not tell its time-out."""
 ACTED_AFTER = 1.0
 """Seconds beyond its time-out after which a drive has begun to act."""
-SEEN_STANDING = ("stopped", "ready", "blocked")
 
 
 class Bystander:
@@ -71,7 +72,7 @@ class Bystander:
         seen = self._latest()
         if seen is None or seen.error or seen.time < since:
             return False
-        stands = seen.state.motion in SEEN_STANDING
+        stands = seen.state.motion in AT_REST
         self.orphan = self.orphan and not stands
         return stands
 
