@@ -12,6 +12,7 @@ from tui.session.drive import DriveSession
 from tui.session.sharing.bystander import (
     ACTED_AFTER,
     COMMANDER_SILENT,
+    GRACE_SHARE,
     UNKNOWN_TIMEOUT_ACTED,
     Bystander,
 )
@@ -63,17 +64,27 @@ def test_a_drive_that_nobody_commands_is_asked() -> None:
     assert all(bench.asks() for _ in range(5))
 
 
-def test_a_drive_is_asked_once_for_each_sign_of_its_commander() -> None:
+def test_a_drive_is_asked_a_while_after_each_sign_of_its_commander() -> None:
     bench = Bench()
     bench.saw("running")
     for _ in range(3):
         bench.sign = bench.time
-        assert bench.asks()
-    assert not bench.asks(), "the client has died"
+        assert bench.asks(0.5)
+        assert bench.asks(GRACE_SHARE * TTO - 0.5)
+    assert not bench.asks(0.1), "the client has died"
     # nothing feeds its time-out; once it must have acted, it is looked at
-    assert not bench.asks(TTO - 2.0)
-    assert bench.asks(ACTED_AFTER + 2.0)
+    assert not bench.asks(TTO - 0.2)
+    assert bench.asks(ACTED_AFTER + 0.2)
     assert not bench.asks()
+
+
+def test_a_slow_commander_has_its_drive_asked_once_for_each_sign() -> None:
+    bench = Bench()
+    bench.saw("running")
+    for _ in range(3):
+        bench.sign = bench.time
+        assert bench.asks(GRACE_SHARE * TTO + 1.0)
+        assert not bench.asks()
 
 
 def test_a_motor_that_was_seen_to_stand_is_asked_on() -> None:
@@ -86,12 +97,12 @@ def test_a_motor_that_was_seen_to_stand_is_asked_on() -> None:
     assert bench.asks()
     assert bench.asks()
     bench.saw("stopped", error="No answer.")
-    assert not bench.asks()
+    assert not bench.asks(GRACE_SHARE * TTO)
     bench.saw("stopped")
     bench.time += 1
     bench.sign = bench.time
     assert bench.asks(), "it was told something since"
-    assert not bench.asks(), "and was not seen since"
+    assert not bench.asks(GRACE_SHARE * TTO), "and was not seen since"
 
 
 @pytest.mark.parametrize(

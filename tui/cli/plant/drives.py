@@ -167,7 +167,8 @@ class PlantDrive:
                 await asyncio.sleep(PLANT_LOOK_INTERVAL)
                 if self._cycle is not None and not self._cycle.error:
                     self._good = loop.time()
-                    if loop.time() - learned > TIMEOUT_READ_AGAIN:
+                    due = loop.time() - learned > TIMEOUT_READ_AGAIN
+                    if due and not looks_on.held_back():
                         learned = loop.time()
                         await _learn_timeout(session)
                 elif self._cycle is not None and looks_on.waits:

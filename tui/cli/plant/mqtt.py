@@ -46,7 +46,6 @@ class MqttPublisher:
         self._news = asyncio.Event()
         self._ended = False
         self._trouble = ""
-        self._there = False
         self.connected = False
         """Whether a broker takes messages now."""
 
@@ -61,16 +60,18 @@ class MqttPublisher:
 
     async def run(self) -> None:
         """Publish until end(); a broker that is lost, or never there, is tried on."""
-        delay = TRY_AGAIN_FIRST
+        delay, loop = TRY_AGAIN_FIRST, asyncio.get_running_loop()
         while not self._ended:
-            self._there = False
+            begun = loop.time()
             try:
                 await self._connected()
             except Exception as error:
                 if not _is_mqtt(error):
                     log.exception("publishing failed")
                 self._lost(str(error))
-            delay = TRY_AGAIN_FIRST if self._there else min(2 * delay, TRY_AGAIN_LONGEST)
+            # one that is lost at once may be that of two programs with one topic: no haste
+            lasted = loop.time() - begun > TRY_AGAIN_LONGEST
+            delay = TRY_AGAIN_FIRST if lasted else min(2 * delay, TRY_AGAIN_LONGEST)
             await self._wait_to_try(delay)
 
     async def _wait_to_try(self, seconds: float) -> None:
@@ -84,7 +85,7 @@ class MqttPublisher:
     async def _connected(self) -> None:
         """One connection, from its begin until it is lost or all is over."""
         async with self._client() as client:
-            self._there = self.connected = True
+            self.connected = True
             if self._trouble:
                 say(f"drivepanel: {self._broker.place} is there again.", err=True)
                 self._trouble = ""

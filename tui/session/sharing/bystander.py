@@ -21,6 +21,8 @@ if TYPE_CHECKING:
 COMMANDER_SILENT = "Not asked: whoever started its motor gives no sign of life."
 UNKNOWN_TIMEOUT_ACTED = 60.0
 """Seconds of silence after which a drive has acted that does not tell its time-out."""
+GRACE_SHARE = 0.25
+"""Share of its time-out for which a drive is asked on after the last sign of its commander."""
 ACTED_AFTER = 1.0
 """Seconds beyond its time-out after which a drive has begun to act."""
 
@@ -29,8 +31,9 @@ class Bystander:
     """Looks on at one drive, and keeps no motor running whose commander has died.
 
     `sign` tells when whoever started its motor was last heard (monotonic), or None where nobody
-    is known to have. The drive is asked once for each such sign, until its motor was seen to
-    stand; one that was silent for longer than its time-out has acted: it is looked at once.
+    is known to have. The drive is asked once for each such sign, and for a quarter of its
+    time-out after it, until its motor was seen to stand; one that was silent for longer than its
+    time-out has acted: it is looked at once.
     """
 
     def __init__(
@@ -65,7 +68,12 @@ class Bystander:
         sign = -math.inf if sign is None else sign
         if sign >= self._asked or self._stands(sign):
             return True
-        return self._silence() > self._limit()
+        timeout = self._timeout()
+        if timeout is None:
+            return self._silence() > UNKNOWN_TIMEOUT_ACTED
+        if timeout == 0 or self._now() - sign <= GRACE_SHARE * timeout:
+            return True
+        return self._silence() > timeout + ACTED_AFTER
 
     def _stands(self, since: float) -> bool:
         """Whether it stood when it was last looked at, and was told nothing since."""
@@ -80,9 +88,9 @@ class Bystander:
         heard = self._session.line.device_state(self._session.device).heard
         return self._now() - (heard if heard is not None else self._asked)
 
-    def _limit(self) -> float:
-        """Seconds of silence after which the drive has acted; 0 for one that never does."""
+    def _timeout(self) -> float | None:
+        """The drive's communication time-out in seconds, 0 for one that has none; None: unknown."""
         told = self._session.timeout
         if told is None or not told.known:
-            return UNKNOWN_TIMEOUT_ACTED
-        return told.watch.timeout + ACTED_AFTER if told.watch is not None else 0.0
+            return None
+        return told.watch.timeout if told.watch is not None else 0.0
