@@ -36,6 +36,7 @@ from tests.defects import (
     identity,
     lines,
     listening,
+    publishing,
     records,
     scripts,
     sharing,
@@ -62,6 +63,7 @@ DEFECTS: tuple[Defect, ...] = (
     *teaching.DEFECTS,
     *terminal.DEFECTS,
     *gateway.DEFECTS,
+    *publishing.DEFECTS,
     *sharing.DEFECTS,
     *counting.DEFECTS,
 )

@@ -11,6 +11,7 @@ import pytest
 from tests.programs import DRIVEPANEL, drivepanel, served
 from tests.sweeps import kept
 from tui.cli.main import COMMANDS
+from tui.cli.plant.metrics import METRICS
 
 from .commands import ended
 
@@ -98,3 +99,9 @@ def test_every_option_is_in_the_help_of_its_command() -> None:
             for word in words:
                 if word.startswith("--"):
                     assert word in told, line
+
+
+def test_every_metric_is_on_the_page_of_the_plant() -> None:
+    page = (DOCS / "plant.md").read_text("utf-8")
+    for name in METRICS:
+        assert f"`drivepanel_{name}`" in page, name

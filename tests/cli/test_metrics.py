@@ -6,12 +6,11 @@ import asyncio
 import re
 from collections.abc import AsyncIterator
 from decimal import Decimal
-from pathlib import Path
 
 import pytest
 import pytest_asyncio
 
-from tui.cli.plant.metrics import BASE_UNITS, METRICS, metrics_text, value_metric
+from tui.cli.plant.metrics import BASE_UNITS, metrics_text, value_metric
 from tui.cli.plant.metrics_server import LONGEST_REQUEST, MOST_SCRAPES, MetricsServer
 from tui.cli.plant.sights import DriveSight, LineSight
 from tui.drive.profile import library
@@ -110,12 +109,6 @@ def test_every_unit_of_every_profile_makes_a_name() -> None:
     assert value_metric("l/min") == ("value_l_min", Decimal(1))
     assert value_metric("µ") == ("value_other", Decimal(1))
     assert value_metric("kHz") == ("value_hertz", Decimal(1000))
-
-
-def test_the_documented_metrics_are_those_that_are_told() -> None:
-    page = (Path(__file__).parents[2] / "docs" / "plant.md").read_text("utf-8")
-    for name in METRICS:
-        assert f"`drivepanel_{name}`" in page, name
 
 
 # The server
