@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
 from typing import TYPE_CHECKING
@@ -22,6 +23,8 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
+FIRST_LOOK_WITHIN = 5.0
+"""Seconds after which those drives are read that were found, at the latest."""
 FIND_AGAIN = 3.0
 """Seconds between two looks for drives that are not there, one after the other on each line."""
 SILENT_FOR_LONG = 60.0
@@ -54,11 +57,19 @@ class PlantLine:
         return LineSight(self.name, self.opened.text, line.state, line.counters, drives)
 
     async def run(self) -> None:
-        """Read its drives until this is cancelled."""
-        finding = asyncio.Lock()
+        """Read its drives until this is cancelled.
+
+        All are looked for before any is read: on a line full of polls that takes far longer.
+        """
+        finding, begin = asyncio.Lock(), asyncio.Event()
         async with asyncio.TaskGroup() as tasks:
             for one in self.drives:
-                tasks.create_task(one.run(finding), name=f"plant {one.device}")
+                tasks.create_task(one.run(finding, begin), name=f"plant {one.device}")
+            with suppress(TimeoutError):
+                async with asyncio.timeout(FIRST_LOOK_WITHIN):
+                    for one in self.drives:
+                        await one.looked_for.wait()
+            begin.set()
 
 
 class PlantDrive:
@@ -80,6 +91,8 @@ class PlantDrive:
         self._every = every
         self._changed = changed
         self._sign = sign
+        self.looked_for = asyncio.Event()
+        """Set once it was asked who it is, whatever it came to."""
         self._session: DriveSession | None = None
         self._cycle: Snapshot | None = None
         self._error = f"Device {self.device} was not asked yet."
@@ -91,10 +104,14 @@ class PlantDrive:
             return DriveSight(self.device, self._session, None, self._error)
         return drive_sight(self.device, self._session, self._cycle, now)
 
-    async def run(self, finding: asyncio.Lock) -> None:
-        """Find it, read it until it is lost, and again; ends by being cancelled only."""
+    async def run(self, finding: asyncio.Lock, begin: asyncio.Event) -> None:
+        """Find it, read it until it is lost, and again; ends by being cancelled only.
+
+        One drive of a line is looked for at a time; none is read before `begin`.
+        """
         while True:
-            session = await self._found(finding)
+            session = await self._found(finding, begin)
+            await begin.wait()
             if self._session is None or session.profile.id != self._session.profile.id:
                 self._cycle = None
             self._session = session
@@ -102,14 +119,18 @@ class PlantDrive:
 
     # Who it is
 
-    async def _found(self, finding: asyncio.Lock) -> DriveSession:
+    async def _found(self, finding: asyncio.Lock, begin: asyncio.Event) -> DriveSession:
         while True:
             async with finding:
-                if (session := await self._looked_for()) is not None:
+                session = await self._asked()
+                self.looked_for.set()
+                if session is not None:
                     return session
-                await asyncio.sleep(FIND_AGAIN)
+                if begin.is_set():
+                    await asyncio.sleep(FIND_AGAIN)
+            await begin.wait()
 
-    async def _looked_for(self) -> DriveSession | None:
+    async def _asked(self) -> DriveSession | None:
         """The drive, or None with why not, which is said when it changes."""
         from tui.bus.api import Priority
         from tui.session.connect.identify import identify_drive

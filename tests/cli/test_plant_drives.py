@@ -1,0 +1,108 @@
+"""Drives that are read for the plant: those that are away cost the others little, and come back."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import AsyncIterator
+from contextlib import suppress
+from dataclasses import dataclass, field
+
+import pytest
+import pytest_asyncio
+
+from tests.session.test_stop import wait_for
+from tui.bus.line import Line, Timing
+from tui.bus.link import RtuTcpLink
+from tui.cli.plant import drives
+from tui.cli.plant.drives import PlantDrive, PlantLine
+from tui.cli.plant.sights import DriveSight
+from tui.cli.shared.options import Target
+from tui.session.connect.open_line import OpenLine
+from tui.simulator import Simulation, parse_drives
+
+LINE = "sim:atv71@1,atv312@2,powerdrive@3"
+HERE, OTHER, NAMELESS, AWAY = 1, 2, 3, 9
+
+
+@dataclass
+class Bench:
+    """A simulated line that is read."""
+
+    opened: OpenLine
+    plant: PlantLine
+    changes: list[int] = field(default_factory=list)
+
+    @property
+    def simulation(self) -> Simulation:
+        assert self.opened.simulation is not None
+        return self.opened.simulation
+
+    def sight(self, device: int) -> DriveSight:
+        seen = self.plant.sight(time.monotonic())
+        return next(one for one in seen.drives if one.device == device)
+
+    def good(self, device: int) -> bool:
+        seen = self.sight(device)
+        return seen.cycle is not None and not seen.error
+
+    def asked(self, device: int) -> int:
+        """Requests that went out to a device."""
+        counted = self.opened.line.counters.devices.get(device)
+        return counted.requests if counted is not None else 0
+
+
+@pytest_asyncio.fixture
+async def bench(monkeypatch: pytest.MonkeyPatch) -> AsyncIterator[Bench]:
+    monkeypatch.setattr(drives, "PLANT_LOOK_INTERVAL", 0.05)
+    monkeypatch.setattr(drives, "FIRST_LOOK_WITHIN", 0.5)
+    monkeypatch.setattr(drives, "FIND_AGAIN", 0.1)
+    simulation = Simulation(parse_drives(LINE.removeprefix("sim:")))
+    simulation.start()
+    quick = Timing(first_timeout=0.2, scan_timeout=0.2, patient_timeout=0.2, late_reply=0.2)
+    line = Line(RtuTcpLink(*simulation.serve_rtu_tcp()), timing=quick)
+    line.open(wait=5.0)
+    opened = OpenLine(LINE, line, simulation)
+    changes: list[int] = []
+    read = tuple(
+        PlantDrive(opened, Target(LINE, device, None), (), 0.1, lambda: changes.append(1))
+        for device in (HERE, AWAY, OTHER, NAMELESS)
+    )
+    made = Bench(opened, PlantLine("pump", opened, read), changes)
+    task = asyncio.create_task(made.plant.run())
+    yield made
+    task.cancel()
+    with suppress(asyncio.CancelledError):
+        await task
+    opened.close()
+
+
+async def test_a_drive_that_is_away_keeps_no_other_from_being_read(
+    bench: Bench, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert bench.sight(HERE).error == "Device 1 was not asked yet."
+    await wait_for(lambda: bench.good(HERE) and bench.good(OTHER))
+    assert bench.changes
+    before = bench.asked(HERE)
+    await wait_for(lambda: bench.asked(HERE) > before + 20)
+    assert bench.asked(AWAY) < before
+    assert "did not answer" in bench.sight(AWAY).error
+    await wait_for(lambda: "name its profile" in bench.sight(NAMELESS).error)
+    said = capsys.readouterr().err
+    assert said.count("Device 9 did not answer") == 1
+    assert said.count("It is tried on.") == 2
+
+
+async def test_a_drive_that_was_long_silent_is_asked_anew_who_it_is(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(drives, "SILENT_FOR_LONG", 0.5)
+    await wait_for(lambda: bench.good(HERE))
+    first = bench.sight(HERE).session
+    bench.simulation.drive(HERE).power_off()
+    await wait_for(lambda: not bench.good(HERE))
+    seen = bench.sight(HERE).cycle
+    assert seen is not None
+    assert {str(one.quality) for one in seen.readings.values()} <= {"stale", "bad"}
+    bench.simulation.drive(HERE).power_on()
+    await wait_for(lambda: bench.good(HERE) and bench.sight(HERE).session is not first)
