@@ -266,6 +266,18 @@ def test_a_serve_that_comes_back_feeds_no_motor_of_the_one_before(programs: Exit
     wait_until(lambda: "fault_info{" in scraped(again), "it is read again")
 
 
+def test_publish_beside_serve_feeds_no_motor_whose_client_died(programs: ExitStack) -> None:
+    spec = DriveSpec("atv71", 1, sets={"CHCF": 1, "TTO": 50})
+    simulation, line = programs.enter_context(bench(spec))
+    command = serving(line, "--tcp", "127.0.0.1:0", "--allow-commands")
+    made = Gateway(simulation, line, programs.enter_context(served(command, ready="Ready:")))
+    broker = f"mqtt://127.0.0.1:{free_port()}"
+    command = [*serving()[:-1], "publish", line, "--mqtt", broker, "--every", "0.2"]
+    programs.enter_context(served(command, ready="Ready:"))
+    started_by_a_client(made)
+    wait_until(lambda: not turns(simulation), "its own time-out stops the motor")
+
+
 def up(program: Served) -> bool:
     return bool(re.search(r"^drivepanel_drive_up\{.*\} 1$", scraped(program), re.M))
 

@@ -33,6 +33,9 @@ PLANT_LOOK_INTERVAL = 2.0
 TIMEOUT_READ_AGAIN = 20.0
 """Seconds after which a drive's communication time-out is read anew."""
 
+GATEWAY = "serve"
+"""What a program is called on a line whose clients may start motors."""
+
 Sign = Callable[[int], float | None]
 """When whoever started the motor of a device was last heard; None where nobody is known to have."""
 
@@ -186,6 +189,8 @@ class PlantDrive:
         try:
             while loop.time() - self._good < SILENT_FOR_LONG:
                 await asyncio.sleep(PLANT_LOOK_INTERVAL)
+                if any(one.name == GATEWAY for one in session.line.facts.others):
+                    looks_on.orphan |= await asyncio.to_thread(_is_orphan, session)
                 if self._cycle is not None and not self._cycle.error:
                     self._good = loop.time()
                     due = loop.time() - learned > TIMEOUT_READ_AGAIN
@@ -218,10 +223,16 @@ async def _learn_timeout(session: DriveSession) -> None:
 
 
 def _is_orphan(session: DriveSession) -> bool:
-    """Whether a program that has ended started the motor, and did not mean to leave it running."""
+    """Whether whoever started the motor has ended, and did not mean to leave it running.
+
+    So has the client of another program's gateway that commands the drive no more. Reads files.
+    """
     from tui.session.starts.keeper import pids_absent
     from tui.session.starts.starts import Starts
 
-    absent = pids_absent(session.line.facts)
+    facts = session.line.facts
+    commander = facts.commanders.get(session.device)
+    gateways = {one.pid for one in facts.others if one.name == GATEWAY and one.id != commander}
+    absent = pids_absent(facts) | gateways
     record = Starts().found(session.line_text, session.device, absent)
     return record is not None and not record.left_running
