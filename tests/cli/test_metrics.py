@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import re
 from collections.abc import AsyncIterator
+from dataclasses import replace
 from decimal import Decimal
 
 import pytest
@@ -78,6 +79,18 @@ def test_line_quality_and_turnarounds_add_up() -> None:
     assert f'{bucket}{{{WHERE},le="1.0"}} 6' in seen
     assert f'{bucket}{{{WHERE},le="+Inf"}} 7' in seen
     assert f"drivepanel_drive_turnaround_seconds_count{{{WHERE}}} 7" in seen
+
+
+def test_what_nobody_is_sure_of_is_no_number_and_a_taught_scale_is_marked() -> None:
+    seen = cycle(small_drive(), RFR=499, THD=50)
+    changed = {"RFR": {"unsure": True}, "THD": {"taught": True}}
+    readings = {
+        code: replace(one, value=replace(one.value, **changed[code]))  # type: ignore[type-var]
+        for code, one in seen.readings.items()
+    }
+    text = text_of(line_of(drive_of(replace(seen, readings=readings))))
+    assert "drivepanel_value_hertz" not in text
+    assert f'drivepanel_value_ratio{{{WHERE},code="THD",taught="true"}} 0.5' in text
 
 
 def test_a_drive_that_was_never_found_is_down_and_nothing_else() -> None:

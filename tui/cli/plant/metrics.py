@@ -232,5 +232,9 @@ def _of_value(who: Labels, reading: Reading, now: float) -> Iterator[MetricSampl
     if reading.value is None or reading.value.number is None:
         yield MetricSample("word", who, reading.raw)
         return
+    if reading.value.unsure:
+        return  # no document says what so high a raw value means: no number for a graph
+    if reading.value.taught:
+        who = {**who, "taught": "true"}
     metric, factor = value_metric(reading.unit)
     yield MetricSample(metric, who, float(reading.value.number * factor))
