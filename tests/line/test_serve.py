@@ -11,6 +11,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from urllib.request import urlopen
 
 import pytest
 from modbus_tk import defines, modbus_tcp
@@ -18,6 +19,7 @@ from modbus_tk.modbus import ModbusError
 from pymodbus.client import ModbusTcpClient
 
 from tests.programs import DRIVEPANEL, PATIENCE, Served, port_of, served, wait_until
+from tui.session.connect.named_lines import settings_file
 from tui.simulator import DriveSpec, Simulation
 
 from .conftest import HERE, Peer
@@ -164,6 +166,28 @@ def test_ids_of_two_lines(programs: ExitStack) -> None:
             assert names[1].startswith(b"ATV31")
             missing = client.read_holding_registers(STATUS, count=1, device_id=2)
             assert missing.exception_code == 10
+
+
+def test_a_name_says_what_a_drive_is_that_does_not(programs: ExitStack) -> None:
+    """A Leroy-Somer drive is not commanded unless it is known which it is."""
+    drives = DriveSpec("powerdrive", 3)
+    with bench(drives) as (simulation, line):
+        settings_file().parent.mkdir(parents=True, exist_ok=True)
+        named = f'[lines.pump]\nline = "{line}"\ndevice = 3\nprofile = "powerdrive"\n'
+        settings_file().write_text(named, "utf-8")
+        command = serving("pump", "--tcp", ":0", "--metrics", ":0", "--every", "0.2")
+        program = programs.enter_context(served(command, ready="Ready:"))
+        made = Gateway(simulation, line, program)
+        with made.client() as client:
+            assert not client.write_register(641, 0, device_id=3).isError()
+        url = re.search(r"http://\S+/metrics", program.ready)
+        assert url is not None
+
+        def read() -> bool:
+            with urlopen(url[0], timeout=PATIENCE) as answer:
+                return b'device="3",profile="powerdrive"' in answer.read()
+
+        wait_until(read, "the drive of the name is read")
 
 
 def test_it_warns_where_other_computers_reach_it() -> None:
