@@ -108,9 +108,7 @@ def test_drives_are_read_by_their_profiles() -> None:
         (1, None),
         (2, "powerdrive"),
     ]
-    (bare,) = served_lines(["bare"])
-    with pytest.raises(click.UsageError, match="Write bare@1,2"):
-        read_drives(bare, ())
+    assert "Write bare@1,2" in refused(2, "serve", "pump", "bare", "--metrics", ":1")
     (simulated,) = served_lines(["sim:atv71@1,atv31@4"])
     assert [one.device for one in read_drives(simulated, (1, 4))] == [1, 4]
 

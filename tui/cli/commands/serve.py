@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from ..plant.broker import mqtt_password_option
-from ..plant.wish import PlantWish, check_names, plant_wish, read_drives
+from ..plant.wish import PlantWish, check_drives, check_names, plant_wish, read_drives
 from ..running.holding import BY_SIGNAL
 from ..running.service import Service
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
@@ -121,8 +121,10 @@ def serve(
             raise click.UsageError("-d and -p go with --tcp, --metrics and --mqtt.")
     wish = _wish(len(served), tcp, maps, fresh, allow_writes, allow_commands)
     served = with_named(served, wish, devices, profile_id)
-    if plant is not None and plant.broker is not None:
-        check_names(plant.broker, [one.name for one in served])
+    if plant is not None:
+        check_drives(served)
+        if plant.broker is not None:
+            check_names(plant.broker, [one.name for one in served])
     service, texts = Service(), [one.text for one in served]
 
     def ready(places: ServedAt) -> str:

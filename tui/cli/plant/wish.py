@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ipaddress
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -48,17 +49,21 @@ def check_names(broker: Broker, names: list[str]) -> None:
         raise click.UsageError(f"{str(error)[0].upper()}{str(error)[1:]}.") from error
 
 
-def read_drives(line: ServedLine, simulated: tuple[int, ...]) -> list[Target]:
-    """The drives of a line that are read: those named, else all of a simulated one.
+def check_drives(lines: Sequence[ServedLine]) -> None:
+    """Raise UsageError where nobody says which drives of a line are read."""
+    from tui.session.connect.line_key import SIMULATED_PREFIX
 
-    Raises UsageError where none is known.
-    """
-    devices = line.devices or simulated
-    if not devices:
-        raise click.UsageError(
-            f"Which drives of {line.name} are read for --metrics and --mqtt?"
-            f" Write {line.name}@1,2 with their addresses."
-        )
+    for line in lines:
+        if not line.devices and not line.text.casefold().startswith(SIMULATED_PREFIX):
+            raise click.UsageError(
+                f"Which drives of {line.name} are read for --metrics and --mqtt?"
+                f" Write {line.name}@1,2 with their addresses."
+            )
+
+
+def read_drives(line: ServedLine, simulated: Sequence[int]) -> list[Target]:
+    """The drives of a line that are read: those named, else all of a simulated one."""
+    devices = line.devices or tuple(simulated)
     return [Target(line.text, device, line.profiles.get(device)) for device in devices]
 
 
