@@ -161,6 +161,21 @@ async def test_metrics_are_told_and_nothing_else(served: int) -> None:
     assert (await asked(served, b"\x16\x03\r\n\r\n")).startswith(b"HTTP/1.1 405")
 
 
+async def test_an_error_that_nobody_foresaw_ends_no_service() -> None:
+    wrong = ["once"]
+
+    def told() -> str:
+        if wrong:
+            raise RuntimeError(wrong.pop())
+        return 'x{name="\udcff"} 1\n'
+
+    server = MetricsServer(told)
+    _, port = await server.listen("127.0.0.1", 0)
+    assert (await asked(port, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 500")
+    assert (await asked(port, b"GET /metrics HTTP/1.1\r\n\r\n")).endswith(b'x{name="?"} 1\n')
+    await server.close()
+
+
 async def test_a_client_that_asks_too_much_is_let_go(served: int) -> None:
     assert await asked(served, b"GET /" + b"x" * 2 * LONGEST_REQUEST) == b""
     assert (await asked(served, b"GET /metrics HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 200")

@@ -73,14 +73,20 @@ class MetricsServer:
             return _http(HTTPStatus.METHOD_NOT_ALLOWED, "Nothing is taken here.\n")
         if path != PATH:
             return _http(HTTPStatus.NOT_FOUND, f"The metrics are at {PATH}.\n")
-        return _http(HTTPStatus.OK, self._text(), METRICS_TYPE, body=method == "GET")
+        try:
+            text = self._text()
+        except Exception:
+            # one answer that nobody foresaw ends no service
+            log.exception("the metrics were not told")
+            return _http(HTTPStatus.INTERNAL_SERVER_ERROR, "The log says what is wrong.\n")
+        return _http(HTTPStatus.OK, text, METRICS_TYPE, body=method == "GET")
 
 
 def _http(
     status: HTTPStatus, text: str, kind: str = "text/plain; charset=utf-8", *, body: bool = True
 ) -> bytes:
     """A whole answer; the connection ends with it."""
-    content = text.encode()
+    content = text.encode("utf-8", "replace")
     head = (
         f"HTTP/1.1 {status.value} {status.phrase}\r\nContent-Type: {kind}\r\n"
         f"Content-Length: {len(content)}\r\nConnection: close\r\n\r\n"
