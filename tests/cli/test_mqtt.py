@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import logging
 import socket
 import sys
 from collections.abc import AsyncIterator
@@ -194,6 +195,9 @@ async def test_everything_is_retained_anew_after_a_lost_connection(
     first = clients.made[2]
     assert first.how["will"] == aiomqtt.Will("plant/status", "offline", qos=1, retain=True)
     assert first.retained["plant/status"] == "online"
+    # a broker that sends what nobody asked for fills no terminal and no log
+    assert not first.how["logger"].isEnabledFor(logging.ERROR)
+    assert first.how["max_queued_incoming_messages"] == 1
 
     sights[:] = [line_of(drive_of(cycle(small_drive(), ETA=0x27, RFR=2)))]
     publisher.news()

@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     import aiomqtt
 
 log = logging.getLogger(__name__)
+_of_client = logging.getLogger(f"{__name__}.client")
+# it tells every message that a broker sends unasked; what counts is raised
+_of_client.setLevel(logging.CRITICAL)
 
 MQTT_KEEPALIVE = 10
 """Seconds; a broker sends the last will after 1.5 of these at the latest."""
@@ -112,6 +115,7 @@ class MqttPublisher:
             username=broker.user,
             password=broker.password,
             identifier=client_id(broker.root),
+            logger=_of_client,
             will=aiomqtt.Will(will, OFFLINE, qos=1, retain=True),
             keepalive=MQTT_KEEPALIVE,
             tls_context=ssl.create_default_context() if broker.tls else None,
