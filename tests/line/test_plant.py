@@ -182,9 +182,10 @@ def test_the_last_will_comes_within_one_and_a_half_keep_alives(
 ) -> None:
     made = publishing(programs, broker)
     assert broker.status == "online"
+    # how long a broker waits is its own affair: 1.5 times what it was told here
+    assert broker.said(f"k{MQTT_KEEPALIVE}, u'drives'") == 1
     made.program.process.send_signal(number)
-    # the broker looks each second
-    wait_until(lambda: broker.status == "offline", "the will", patience=1.5 * MQTT_KEEPALIVE + 5)
+    wait_until(lambda: broker.status == "offline", "the will")
     made.program.process.kill()
 
 
