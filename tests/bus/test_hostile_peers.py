@@ -23,7 +23,7 @@ from tui.bus.master import LineContext, Sending
 from tui.bus.requests import Read
 from tui.bus.result import Piece, ResultKind
 from tui.bus.rtu.exchange import FLOOD, RtuExchange
-from tui.bus.rtu.master import STOOD_STILL, RtuMaster
+from tui.bus.rtu.master import FROZEN_IN_SENDING, RtuMaster
 from tui.bus.tally import Tally
 from tui.bus.tcp.master import TcpMaster
 from tui.bus.trace import Trace
@@ -96,7 +96,7 @@ async def test_what_came_while_the_program_stood_still_as_it_sent_is_no_answer()
     master = RtuMaster(transport, RtuTcpLink("x", 1), around, lambda: None, wire_time=False)
 
     def freeze() -> None:
-        time.sleep(STOOD_STILL + 0.05)
+        time.sleep(FROZEN_IN_SENDING + 0.05)
         transport.held = reply(b"\x01" + QUESTION + b"\0\0")
 
     asked = Sending(1, QUESTION, REQUEST.expectation(), 0.05, look=freeze)

@@ -211,7 +211,7 @@ DEFECTS = (
     Defect(
         "stood-still-not-noticed",
         "tui/bus/rtu/master.py",
-        "still = clock() - begun > STOOD_STILL",
+        "still = clock() - begun > FROZEN_IN_SENDING",
         "still = False",
         "An answer that came while the program was frozen is shown as that of the next request.",
         ("tests/bus/test_hostile_peers.py",),

@@ -25,7 +25,7 @@ TOLERANCE = 0.001
 """Seconds by which the end of a request is uncertain."""
 REMEMBERED, JUDGED, SELDOM = 64, 8, 0.15
 """Replies looked back at; how many are enough; the share of early ones on a line with a baud."""
-STOOD_STILL = 0.2
+FROZEN_IN_SENDING = 0.2
 """Seconds from the last look at the line to the end of sending, past which nothing is sure."""
 MUCH_TALK = 256
 """Bytes that came in while nothing was due, and no silence, after which they are looked at."""
@@ -163,7 +163,7 @@ class RtuMaster:
             await self._send(data)
             tally.count_sent(sending.device, len(data))
             self._around.trace.add(begun, "out", data)
-            still = clock() - begun > STOOD_STILL
+            still = clock() - begun > FROZEN_IN_SENDING
             result = await (self._distrust(sending) if still else self._result(exchange, sending))
         finally:
             self._exchange = self._done = None
