@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 import math
 import threading
-import time
 from collections.abc import Callable, Coroutine, Iterable
 from contextlib import suppress
 from typing import Any
@@ -14,6 +13,7 @@ from tui.bus.api import ModbusLine
 from tui.bus.errors import LineClosed
 from tui.bus.program import Program
 
+from ..clock import REAL_CLOCK
 from .started import StartedMotors
 
 log = logging.getLogger(__name__)
@@ -73,7 +73,7 @@ class GatewayCommanding:
             return why
         with self._lock:
             before, self._by[device] = self._by.get(device), client
-            self._signs[device] = time.monotonic()
+            self._signs[device] = REAL_CLOCK.monotonic()
         if before not in (None, client):
             text = f"Modbus TCP client {client} commands this drive now, as client {before} did."
             log.warning("drive %s: %s", device, text)
@@ -84,7 +84,7 @@ class GatewayCommanding:
         """A client asks for a drive: a sign of life, if it is the one that commands it."""
         with self._lock:
             if self._by.get(device) == client:
-                self._signs[device] = time.monotonic()
+                self._signs[device] = REAL_CLOCK.monotonic()
 
     def last_sign(self, device: int) -> float:
         """When a client that commands the drive was last heard (monotonic); never is -inf."""

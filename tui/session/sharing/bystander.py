@@ -7,12 +7,12 @@ died would run for ever.
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from tui.drive.settings.writable import AT_REST
 
+from ..clock import REAL_CLOCK
 from ..drive import DriveSession
 
 if TYPE_CHECKING:
@@ -41,7 +41,7 @@ class Bystander:
         session: DriveSession,
         sign: Callable[[], float | None],
         latest: Callable[[], Snapshot | None],
-        now: Callable[[], float] = time.monotonic,
+        now: Callable[[], float] = REAL_CLOCK.monotonic,
     ) -> None:
         self.orphan = False
         """Whether a program that has ended started the motor, and nobody has seen it stand."""
