@@ -17,7 +17,6 @@ EXCEPTIONS: dict[str, tuple[int, str]] = {
     "bus/api.py:ModbusLine": (20, "what all of a line is asked for; the fake has the same"),
     "bus/fake.py:FakeLine": (18, "the same as the line that it stands for"),
     "bus/fake.py": (325, "a line in one place, its use shown at the top"),
-    "screens/connection/state.py": (314, "one screen's lists, form, search and advice"),
     "bus/shared_facts.py:SharedFacts": (18, "all that programs on a line must agree on"),
     "screens/app_port.py:Panel": (25, "all that screens ask of the app, most of it abstract"),
     "screens/connection/state.py:LineView": (

@@ -19,7 +19,7 @@ import pytest
 
 from tests.bus.peer import PtyPeer, Step, silent
 from tests.programs import DRIVEPANEL, PATIENCE, served
-from tui.drive.finding import likely_settings
+from tui.drive.finding import LineSetting, likely_settings
 from tui.session.connect import strangers
 from tui.simulator import DriveSpec, LineTiming, Simulation
 from tui.wire.frames import frame, read_frame
@@ -203,6 +203,19 @@ def test_other_settings_are_tried_and_what_hears_two_is_told_once() -> None:
         (9600, "8E1"),
     ]
     assert end["not_tried"] == 0
+
+
+def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = [LineSetting(9600, "8E1"), LineSetting(600, "8E1"), LineSetting(300, "8E1")]
+    monkeypatch.setattr(strangers, "likely_settings", lambda *_: slow)
+    with PtyPeer(silent) as peer:
+        done = invoked("scan", peer.path, "--addresses", "1", "--all-settings", "--json")
+    (told,) = events(done.stdout, "slow")
+    assert [one["baud"] for one in told["settings"]] == [600, 300]
+    text = "Left are 300 and 600 baud: 1 s more, for Powerdrive, Proxidrive and Varmeca 33/34 alone"
+    assert text in done.stderr
+    (end,) = events(done.stdout, "ended")
+    assert [one["baud"] for one in end["settings"]] == [19200, 9600, 600, 300]
 
 
 def test_without_a_terminal_no_other_setting_is_tried_where_a_drive_would_act() -> None:

@@ -8,6 +8,7 @@ SCAN = "tests/cli/test_scan.py"
 SEARCH = "tests/session/test_search.py"
 MASTERS = "tests/session/test_other_masters.py"
 FIND = "tests/session/test_find_drive.py"
+SETTINGS = "tests/ui/test_other_settings.py"
 FAMILIES = "tests/drive/test_finding.py"
 
 DEFECTS = (
@@ -106,5 +107,45 @@ DEFECTS = (
         "    except ZeroDivisionError:\n",
         "Whoever ends a long search does not learn what it came to.",
         (f"{SCAN}::test_ctrl_c_keeps_what_was_found",),
+    ),
+    Defect(
+        "unknown-drive-left-alone",
+        "tui/session/fleet.py",
+        "self._strangers.keep(identity.device)",
+        "pass",
+        "A drive of no known family trips while a person looks up which one it is.",
+        (f"{SETTINGS}::test_drives_are_asked_on_while_the_person_decides_known_or_not",),
+    ),
+    Defect(
+        "unclear-answer-passed-by",
+        "tui/screens/connection/other_settings.py",
+        "if self.found or self.search.answered:",
+        "if self.found:",
+        "Two drives at one address are asked once and left alone, unasked.",
+        (f"{SETTINGS}::test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked",),
+    ),
+    Defect(
+        "families-not-named",
+        "tui/screens/connection/scanning.py",
+        "self.families = await asyncio.to_thread(_families)",
+        'self.families = ""',
+        "Nobody knows before the search that a drive will watch the line from then on.",
+        (f"{SETTINGS}::test_who_may_be_there_is_named_before_the_first_request",),
+    ),
+    Defect(
+        "second-round-not-counted",
+        "tui/session/connect/search.py",
+        "return first + LATE_WAIT + (self._silent.times + still) * self._cost_again",
+        "return first",
+        "A search that says that a second is left takes ten.",
+        (f"{SEARCH}::test_what_is_left_counts_the_silent_ones_once_more_and_what_they_really_take",),
+    ),
+    Defect(
+        "slow-settings-unannounced",
+        "tui/cli/running/scanning.py",
+        "if self.costs is None or not later[0].slow or any(one.slow for one in self.tried[1:]):",
+        "if True:",
+        "A search that is as good as done goes on for a minute and a half, and nobody knows why.",
+        (f"{SCAN}::test_what_is_slow_is_told_before_it_is_tried",),
     ),
 )  # fmt: skip

@@ -8,8 +8,10 @@ from tests.session.fakes import profile_of
 from tui.drive.finding import (
     LineSetting,
     PresenceProbe,
+    families_at,
     likely_settings,
     longest_turnaround,
+    names_text,
     presence_probes,
     silent_cost,
     wait_for_reply,
@@ -31,6 +33,26 @@ def test_factory_settings_come_first_and_what_costs_most_last(families: list[Pro
     assert found.index(LineSetting(9600, "8E1")) < found.index(LineSetting(38400, "8E1"))
     assert str(found[-1]) == "300 8O1"
     assert len(found) == len(set(found)) == 40
+
+
+def test_what_is_slow_is_a_step_of_its_own_behind_all_that_is_likely(
+    families: list[Profile],
+) -> None:
+    found = likely_settings([one.data.link for one in families], longest_turnaround(families))
+    slow = [one for one in found if one.slow]
+    assert found[-len(slow) :] == slow
+    assert {one.baud for one in slow} == {300, 600}
+    assert families_at(families, slow) == ["Powerdrive", "Proxidrive", "Varmeca 33/34"]
+    # 31 addresses at all the others take less than a minute, the listening with it
+    wait = longest_turnaround(families) + 0.002
+    likely = [one for one in found if not one.slow]
+    assert sum(31 * silent_cost(one, wait_for_reply(one, wait)) for one in likely) < 60 - 1.5
+
+
+def test_names_in_a_sentence() -> None:
+    assert names_text([]) == "nobody"
+    assert names_text(["300"]) == "300"
+    assert names_text(["300", "600", "1200"]) == "300, 600 and 1200"
 
 
 def test_of_two_that_are_as_likely_the_faster_comes_first() -> None:

@@ -28,7 +28,7 @@ from tui.bus.schedule.pace import Pace
 from tui.drive.profile import library
 from tui.session.connect.identify import ScanResult, identify_drive
 from tui.session.connect.open_line import demo_line, open_line
-from tui.session.connect.search import REST, Search
+from tui.session.connect.search import LATE_WAIT, REST, SECOND_WAIT, Search
 from tui.session.connect.strangers import JITTER
 from tui.session.drive import DriveSession
 from tui.simulator import DriveSpec, Simulation
@@ -140,6 +140,39 @@ async def test_a_network_is_waited_for_as_ever() -> None:
     line = Replies(set(), link=TcpLink("127.0.0.1"))
     await searched(Search([1], line.no_time, once=True), line)
     assert line.waits == [None]
+
+
+async def test_what_is_left_counts_the_silent_ones_once_more_and_what_they_really_take() -> None:
+    line = Replies({1})
+    clock, left = [0.0], list[float]()
+
+    def look() -> None:
+        left.append(search.left)
+        clock[0] += 1.0  # each address takes a second
+
+    search = Search(range(1, 5), line.no_time, between=look, now=lambda: clock[0])
+    await searched(search, line)
+    once, again, within = left[0] - LATE_WAIT, left[4], line.waits[0]
+    assert within is not None
+    # before anything is known: four at the line's limit, and the four of the next round
+    assert once == pytest.approx(4 * (search.cost + search.cost + SECOND_WAIT - within))
+    assert again == pytest.approx(3 * (search.cost + SECOND_WAIT - within))
+    assert search.left == 0
+
+
+async def test_silent_addresses_that_take_longer_tell_more_time() -> None:
+    line, clock, left = Replies(set()), [0.0], list[float]()
+
+    async def rest(_seconds: float) -> None:
+        clock[0] += 2.0
+
+    def look() -> None:
+        left.append(search.left)
+
+    search = Search(range(1, 4), rest, once=True, between=look, now=lambda: clock[0])
+    line.pace.claim("a monitor", 1, 0.1, 0.5)
+    await searched(search, line)
+    assert left == [pytest.approx(3 * search.cost), 4.0, 2.0]
 
 
 async def test_who_answers_too_late_is_heard_and_asked_again() -> None:

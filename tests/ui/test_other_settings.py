@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 
 import pytest
 from textual.pilot import Pilot
 
-from tests.bus.peer import PtyPeer, silent
+from tests.bus.peer import PtyPeer, Step, silent
 from tui.app import DrivePanelApp
-from tui.drive.finding import likely_settings
+from tui.drive.finding import LineSetting, likely_settings
 from tui.screens.dialogs.confirm import Confirm
 from tui.session.connect import strangers
 from tui.session.paths import recent_lines
 from tui.simulator import DriveSpec, LineTiming, Simulation
-from tui.wire.frames import read_frame
+from tui.widgets.plain import Plain
+from tui.wire.frames import frame, read_frame
 
-from .test_flows import until
+from .test_flows import shown, until
 
 
 @pytest.fixture(autouse=True)
@@ -38,6 +39,14 @@ async def panel_on(line: str) -> AsyncIterator[tuple[DrivePanelApp, Pilot[None]]
         app.connection.action_scan()
         await until(pilot, lambda: bool(app.connection.search and app.connection.search.ended))
         yield app, pilot
+
+
+def advice(app: DrivePanelApp) -> str:
+    return " ".join(shown(app, "message").split())
+
+
+def dialog(app: DrivePanelApp) -> str:
+    return str(app.screen.query_one("#follows", Plain).visual)
 
 
 def said(app: DrivePanelApp) -> str:
@@ -68,6 +77,69 @@ async def test_a_drive_that_would_act_is_left_alone_only_with_a_yes() -> None:
             await until(pilot, lambda: not isinstance(app.screen, Confirm))
             assert set(app.connection.found) == {1}
             assert app.line_text.endswith(",19200,8E1")
+
+
+async def test_what_is_slow_is_told_before_it_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow = [LineSetting(9600, "8E1"), LineSetting(600, "8E1"), LineSetting(300, "8E1")]
+    monkeypatch.setattr(strangers, "likely_settings", lambda *_: slow)
+    with PtyPeer(silent) as peer:
+        async with panel_on(peer.path) as (app, pilot):
+            app.connection.form.offer_addresses("1-3")
+            app.connection.action_scan_settings()
+            await until(pilot, lambda: "Left are 300 and 600 baud: " in said(app))
+            assert "for Powerdrive, Proxidrive and Varmeca 33/34 alone. Esc ends" in said(app)
+            await until(pilot, lambda: "600 8E1, 2 of 3 settings. 3 s left." in advice(app))
+            app.connection.action_stop_scan()
+
+
+async def test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked() -> None:
+    def garbled(request: bytes, _count: int) -> Sequence[Step]:
+        return [frame(2, bytes.fromhex("03 02 0001"))[:-1] + b"\0"] if request[0] == 2 else []
+
+    with PtyPeer(garbled) as peer:
+        async with panel_on(peer.path) as (app, pilot):
+            app.connection.action_scan_settings()
+            await until(pilot, lambda: isinstance(app.screen, Confirm))
+            assert "Something answered at 2: what it does" in dialog(app)
+            await pilot.press("y")
+            await until(
+                pilot, lambda: "Somebody answers, and not clearly, at 19200 8N2" in said(app)
+            )
+
+
+async def test_who_may_be_there_is_named_before_the_first_request() -> None:
+    with PtyPeer(silent) as peer:
+        app = DrivePanelApp(start=f"{peer.path},19200,8E1")
+        async with app.run_test(size=(80, 24)) as pilot:
+            await until(pilot, lambda: "Altivar 21 (F803), and" in shown(app, "message"))
+            assert "asked on while the line is open" in advice(app)
+            assert peer.requests == []
+            await until(pilot, lambda: " left" in shown(app, "search"))
+            assert " s left." in advice(app)
+
+
+async def test_drives_are_asked_on_while_the_person_decides_known_or_not() -> None:
+    def refusing(request: bytes, _count: int) -> Sequence[Step]:
+        if request[0] == 2:
+            return [frame(2, bytes([request[1] | 0x80, 1]))]
+        reply = simulation.line.receive(request)
+        return [reply.data] if reply is not None else []
+
+    simulation = Simulation([DriveSpec("atv21", 1)], any_settings=True)
+    with simulation, PtyPeer(refusing) as peer:
+        async with panel_on(peer.path) as (app, pilot):
+            await until(pilot, lambda: set(app.connection.found) == {1, 2})
+            app.connection.action_scan_settings()
+            await until(pilot, lambda: isinstance(app.screen, Confirm))
+            assert "Device 2: what it does when it is asked no more is not" in dialog(app)
+            before = len(peer.requests)
+            for device in (1, 2):
+                await until(pilot, lambda: _asked(peer, device, before) >= 2)  # noqa: B023
+            assert app.line_text.endswith(",19200,8E1")
+
+
+def _asked(peer: PtyPeer, device: int, since: int) -> int:
+    return sum(request[0] == device for request in peer.requests[since:])
 
 
 async def test_another_master_is_told_and_nothing_is_sent() -> None:

@@ -16,6 +16,9 @@ T = TypeVar("T")
 
 FACTORY_SHARE = Decimal("0.5")
 """How many of the drives of a family are taken to be as they left the factory, in each setting."""
+SLOW_BELOW = 1200
+"""Baud rates below it are tried last, unless a family leaves the factory so: an address costs
+0.2 s and more there."""
 IDENTIFY = 43
 ASKED_CHARACTERS = 8
 """Characters of the request that finds out whether anybody is there."""
@@ -35,6 +38,11 @@ class LineSetting:
     def stop_bits(self) -> int:
         """1 or 2."""
         return int(self.format[2])
+
+    @property
+    def slow(self) -> bool:
+        """Whether it is tried last, and only after that was said."""
+        return self.baud < SLOW_BELOW
 
     def hears(self, other: LineSetting) -> bool:
         """Whether a drive of the one setting may understand the other: but for stop bits alike."""
@@ -87,7 +95,7 @@ def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[Li
     """Every baud and format that a family can have, in the order in which they are worth a try.
 
     Factory settings first; then by how many drives are likely to have it, for the time that it
-    takes to ask an address: at 300 baud one costs as much as thirty at 19 200.
+    takes to ask an address: at 300 baud one costs as much as thirty at 19 200. Slow ones last.
     """
     shares: dict[LineSetting, Decimal] = {}
     for link in links:
@@ -97,11 +105,29 @@ def likely_settings(links: Sequence[LinkSettings], turnaround: float) -> list[Li
                 shares[one] = shares.get(one, Decimal(0)) + of_baud * of_form
     factory = {LineSetting(link.baud, link.format) for link in links}
 
-    def worth(one: LineSetting) -> tuple[bool, float, int, str]:
+    def worth(one: LineSetting) -> tuple[bool, bool, float, int, str]:
         cost = silent_cost(one, wait_for_reply(one, turnaround))
-        return one not in factory, -float(shares[one]) / cost, -one.baud, one.format
+        return one not in factory, one.slow, -float(shares[one]) / cost, -one.baud, one.format
 
     return sorted(shares, key=worth)
+
+
+def families_at(profiles: Iterable[Profile], settings: Iterable[LineSetting]) -> list[str]:
+    """Names of the families that can be set to one of these."""
+    wanted = {(one.baud, one.format) for one in settings}
+    found = []
+    for one in profiles:
+        link = one.data.link
+        bauds, formats = {link.baud, *link.bauds}, {link.format, *link.formats}
+        if any(baud in bauds and form in formats for baud, form in wanted):
+            found.append(one.data.profile.name)
+    return found
+
+
+def names_text(names: Sequence[str]) -> str:
+    """Names in a sentence: one, or several with `and` before the last."""
+    *first, last = names or ("nobody",)
+    return f"{', '.join(first)} and {last}" if first else last
 
 
 def _shares(factory: T, all_of_them: Sequence[T]) -> dict[T, Decimal]:

@@ -99,6 +99,11 @@ class Leaving(Panel):
             for one in line_watch.unread()
             if one.device not in told
         ]
+        found += [
+            f"Device {device}: what it does when it is asked no more is not known."
+            for device, one in fleet.found.items()
+            if one.console is None
+        ]
         head = "Once nobody asks them any more, drives act on their time-out, at rest too:"
         return [head, *found] if found else []
 

@@ -27,6 +27,7 @@ from .events import EventLog
 from .journal import Entry, Journal, now_text
 from .monitor.alarms import LineAlarms, PresentFault
 from .monitor.line_watch import LineWatch
+from .monitor.strangers_asked import StrangersAsked
 from .sharing.handover import Handover
 from .starts.keeper import StartKeeper
 from .work import Outcome, OutcomeKind
@@ -74,6 +75,7 @@ class Fleet:
         self.starts = starts
         """Where starts of motors are put on record; None where none are."""
         self.line_watch = LineWatch(line)
+        self._strangers = StrangersAsked(line, clock)
         self.events = events or EventLog(clock.wall)
         """What was said about the drives."""
         self.stopper = Stopper(line, journal, self.events)
@@ -107,8 +109,9 @@ class Fleet:
         return found.console if found else None
 
     def note(self, identity: DriveIdentity) -> None:
-        """A drive answered; what it is taken for is not known yet."""
+        """A drive answered; what it is taken for is not known yet. It is asked on."""
         self._put(FoundDrive(identity))
+        self._strangers.keep(identity.device)
 
     def take(
         self, session: DriveSession, identity: DriveIdentity | None = None, *, guessed: bool = False
@@ -128,6 +131,7 @@ class Fleet:
         self._put(FoundDrive(said, console, guessed))
         if before is not None:
             before.close()
+        self._strangers.let_go(session.device)
         self.line_watch.keep(session, console.monitor)
         # reads files: in a thread that nobody waits for
         threading.Thread(target=self._recall, args=(console,), daemon=True).start()
@@ -187,6 +191,7 @@ class Fleet:
         with self._lock:
             before, self._found = self._found, MappingProxyType({})
         self.line_watch.stop()
+        self._strangers.stop()
         for drive in before.values():
             if drive.console is not None:
                 drive.console.close()

@@ -30,8 +30,8 @@ ALL_ADDRESSES = "1-247"
 @click.option(
     "--all-settings",
     is_flag=True,
-    help="Then try every other baud and format that drives can have, likely ones first. The line"
-    " is not shared meanwhile.",
+    help="Then try every other baud and format that drives can have, likely ones first and those"
+    " below 1200 baud, which take longest, last. The line is not shared meanwhile.",
 )
 @click.option(
     "--yes",
@@ -93,7 +93,8 @@ async def _prepare(scan: Scan, *, all_settings: bool) -> None:
     """Which settings are tried; raises UsageError and Failure where others cannot be."""
     from tui.bus.link import SerialLink
     from tui.bus.transport.ports import is_pseudo_terminal
-    from tui.session.connect.strangers import settings_worth_a_try, strangers_of
+    from tui.session.connect.setting_costs import setting_costs
+    from tui.session.connect.strangers import settings_worth_a_try
 
     line, here = scan.opened.line, scan.setting
     if not all_settings:
@@ -109,10 +110,14 @@ async def _prepare(scan: Scan, *, all_settings: bool) -> None:
         )
     parity = not is_pseudo_terminal(line.link.path)
     scan.settings = await asyncio.to_thread(settings_worth_a_try, here, parity=parity)
-    wait, patient = line.timing.scan_timeout, scan.opened.simulation is not None
-    for one in scan.settings:
-        link = SerialLink(line.link.path, one.baud, one.format, line.link.timeout)
-        scan.costs[one] = strangers_of(link, wait, patient=patient).cost
+    scan.costs = await asyncio.to_thread(
+        setting_costs,
+        line.link,
+        line.timing.scan_timeout,
+        scan.settings,
+        len(scan.devices),
+        patient=scan.opened.simulation is not None,
+    )
 
 
 def _end(scans: list[Scan], addresses: str) -> str:

@@ -24,6 +24,7 @@ from .of_drives import (
     ScanEndTold,
     ScanFamiliesTold,
     ScanHitTold,
+    ScanSlowTold,
     ScanUnclearTold,
     StatusTold,
     StopTold,
@@ -61,7 +62,7 @@ from .of_settings import (
 
 DOCUMENTS: tuple[type[msgspec.Struct], ...] = (
     ErrorTold, ReadTold, CycleTold, IdentityTold, StatusTold, RunTold, HoldTold, ProveTold,
-    ScanFamiliesTold, ScanHitTold, ScanUnclearTold, ScanEndTold,
+    ScanFamiliesTold, ScanSlowTold, ScanHitTold, ScanUnclearTold, ScanEndTold,
     CommandTold, StopTold, WriteTold, RestoreTold, BackupTold, ReportTold, CompareTold, BlocksTold,
     BlockChangeTold, BlockFileTold, LessonTold, TaughtTold, TeachChangeTold, PortTold, ProfileTold,
     ProfileShown, WiringTold, CheckTold, ProfileBegun, ProfileFolder, SimulationReady, InputsTold,

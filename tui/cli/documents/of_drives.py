@@ -193,6 +193,17 @@ class ScanUnclearTold(DocumentTold, kw_only=True):
     text: str
 
 
+class ScanSlowTold(DocumentTold, kw_only=True):
+    """`scan`: the likely settings are through; those that are left take so many seconds."""
+
+    command: Literal["scan"]
+    line: str
+    event: Literal["slow"]
+    settings: list[LineSettingTold]
+    seconds: float
+    text: str
+
+
 class ScanEndTold(DocumentTold, kw_only=True):
     """`scan`: the end; `done` is false where it was ended before."""
 

@@ -81,6 +81,15 @@ class ScanTelling:
             self._print({"event": "families", "families": rows, "text": told})
         self.note(told)
 
+    def slow(self, settings: Sequence[LineSetting], seconds: float, text: str) -> None:
+        """The likely settings are through; those that are left take long."""
+        if self._as_json:
+            rows = [_setting_json(one) for one in settings]
+            self._print(
+                {"event": "slow", "settings": rows, "seconds": round(seconds, 1), "text": text}
+            )
+        self.note(text)
+
     def hit(self, hit: Hit) -> None:
         """A drive has answered."""
         if self._as_json:

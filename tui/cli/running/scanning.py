@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from tui.session.connect.identify import DriveIdentity, ScanResult
     from tui.session.connect.open_line import OpenLine
     from tui.session.connect.search import Search
+    from tui.session.connect.setting_costs import SettingCosts
     from tui.session.drive import DriveSession
     from tui.session.fleet import Fleet
 
@@ -39,8 +40,8 @@ class Scan:
     tell: ScanTelling
     settings: list[LineSetting] = field(default_factory=list)
     """Those to be tried, that of the line first; none over a network."""
-    costs: dict[LineSetting, float] = field(default_factory=dict)
-    """Seconds that an address costs at each at which nobody is."""
+    costs: SettingCosts | None = None
+    """What they take; None where no other is tried."""
     yes: bool = False
     """Whether other settings are tried although drives that were found may act meanwhile."""
     hits: list[Hit] = field(default_factory=list)
@@ -64,6 +65,7 @@ class Scan:
         later = self.settings[1:]
         goes_on = await self._at_this_setting(last=not later)
         while later and goes_on:
+            await self._tell_slow(later)
             setting = later.pop(0)
             if await self._reopened(setting):
                 goes_on = await self._at_this_setting(last=not later)
@@ -150,15 +152,26 @@ class Scan:
         finally:
             work.cancel()
 
+    async def _tell_slow(self, later: Sequence[LineSetting]) -> None:
+        """Before the first of the slow settings: how long they take, and who can have them."""
+        if self.costs is None or not later[0].slow or any(one.slow for one in self.tried[1:]):
+            return
+        text = await asyncio.to_thread(self.costs.before_slow, later, "Ctrl-C")
+        self.tell.slow(later, self.costs.seconds(later), text)
+
     def _progress(self, search: Search) -> Progress:
-        later = self.settings[len(self.tried) :]
-        left = search.left + sum(self.costs.get(one, 0.0) for one in later) * len(self.devices)
-        found = len(self.hits)
+        """How far it is; the slow settings are a step of their own."""
+        later, left, found = self.settings[len(self.tried) :], search.left, len(self.hits)
+        if self.costs is not None:
+            slow = self.setting is not None and self.setting.slow
+            later = [one for one in later if slow or not one.slow]
+            left += self.costs.seconds(later)
         return Progress(self.setting, search.asked, search.of, found, left, len(later))
 
     async def _take(self, fleet: Fleet, result: ScanResult) -> None:
         """An address is not silent: tell it at once, then ask the drive on."""
         if result.identity is None:
+            self.unknown.append(result.device)
             self.tell.unclear(self.setting, result)
             return
         hit = Hit(self.setting, result.identity, result.by)
@@ -169,6 +182,7 @@ class Scan:
             mind_the_drive(self.opened, result.device, result.identity)
         if session is None:
             self.unknown.append(result.device)
+            fleet.note(result.identity)
             return
         self.sessions.append(session)
         fleet.take(session, guessed=result.identity.profile is None)

@@ -11,12 +11,13 @@ from textual.worker import WorkerError
 
 from tui.bus.errors import LineError, LinkSyntaxError, PortRefused
 
+from .advice import ALARM_KIND
 from .line_keys import LineKeys
-from .state import ALARM_KIND
 
 if TYPE_CHECKING:
     from tui.bus.link import SerialLink
     from tui.drive.finding import LineSetting
+    from tui.session.connect.setting_costs import SettingCosts
 
 
 class OtherSettings(LineKeys):
@@ -40,12 +41,25 @@ class OtherSettings(LineKeys):
             self.say(str(error), "c changes the addresses.", ALARM_KIND)
             return
         self.end_search()
-        always = self._what_is_here() if self.found else ""
+        always = self._what_is_here() if self.found else self._who_is_unclear()
         question = "Try other baud rates and formats?"
         if not await self.app.may_let_go(question, yes="tries them", no="stays", always=always):
             return
+        await self.name_families()
         if not await self.hears_another_master(link):
-            await self._try(link, devices, await asyncio.to_thread(self._worth_a_try, link))
+            settings = await asyncio.to_thread(self._worth_a_try, link)
+            costs = await asyncio.to_thread(self._costs, link, settings, len(devices))
+            await self._try(link, devices, settings, costs)
+
+    def _who_is_unclear(self) -> str:
+        """Of addresses whose answers were no replies: what leaves them alone; empty without any."""
+        from tui.session.connect.addresses import addresses_text
+
+        answered = self.search.answered if self.search is not None else frozenset()
+        if not answered:
+            return ""
+        who = addresses_text(sorted(answered))
+        return f"Something answered at {who}: what it does when it is asked no more is not known."
 
     def _port(self) -> SerialLink | None:
         """The port that is open for the panel alone; else it is said why nothing is tried."""
@@ -79,14 +93,36 @@ class OtherSettings(LineKeys):
         self._settings_tried |= {here}
         return left or known[1:]
 
+    def _costs(
+        self, link: SerialLink, settings: Sequence[LineSetting], addresses: int
+    ) -> SettingCosts:
+        """What the settings take; reads files."""
+        from tui.session.connect.setting_costs import setting_costs
+
+        opened = self.app.opened
+        wait = opened.line.timing.scan_timeout if opened is not None else 0.0
+        return setting_costs(link, wait, settings, addresses)
+
+    def _tell_slow(self, settings: Sequence[LineSetting], costs: SettingCosts) -> None:
+        """Before the first of the slow settings: how long they take, and who can have them."""
+        self.app.events.add("told", costs.before_slow(settings, "Esc"))
+
     async def _try(
-        self, link: SerialLink, devices: Sequence[int], settings: Sequence[LineSetting]
+        self,
+        link: SerialLink,
+        devices: Sequence[int],
+        settings: Sequence[LineSetting],
+        costs: SettingCosts,
     ) -> None:
         """Search at each setting until somebody answers."""
         self.forget_drives()
         for number, setting in enumerate(settings, start=1):
             text = f"serial:{link.path},{setting.baud},{setting.format}"
             far = f"{setting}, {number} of {len(settings)} settings"
+            later = settings[number:]
+            if setting.slow and not any(one.slow for one in settings[: number - 1]):
+                self._tell_slow((setting, *later), costs)
+            self.later = costs.seconds(one for one in later if setting.slow or not one.slow)
             self.advise(f"Drives are searched for at {far}.", "Esc ends it.")
             try:
                 await self.app.connect(text, remember=False)
@@ -103,7 +139,7 @@ class OtherSettings(LineKeys):
             if self.search is None or self.search.ended != "done":
                 return  # told where it failed
             self._settings_tried |= {setting}
-            if self.found:
+            if self.found or self.search.answered:
                 self._stay_at(text, setting)
                 return
         self.say(
@@ -118,7 +154,8 @@ class OtherSettings(LineKeys):
         from tui.session.paths import remember_line
 
         self.form.show_settings(setting.baud, setting.format)
-        self.say(f"Drives answer at {setting}.", "The line stays there.")
+        answer = "Drives answer" if self.found else "Somebody answers, and not clearly,"
+        self.say(f"{answer} at {setting}.", "The line stays there.")
         remember_line(remembered_text(text))
         self.action_refresh_lines()
         self.look()

@@ -12,8 +12,9 @@ from textual import work
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 
+from .advice import ALARM_KIND
 from .found import WATCHED_ONLY
-from .state import ALARM_KIND, LineView
+from .state import LineView
 
 if TYPE_CHECKING:
     from tui.bus.link import Link
@@ -60,14 +61,19 @@ class Scanning(LineView):
         opened = self.app.opened
         patient = opened is not None and opened.simulation is not None
         look = MasterLookout(fleet.line).look
-        search = fleet.search = Search(devices, patient=patient, once=once, between=look)
+        now = fleet.clock.monotonic
+        search = fleet.search = Search(devices, patient=patient, once=once, between=look, now=now)
         if not once:
+            self.later = 0.0
             self.tell_search()
         self.look()
         if typed:
             await asyncio.to_thread(_remember, self.app.line_text, typed)
-        if not once and await self._is_not_alone(search):
-            return
+        if not once:
+            strangers = len(devices) > 1 and not self.found
+            await self.name_families(wanted=strangers)
+            if strangers and await self._is_not_alone(search):
+                return
         try:
             await search.run(fleet.line, self._take)
         except LineError as error:
@@ -80,7 +86,7 @@ class Scanning(LineView):
 
     async def _is_not_alone(self, search: Search) -> bool:
         """Whether another master was heard before a search for unknown drives; that ends it."""
-        if len(search.devices) < 2 or self.found or self.app.fleet is None:
+        if self.app.fleet is None:
             return False
         heard = True  # also where a key ends it meanwhile
         try:
@@ -91,6 +97,18 @@ class Scanning(LineView):
             self.tell_search()
         self.look()
         return heard
+
+    async def name_families(self, *, wanted: bool = True) -> None:
+        """Before the first request: who may be there and acts when it is asked no more.
+
+        Not where they are known drives, or those of a simulation in this very program.
+        """
+        opened = self.app.opened
+        if not wanted or opened is None or opened.simulation is not None:
+            self.families = ""
+            return
+        self.families = await asyncio.to_thread(_families)
+        self.look()
 
     async def hears_another_master(self, link: Link) -> bool:
         """Listen on a port before anything is sent; another master is told, and what it asks."""
@@ -232,6 +250,15 @@ class Scanning(LineView):
             self.app.fleet.forget()
         self.warned.clear()
         self.look()
+
+
+def _families() -> str:
+    """Who watches the line from the first request on, in a sentence; reads files."""
+    from tui.drive.finding import watching_families, watching_text
+    from tui.session.connect.strangers import known_profiles
+
+    text = watching_text(watching_families(known_profiles()))
+    return f"{text} What is found is asked on while the line is open." if text else ""
 
 
 def _named(line: str, device: int) -> str | None:

@@ -17,18 +17,20 @@ from textual.worker import Worker, WorkerState
 
 from tui.drive.plain import plain
 from tui.session.connect.named_lines import line_settings
-from tui.widgets.drawing import pair, rule, wrapped
+from tui.widgets.drawing import pair, rule
 from tui.widgets.lines import Lines
-from tui.widgets.palette import ALARM, FAINT, FAULT, PLAIN
+from tui.widgets.palette import FAINT, PLAIN
 
 from ..base import PanelScreen
 from ..frame import SELDOM
+from .advice import ALARM_KIND, ERROR_KIND, Advice, advice_lines
 from .drive_list import DriveList
 from .found import about_drive, next_step
 from .hints import hint_for
 from .line_form import LineForm
 from .line_list import LineList
 from .rows import rows_of
+from .search_view import far_text, left_text
 from .wall import WallRow, column_heads, columns_for, heading, in_order, wall_line
 
 if TYPE_CHECKING:
@@ -38,16 +40,12 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-ERROR_KIND, ALARM_KIND = "error", "alarm"
 STATES = 0.5
 """Seconds between two looks at the drives and at the line."""
 QUIET = 1.0
 """Seconds without a key after which drives go to their places in the list."""
 ABOUT = 2
 """Lines that tell all of the drive under the cursor."""
-ADVICE = 4
-"""Lines at most for what happened, and for what to do next, while no drive is found."""
-READ_ONLY = "Read-only: nothing is written to a drive, no stop either."
 SEARCH_LABEL = 11
 SEARCH_TEXT = 18
 """Cells that tell how far a search is."""
@@ -63,11 +61,13 @@ class LineView(PanelScreen):
         super().__init__()
         self.warned: set[int] = set()
         """Devices of which it was said that they trip when they are left alone."""
-        self._advice = (
-            "No line is open.",
-            "Choose a line and press Enter, or n to type one.",
-            "",
+        self._advice = Advice(
+            "No line is open.", "Choose a line and press Enter, or n to type one."
         )
+        self.later = 0.0
+        """Seconds that searches take which follow the present one."""
+        self.families = ""
+        """Who may be there and acts when it is asked no more; said while drives are searched."""
         self._looking: list[Timer] = []
         self._away = self._was_lost = False
         self._key_at = -math.inf
@@ -221,10 +221,10 @@ class LineView(PanelScreen):
 
     def _how_far(self, width: int) -> list[Text]:
         """How far the search is."""
-        far = self.search.text if self.search else "no line"
-        if self.app.fleet is not None and self.search is None:
-            far = "s begins"
         label = SEARCH_LABEL if width > SEARCH_LABEL + SEARCH_TEXT else len(" Search ")
+        far = "no line" if self.app.fleet is None else "s begins"
+        if self.search is not None:
+            far = far_text(self.search, self.later, width - label)
         return [pair(" Search", far, PLAIN, label)]
 
     # What happened
@@ -236,7 +236,7 @@ class LineView(PanelScreen):
 
     def advise(self, now: str, next_step: str, kind: str = "") -> None:
         """What there is instead of drives, and what to do next."""
-        self._advice = (now, next_step, kind)
+        self._advice = Advice(now, next_step, kind)
         self._show_advice()
 
     def fail(self, error: Exception) -> None:
@@ -263,18 +263,13 @@ class LineView(PanelScreen):
 
     def _advice_lines(self, width: int) -> list[Text]:
         """What happened, what to do next, in the column at the right."""
-        now, next_step, kind = self._advice
-        width = max(10, width - 3)
-        style = {ERROR_KIND: FAULT, ALARM_KIND: ALARM}.get(kind, PLAIN)
-        lines = [Text("")]
-        lines += [Text(f"  {part}", style) for part in wrapped(now, width, ADVICE)]
-        lines += [Text(f"  {part}", FAINT) for part in wrapped(next_step, width, ADVICE)]
-        if self.app.read_only:
-            lines += [
-                Text(""),
-                *(Text(f"  {part}", FAINT) for part in wrapped(READ_ONLY, width, 2)),
-            ]
-        return lines
+        return advice_lines(
+            self._advice,
+            width,
+            left=left_text(self.search, self.later),
+            families=self.families,
+            read_only=self.app.read_only,
+        )
 
     def _follow_line(self) -> None:
         """While no drive is found: a line that is lost, and that came back."""

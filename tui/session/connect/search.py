@@ -6,6 +6,7 @@ import asyncio
 from collections.abc import Awaitable, Callable, Iterable, Sequence
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 from tui.bus.api import IdentificationObjects, ModbusLine, Priority, Reply
 from tui.bus.errors import LineClosed, LineError, LineLost, NoAnswer
@@ -46,6 +47,7 @@ class Search:
         once: bool = False,
         patient: bool = False,
         between: Callable[[], None] = lambda: None,
+        now: Callable[[], float] = REAL_CLOCK.monotonic,
     ) -> None:
         self.devices = tuple(devices)
         self.of = len(self.devices)
@@ -61,7 +63,9 @@ class Search:
         """`done`, `stopped`, or empty while it goes on."""
         self.cost = 0.0
         """Seconds that an address costs at which nobody is; 0 before the first is asked."""
-        self._rests = rests
+        self._cost_again = 0.0
+        self._silent = _SilentTimes()
+        self._rests, self._now = rests, now
         self._once, self._patient, self._between = once, patient, between
 
     @property
@@ -71,8 +75,20 @@ class Search:
 
     @property
     def left(self) -> float:
-        """Seconds that this round still takes where nobody else answers."""
-        return 0.0 if self.ended else (self.of - self.asked) * self.cost
+        """Seconds that it still takes where nobody else answers; 0 before the first is asked.
+
+        By what the line allows, or by what silent addresses of this round took where that was
+        more, as beside polls. That they are asked once more counts too.
+        """
+        if self.ended or not self.cost:
+            return 0.0
+        still = self.of - self.asked
+        if self.again:
+            return still * max(self._cost_again, self._silent.mean)
+        first = still * max(self.cost, self._silent.mean)
+        if self._once:
+            return first
+        return first + LATE_WAIT + (self._silent.times + still) * self._cost_again
 
     @property
     def text(self) -> str:
@@ -94,6 +110,7 @@ class Search:
             wait = line.timing.scan_timeout
             how = await asyncio.to_thread(strangers_of, line.link, wait, patient=self._patient)
             self.cost = how.cost
+            self._cost_again = _cost_again(how, line)
             first = partial(self._round, line, how, found)
             silent = await first(self.devices, Priority.BACKGROUND, how.within)
             if silent and how.within is not None:
@@ -122,12 +139,12 @@ class Search:
         within: float | None,
     ) -> list[int]:
         """Ask these addresses; returns those that were silent."""
-        self.asked, self.of = 0, len(devices)
+        self.asked, self.of, self._silent = 0, len(devices), _SilentTimes()
         silent: list[int] = []
         asks = _Considerate(line, self._rests)
         for number, device in enumerate(devices, start=1):
             self._between()
-            self.asked, self.at = number, device
+            self.asked, self.at, began = number, device, self._now()
             try:
                 result = await find_drive(
                     asks,
@@ -139,6 +156,7 @@ class Search:
                 )
             except NoAnswer:
                 silent.append(device)
+                self._silent = self._silent.with_one_more(self._now() - began)
                 continue
             except (LineClosed, LineLost):
                 raise
@@ -147,6 +165,30 @@ class Search:
             self.answered |= {device}
             await found(result)
         return silent
+
+
+class _SilentTimes(NamedTuple):
+    """How long the addresses of a round took at which nobody was, in seconds."""
+
+    times: int = 0
+    seconds: float = 0.0
+
+    @property
+    def mean(self) -> float:
+        """Seconds each; 0 while there was none."""
+        return self.seconds / self.times if self.times else 0.0
+
+    def with_one_more(self, seconds: float) -> _SilentTimes:
+        """With another one."""
+        return _SilentTimes(self.times + 1, self.seconds + seconds)
+
+
+def _cost_again(how: Strangers, line: ModbusLine) -> float:
+    """Seconds that a silent address costs that is asked once more."""
+    if how.within is None:
+        return line.timing.patient_timeout * len(how.probes)
+    longer = max(SECOND_WAIT, how.within) - how.within
+    return how.cost + longer * len(how.probes)
 
 
 class _Considerate:

@@ -1,0 +1,29 @@
+"""How far a search is and what it still takes, in the words of Line. Pure functions."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tui.session.connect.search import Search
+
+IN_MINUTES = 100
+"""Seconds from which on a time is told in minutes."""
+
+
+def left_text(search: Search | None, later: float) -> str:
+    """What a search still takes, with `later` seconds of those that follow; empty if unknown."""
+    if search is None or search.ended or not search.cost:
+        return ""
+    seconds = search.left + later
+    return f"{seconds / 60:.0f} min" if seconds >= IN_MINUTES else f"{max(1, round(seconds))} s"
+
+
+def far_text(search: Search, later: float, room: int) -> str:
+    """How far a search is, in `room` cells, and what it still takes where that is known."""
+    left = left_text(search, later)
+    if not left:
+        return search.text
+    asked = search.text.partition(",")[0]
+    forms = (f"{search.text}, {left} left", f"{asked}, {left} left", f"{asked}, {left}")
+    return next((form for form in forms if len(form) <= room), forms[-1])

@@ -1,0 +1,49 @@
+"""How long a search takes at other settings of a line, and what is said before the slow ones."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from tui.bus.link import SerialLink
+from tui.drive.finding import LineSetting, families_at, names_text
+
+from .strangers import known_profiles, strangers_of
+
+
+@dataclass(frozen=True, slots=True)
+class SettingCosts:
+    """What addresses cost at which nobody is, at each setting of a line; in seconds."""
+
+    each: Mapping[LineSetting, float]
+    """One address."""
+    addresses: int
+
+    def seconds(self, settings: Iterable[LineSetting]) -> float:
+        """A search at these settings."""
+        return sum(self.each.get(one, 0.0) for one in settings) * self.addresses
+
+    def before_slow(self, settings: Sequence[LineSetting], ends: str) -> str:
+        """What is said before the slow settings are tried; `ends` is the key that ends it."""
+        bauds = [f"{baud}" for baud in dict.fromkeys(one.baud for one in settings)]
+        can = families_at(known_profiles(), settings)
+        return (
+            f"Left are {names_text(sorted(bauds, key=int))} baud: {self.seconds(settings):.0f} s"
+            f" more, for {names_text(can)} alone. {ends} ends it."
+        )
+
+
+def setting_costs(
+    link: SerialLink,
+    wait: float,
+    settings: Iterable[LineSetting],
+    addresses: int,
+    *,
+    patient: bool = False,
+) -> SettingCosts:
+    """What settings of a line cost; reads files. `wait` is that of a network, in seconds."""
+    each = {}
+    for one in settings:
+        there = replace(link, baud=one.baud, format=one.format)
+        each[one] = strangers_of(there, wait, patient=patient).cost
+    return SettingCosts(each, addresses)
