@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from .defect import Defect
 
+HEARING = "tests/ui/test_hearing.py"
+
 DEFECTS = (
     Defect(
         "listener-can-write",
@@ -111,5 +113,37 @@ DEFECTS = (
         "",
         "A full disk leaves a file of frames that no program reads.",
         ("tests/session/test_capture_file.py",),
+    ),
+    Defect(
+        "fed-drive-left-for-listening",
+        "tui/screens/hear.py",
+        "if acting := watch.left_alone():",
+        "if (acting := watch.left_alone()) and False:",
+        "A drive trips because somebody wanted to see what goes over the line.",
+        (f"{HEARING}::test_a_drive_that_the_panel_feeds_is_not_left_alone",),
+    ),
+    Defect(
+        "running-motor-left-for-listening",
+        "tui/screens/hear.py",
+        "if running := watch.under_command():",
+        "if (running := watch.under_command()) and False:",
+        "A motor runs on, started from here, and nobody asks it or can stop it any more.",
+        (f"{HEARING}::test_why_the_panel_may_not_fall_silent",),
+    ),
+    Defect(
+        "listening-says-it-stops",
+        "tui/screens/hands.py",
+        "if self.hearing and not self.fleets:",
+        "if False:",
+        "A person relies on a stop key that stops nothing.",
+        (f"{HEARING}::test_a_line_that_is_not_open_is_listened_to_and_given_back",),
+    ),
+    Defect(
+        "left-for-listening-unasked",
+        "tui/screens/hear.py",
+        "if here.fleet.found else",
+        "if False else",
+        "One key ends the panel's watch over its drives.",
+        (f"{HEARING}::test_drives_that_do_not_act_are_left_to_their_master_with_a_yes",),
     ),
 )

@@ -19,7 +19,9 @@ from tui.screens.control.screen import ControlSourceScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
 from tui.screens.faults.screen import FaultsScreen
-from tui.screens.frames.screen import FEW, FramesScreen
+from tui.screens.frames.frame_list import FEW
+from tui.screens.frames.heard import HeardScreen
+from tui.screens.frames.screen import FramesScreen
 from tui.screens.keys.help import HelpScreen
 from tui.screens.keys.table import ACTIONS, EVERYWHERE, OPENING
 from tui.screens.messages.screen import MessagesScreen
@@ -215,6 +217,7 @@ def test_every_action_has_a_method_and_words() -> None:
         BlocksScreen,
         MessagesScreen,
         WiringScreen,
+        HeardScreen,
     )
     owners: dict[str, type] = {(screen.TITLE or "line").lower(): screen for screen in screens}
     owners[OPENING] = OpeningScreen

@@ -43,6 +43,8 @@ class Panel(LeanApp):
     """All lines that are open."""
     events: EventLog
     """Everything that was said."""
+    hearing: str = ""
+    """The line that is listened to, as it was typed: nothing is sent there, no stop either."""
     chosen: DriveConsole | None
     """The drive that was opened last on the open line; the stop key means it."""
 

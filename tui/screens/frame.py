@@ -23,7 +23,16 @@ from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, PLAIN, STRONG
 from tui.widgets.small import is_too_small, small_lines
 from tui.widgets.strip import FrameView, Said, Tab, said_line, strip_line, tabs_line
 
-from .keys.action import BLOCKS, CONNECTION, FAULTS, FRAMES, MONITOR, PARAMETERS, SOURCES
+from .keys.action import (
+    BLOCKS,
+    CONNECTION,
+    FAULTS,
+    FRAMES,
+    LISTENING,
+    MONITOR,
+    PARAMETERS,
+    SOURCES,
+)
 
 if TYPE_CHECKING:
     from .app_port import Panel
@@ -83,6 +92,7 @@ class Framed(Screen[Any]):
 
     def _parts(self, view: FrameView, width: int) -> dict[str, list[Text]]:
         here = (self.TITLE or "").lower() or view.place
+        here = FRAMES if here == LISTENING else here  # a mode of it
         return {
             "strip": [strip_line(view.strip, width)],
             "tabs": [tabs_line(TABS, here, view.marks, width)],

@@ -63,7 +63,8 @@ class FrameSource:
 
     def _line(self, fleet: Fleet | None) -> str:
         if not self._app.line_label:
-            return ""
+            hearing = self._app.hearing
+            return f"{hearing} · only listened to" if hearing else ""
         count = len(fleet.found) if fleet else 0
         parts = [self._app.line_label]
         if count:

@@ -26,6 +26,9 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.terminal.stroke import Stroke
 
+NO_STOP_HERE = (
+    "No stop goes out to a line that is only listened to: its master stops it. Esc ends listening."
+)
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 
 
@@ -119,6 +122,8 @@ class Hands(Panel):
     def _stop(self, *, everything: bool) -> None:
         self._stops += 1
         chosen = None if everything else self._open_drive()
+        if self.hearing:
+            soon_in_loop(self, self.notify, NO_STOP_HERE)
         for fleet in self.fleets:
             if chosen is None:
                 self._stop_sessions(fleet, fleet.sessions)
@@ -185,4 +190,6 @@ class Hands(Panel):
     def stops_whom(self) -> str:
         """The words of the stop key in the line of keys."""
         chosen = self._open_drive()
+        if self.hearing and not self.fleets:
+            return "no stop here"
         return f"STOP {chosen.device}" if chosen is not None else "STOP ALL"

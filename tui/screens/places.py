@@ -150,6 +150,12 @@ class Places(Panel):
 
         ask_why(self)
 
+    async def action_hear(self) -> None:
+        """Listen to a line on which another master asks."""
+        from .hear import hear
+
+        self.run_worker(hear(self), exclusive=True, group="hear", exit_on_error=False)
+
     def action_save_shown(self) -> None:
         """Save what the screen shows to a file."""
         self._ask_screen("action_save_file", "There is nothing to save on this screen.")

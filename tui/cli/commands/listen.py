@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import shlex
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,7 +19,9 @@ from ..shared.say import say
 if TYPE_CHECKING:
     from tui.drive.profile.profile import Profile
     from tui.session.capture_file import CaptureFile
+    from tui.session.listening.place import PlaceToListen
 
+PROGRAM_NAME = "listen"
 LAST_ADDRESS_HEARD = 255
 
 
@@ -82,11 +86,12 @@ def listen(
     from tui.bus.errors import LineError
     from tui.session.connect.strangers import known_profiles
     from tui.session.listening.families import Families, remembered_families
+    from tui.session.listening.place import line_to_listen
 
-    from ..running.listening import HearingRun, line_to_listen
+    from ..running.listening import HearingRun
     from ..shared.listen_outputs import HeardJson, HeardLines
 
-    with line_to_listen(line_text) as place:
+    with _serial_line(line_to_listen(line_text, PROGRAM_NAME)) as place:
         families = Families(known_profiles(), named, remembered_families(place.line.link))
         output = HeardJson(line_text, families) if as_json else HeardLines(families)
         file = _opened_file(pcap_path, line_text, raw=raw, force=force)
@@ -108,6 +113,21 @@ def listen(
         listening.end()
     if not as_json:
         say(listening.text)
+
+
+@contextmanager
+def _serial_line(
+    opening: AbstractContextManager[PlaceToListen],
+) -> Iterator[PlaceToListen]:
+    """The line that is meant; raises UsageError for one that is no serial line."""
+    from tui.session.listening.place import NothingToHear
+
+    with ExitStack() as stack:
+        try:
+            place = stack.enter_context(opening)
+        except NothingToHear as error:
+            raise click.UsageError(str(error)) from None
+        yield place
 
 
 def profiles_named(given: tuple[str, ...]) -> dict[int | None, Profile]:

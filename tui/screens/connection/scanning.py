@@ -52,7 +52,7 @@ class Scanning(LineView):
         `typed` is remembered as the addresses of this line. What was asked `once` is one of
         several settings: whoever tries them tells what it came to.
         """
-        from tui.session.connect.other_masters import MasterLookout
+        from tui.session.connect.other_masters import MasterLookout, OtherMaster
         from tui.session.connect.search import Search
 
         fleet = self.app.fleet
@@ -76,6 +76,11 @@ class Scanning(LineView):
                 return
         try:
             await search.run(fleet.line, self._take)
+        except OtherMaster as error:
+            self.say(
+                str(error), "The search has ended. H listens to it; s looks again.", ALARM_KIND
+            )
+            return
         except LineError as error:
             if self.app.fleet is fleet:
                 self.fail(error)
@@ -123,7 +128,7 @@ class Scanning(LineView):
         self.advise("Listening for another master.", "Then drives are searched for.")
         text = (await other_masters.listen_first(opened.line, other_masters.LISTEN)).text
         if text:
-            self.say(text, "Nothing was sent; s listens again.", ALARM_KIND)
+            self.say(text, "Nothing was sent. H listens to it; s looks again.", ALARM_KIND)
         return bool(text)
 
     def tell_search(self) -> None:

@@ -14,10 +14,7 @@ class WhyMeant(LineKeys):
 
     def why_meant(self) -> WhyTarget | None:
         """None where no line is chosen, or no address can be made out."""
-        choice = self.lines.chosen
-        text = self.app.line_text
-        if choice is not None and (self.focused is self.lines or not text):
-            text = self.line_of(choice)
+        text = self._line_meant()
         if not text:
             return None
         here = self.app.open_line_of(text)
@@ -37,6 +34,16 @@ class WhyMeant(LineKeys):
             tuple(one for one in found if one != device),
             self._trouble_of(text),
         )
+
+    def line_to_hear(self) -> tuple[str, str]:
+        """The line that is meant, empty for none, and the profile that was typed for it."""
+        return self._line_meant(), self.form.profile
+
+    def _line_meant(self) -> str:
+        choice, text = self.lines.chosen, self.app.line_text
+        if choice is not None and (self.focused is self.lines or not text):
+            return self.line_of(choice)
+        return text
 
     def _first_address(self) -> int | None:
         try:

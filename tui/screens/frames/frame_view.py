@@ -28,16 +28,18 @@ def frame_time(wall: float) -> str:
 
 
 def gap_text(seconds: float | None) -> str:
-    """The time since the frame before, in nine columns: ms up to 10 s."""
+    """The time since the frame before, in nine columns: ms up to 1 s."""
     if seconds is None:
         return " " * 9
-    told = f"{1000 * seconds:.1f} ms" if seconds < 10 else f"{seconds:.0f} s"
+    told = f"{1000 * seconds:.1f} ms" if seconds < 0.9999 else f"{seconds:.2f} s"
+    if seconds >= 100:
+        told = f"{seconds:.0f} s"
     return f"{'+' + told:>9}"
 
 
 def gaps(frames: Sequence[Frame]) -> list[float | None]:
     """Seconds from each frame's predecessor to it, however few of them are shown."""
-    before = [None, *(frame.time for frame in frames[:-1])]
+    before = [None, *(frame.time for frame in frames)][: len(frames)]
     return [
         None if one is None else max(0.0, frame.time - one)
         for one, frame in zip(before, frames, strict=True)

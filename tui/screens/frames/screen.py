@@ -2,260 +2,72 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from typing import ClassVar, Literal
+from collections.abc import Mapping
+from typing import ClassVar
 
 from rich.text import Text
-from textual.app import ComposeResult
-from textual.containers import Horizontal
-from textual.widgets import Input
 
-from tui.bus.api import Frame
-from tui.bus.link import TcpLink, label
+from tui.bus.api import Frame, ModbusLine
+from tui.bus.link import Link
 from tui.drive.profile.profile import Profile
 from tui.session.console import DriveConsole
-from tui.widgets.drawing import rule
-from tui.widgets.fields import Field
-from tui.widgets.lines import Lines
-from tui.widgets.plain import Plain
 
+from ..app_port import Panel
 from ..keys.table import FRAMES, bindings
-from .choice import choice_of, chosen
 from .counter_keys import CounterKeys
-from .decoded import decoded
-from .frame_view import BESIDE_BYTES, frame_line, frames_text, gaps
-from .saving import KeptFrames, ask_where
-
-Page = Literal["words", "bytes", "counters"]
-PAGES: tuple[Page, ...] = ("words", "bytes", "counters")
-FEW = 6
-"""Frames that are shown on a slow link while they come."""
-FILTER_HINT = "drive, function, error, or what it says: 2 read error"
-FIND_HINT = "Enter: the one before; drive, function, error, or what it says"
+from .frame_list import FrameListScreen
 
 
-class FramesScreen(CounterKeys):
-    """The frame log of the line in words, the newest at the bottom; then its counters."""
+class OwnFrames:
+    """The frames of a line of the panel, told by the drives that were found on it."""
+
+    def __init__(self, line: ModbusLine, app: Panel) -> None:
+        self._line, self._app = line, app
+
+    @property
+    def link(self) -> Link:
+        """The line that they went over."""
+        return self._line.link
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """Those that went over it last."""
+        return tuple(self._line.trace)
+
+    def profile(self, device: int) -> Profile | None:
+        """That of a drive which was found."""
+        console = self._console(device)
+        return console.session.profile if console else None
+
+    def raws(self, device: int) -> Mapping[str, int]:
+        """What was read of a drive."""
+        console = self._console(device)
+        return console.session.image.raws if console else {}
+
+    def _console(self, device: int) -> DriveConsole | None:
+        return self._app.fleet.console(device) if self._app.fleet else None
+
+
+class FramesScreen(CounterKeys, FrameListScreen):
+    """The frame log of the line of a drive; then the counters of that drive."""
 
     CSS_PATH = "frames.tcss"
     BINDINGS: ClassVar = bindings(FRAMES)
     TITLE = "Frames"
-    LOOK = 0.5
-    AUTO_FOCUS: ClassVar = ""
-    """None: while the field has the focus, Space is text and stops nothing."""
-
-    def __init__(self, console: DriveConsole) -> None:
-        super().__init__(console)
-        self._line = console.session.line
-        self._held: tuple[Frame, ...] | None = None
-        self._up = 0
-        """How many frames below the last one shown are out of sight."""
-        self._page: Page = "words"
-        self._filter = ""
-        self._asking: Literal["", "filter", "find"] = ""
-        self._found: Frame | None = None
-        self._room = 1
-        self._since_epoch = 0.0
-        """What is added to a frame's time; taken once, or times that stay would tremble."""
-
-    def body(self) -> ComposeResult:
-        """One list, and under it the field for what is wanted of it."""
-        yield Lines(id="frames")
-        with Horizontal(id="wanted"):
-            yield Plain("", id="which")
-            yield Field(id="typed")
 
     def on_mount(self) -> None:
-        """Nothing is asked for yet."""
-        self._since_epoch = self.app.clock.wall() - self.app.clock.monotonic()
-        self.query_one("#wanted").display = False
+        """The line is that of the drive."""
+        self._source = OwnFrames(self.session.line, self.app)
 
     @property
     def shows_counters(self) -> bool:
         """Whether the counters stand in the place of the frames."""
-        return self._page == "counters"
+        return self._shows_sum
 
-    def draw(self, width: int) -> None:
-        """Show the counters, or the newest frames that fit."""
-        super().draw(width)
-        self._room = max(1, self.size.height - (6 if self._asking else 5))
-        if self.shows_counters:
-            self.put("frames", self.counter_lines(width, self._room + 1))
-            return
-        frames = self._kept
-        room, columns, few = self._room, width, ""
-        if self.app.low_bandwidth and self._held is None:
-            # all of them anew each time is more than a slow link carries
-            room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h shows all, "
-        places = self._places(frames)
-        self._up = min(self._up, max(0, len(places) - room))
-        end = len(places) - self._up
-        count = f"{len(places)} of {len(frames)}" if self._filter else f"{len(frames)}"
-        lines = [rule(self._title(), width, f"{few}j finds, {count} kept")]
-        shown = places[max(0, end - room) : end]
-        self.put("frames", lines + self._lines(frames, shown, columns))
+    def sum_lines(self, width: int, height: int) -> list[Text]:
+        """The counters."""
+        return self.counter_lines(width, height)
 
-    def _title(self) -> str:
-        held = " (held)" if self._held is not None else ""
-        only = f", only {self._filter}" if self._filter else ""
-        return f"Frames on the line{only}{held}"
-
-    @property
-    def _kept(self) -> tuple[Frame, ...]:
-        return self._held if self._held is not None else tuple(self._line.trace)
-
-    def _places(self, frames: Sequence[Frame]) -> list[int]:
-        """Places of the frames that are wanted."""
-        return chosen(frames, choice_of(self._filter), self._told, tcp=self._is_tcp)
-
-    def _lines(self, frames: Sequence[Frame], places: Sequence[int], width: int) -> list[Text]:
-        between, told = gaps(frames), dict(zip(places, self._words(frames, places), strict=True))
-        return [
-            frame_line(
-                frames[at],
-                self._since_epoch + frames[at].time,
-                between[at],
-                width,
-                told[at] if self._page == "words" else "",
-                found=frames[at] is self._found,
-            )
-            for at in places
-        ]
-
-    def _words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
-        """What some frames say; a reply is told by its request, seen or not."""
-        if not places:
-            return []
-        first = places[0] - 1 if places[0] else 0
-        told = self._told(frames[first : places[-1] + 1])
-        return [told[at - first] for at in places]
-
-    def _told(self, frames: Sequence[Frame]) -> list[str]:
-        return decoded(frames, self._profile, self._raws, tcp=self._is_tcp)
-
-    @property
-    def _is_tcp(self) -> bool:
-        return isinstance(self._line.link, TcpLink)
-
-    def _profile(self, device: int) -> Profile | None:
-        console = self.app.fleet.console(device) if self.app.fleet else None
-        return console.session.profile if console else None
-
-    def _raws(self, device: int) -> Mapping[str, int]:
-        console = self.app.fleet.console(device) if self.app.fleet else None
-        return console.session.image.raws if console else {}
-
-    # Holding, scrolling, pages
-
-    def action_hold(self) -> None:
-        """Hold the list still, or let it run."""
-        self._held = tuple(self._line.trace) if self._held is None else None
-        self._up, self._found = 0, None
-        self.look()
-
-    def action_scroll(self, frames: int) -> None:
-        """Older frames or newer ones; the list is held."""
-        if self.shows_counters:
-            return
-        if self._held is None:
-            self._held = tuple(self._line.trace)
-        self._up = max(0, self._up - frames)
-        self.look()
-
-    def action_other_page(self) -> None:
-        """Words, bytes, counters in turn."""
-        self._page = PAGES[(PAGES.index(self._page) + 1) % len(PAGES)]
-        if self.shows_counters:
-            self._end_asking()
-            self.begin_counters()
-        self.look()
-
-    # Filtering and finding
-
-    def action_only(self) -> None:
-        """Show only some frames: of a drive, a function, with errors, that say something."""
-        self._ask_for("filter", " only ", self._filter, FILTER_HINT)
-
-    def action_find_frame(self) -> None:
-        """Find a frame: the list is held, and the newest that fits is shown and marked."""
-        self._found = None
-        self._ask_for("find", " find ", "", FIND_HINT)
-
-    def _ask_for(self, what: Literal["filter", "find"], title: str, text: str, hint: str) -> None:
-        if self.shows_counters:
-            self._page = "words"
-        self._asking = what
-        self.query_one("#wanted").display = True
-        self.query_one("#which", Plain).update(title)
-        field = self.query_one("#typed", Input)
-        field.placeholder = hint
-        with field.prevent(Input.Changed):
-            field.value = text
-        self.set_focus(field)
-        self.call_after_refresh(self.look)
-
-    def _end_asking(self) -> None:
-        self._asking = ""
-        self.set_focus(None)
-        self.query_one("#wanted").display = False
-        self.call_after_refresh(self.look)
-
-    def on_input_changed(self, event: Input.Changed) -> None:
-        """What is typed into the filter has its effect at once."""
-        if self._asking == "filter":
-            self._filter = " ".join(event.value.split())
-            self._up = 0
-            self.look()
-
-    def on_input_submitted(self, event: Input.Submitted) -> None:
-        """Keep the filter; or the next older frame that fits."""
-        if self._asking == "filter":
-            self._end_asking()
-        elif event.value.strip():
-            self._find(event.value)
-
-    def _find(self, text: str) -> None:
-        if self._held is None:
-            self._held = tuple(self._line.trace)
-        frames = self._held
-        places = self._places(frames)
-        shown = [frames[at] for at in places]
-        fits = chosen(shown, choice_of(text), self._told, tcp=self._is_tcp)
-        before = next((at for at, one in enumerate(shown) if one is self._found), len(shown))
-        older = [at for at in fits if at < before]
-        if not older:
-            self.app.tell("No older frame fits." if self._found else "No frame fits.")
-            self._found = None
-            self.look()
-            return
-        self._found = shown[older[-1]]
-        # in the middle of the list, so that what came before and after it is seen
-        self._up = max(0, len(shown) - older[-1] - 1 - self._room // 2)
-        self.look()
-
-    def action_leave(self) -> None:
-        """Out of the field, then out of a filter, then back to Monitor."""
-        if self._asking or self._filter:
-            if self._asking != "find":
-                self._filter = ""
-            self._end_asking()
-            return
-        super().action_leave()
-
-    # Saving
-
-    def action_save_file(self) -> None:
-        """Save the frames that the list has, filtered as it is: for tshark, or as a text."""
-        frames = self._kept
-        places = self._places(frames)
-        heading = [self.app.line_label, self._title(), f"{len(places)} of {len(frames)} frames"]
-        text = frames_text(
-            frames, places, self._all_words(frames, places), self._since_epoch, heading
-        )
-        shown = [frames[at] for at in places]
-        line = label(self._line.link)
-        ask_where(self.app, KeptFrames(shown, text, line, self._is_tcp, self._since_epoch))
-
-    def _all_words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
-        told = self._told(frames)
-        return [told[at] for at in places]
+    def _begin_sum(self) -> None:
+        """Ask the drive for its own."""
+        self.begin_counters()

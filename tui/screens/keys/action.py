@@ -9,6 +9,8 @@ SOURCES, FAULTS, PARAMETERS = "control", "faults", "parameters"
 BLOCKS, MESSAGES, WIRING = "scanner", "messages", "wiring"
 OPENING = "opening"
 """Monitor while its drive is not known yet."""
+LISTENING = "listening"
+"""Frames of others, on a line on which nothing is sent."""
 EVERYWHERE = (
     CONNECTION,
     MONITOR,
@@ -20,6 +22,7 @@ EVERYWHERE = (
     MESSAGES,
     WIRING,
     OPENING,
+    LISTENING,
 )
 
 KEY_NAMES = {

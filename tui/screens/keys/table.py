@@ -17,6 +17,7 @@ from .action import (
     EVERYWHERE,
     FAULTS,
     FRAMES,
+    LISTENING,
     MESSAGES,
     MONITOR,
     OPENING,
@@ -49,6 +50,7 @@ FIND = "Find a parameter by code, name, address or value, from anywhere."
 WIRING_HELP = "Wiring, pins, warnings of a family: connectors, line rules, lamps, commands, errata."
 SCAN_SETTINGS = "Search at other baud rates and formats, likely ones first; asks."
 WHY = "Why no answer? Tell what fails at a drive that is silent, and what to look at next."
+HEAR = "Listen to a line on which another master asks; the panel sends nothing there, asks."
 ACCEPT = "Take the line as it is now: another adapter, or other drives, than before; asks."
 EEPROM = "Save the settings in the drive's EEPROM, where it needs that; armed, asks."
 
@@ -100,19 +102,23 @@ ACTIONS: tuple[Action, ...] = (
     *BLOCK_ACTIONS,
     *WATCH_ACTIONS,
     *on(
-        (FRAMES,),
+        (FRAMES, LISTENING),
         ("hold", "h", "hold", "Hold the list still, or let it run."),
-        ("other_page", "tab", "page", "Codes and values, bytes, or the counters."),
+        ("other_page", "tab", "page", "Codes and values, bytes, or what was counted."),
         ("only", "O", "only", "Only some frames: 2 read error; of a drive, a function, errors."),
         ("find_frame", "j", "", "Find frames by drive, function, error, or what they say."),
         ("scroll(-1)", "up", "", "Older frames; the list is held."),
         ("scroll(1)", "down", "", "Newer frames."),
         ("scroll(-10)", "pageup", "", "Ten frames older."),
         ("scroll(10)", "pagedown", "", "Ten frames newer."),
+    ),
+    *on(
+        (FRAMES,),
         ("reset_counters", "C", "", "Count from now on; what others see stays."),
         ("reset_drive_counters", "Z", "", "Set the drive's own counters to 0; armed, asks."),
         ("leave", "escape", "back", "Out of the filter, then back to Monitor."),
     ),
+    *on((LISTENING,), ("leave", "escape", "end", "Out of the filter, then end listening.")),
     *on(
         (MESSAGES,),
         ("scroll(-1)", "up", "", "Newer messages."),
@@ -139,6 +145,7 @@ ACTIONS: tuple[Action, ...] = (
     of_app("messages", "m", "", "Messages: everything that was said, with its time."),
     of_app("wiring", "I", "", WIRING_HELP),
     of_app("why", "N", "", WHY),
+    of_app("hear", "H", "", HEAR),
     of_app("save_shown", "ctrl+s", "", SAVE),
     of_app("open_file", "ctrl+o", "", OPEN),
     of_app("eeprom", "S", "", EEPROM),
@@ -208,6 +215,7 @@ __all__ = [
     "EVERYWHERE",
     "FAULTS",
     "FRAMES",
+    "LISTENING",
     "MESSAGES",
     "MONITOR",
     "OPENING",

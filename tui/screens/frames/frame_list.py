@@ -1,0 +1,285 @@
+"""A list of frames in codes and values or as bytes: held, scrolled, filtered, searched, saved."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Literal, Protocol
+
+from rich.text import Text
+from textual.app import ComposeResult
+from textual.containers import Horizontal
+from textual.widgets import Input
+
+from tui.bus.api import Frame
+from tui.bus.link import Link, TcpLink, label
+from tui.drive.profile.profile import Profile
+from tui.widgets.drawing import rule
+from tui.widgets.fields import Field
+from tui.widgets.lines import Lines
+from tui.widgets.plain import Plain
+
+from ..base import PanelScreen
+from .choice import choice_of, chosen
+from .decoded import decoded
+from .frame_view import BESIDE_BYTES, frame_line, frames_text, gaps
+from .saving import KeptFrames, ask_where
+
+Page = Literal["words", "bytes", "sum"]
+PAGES: tuple[Page, ...] = ("words", "bytes", "sum")
+FEW = 6
+"""Frames that are shown on a slow link while they come."""
+FILTER_HINT = "drive, function, error, or what it says: 2 read error"
+FIND_HINT = "Enter: the one before; drive, function, error, or what it says"
+
+
+class KeptLine(Protocol):
+    """A line with its last frames, and what they are told by."""
+
+    @property
+    def link(self) -> Link:
+        """The line that the frames went over."""
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """The frames that are kept now, oldest first."""
+
+    def profile(self, device: int) -> Profile | None:
+        """The profile by which the frames of a drive are told."""
+
+    def raws(self, device: int) -> Mapping[str, int]:
+        """Raw values of a drive that scale others."""
+
+
+class FrameListScreen(PanelScreen):
+    """The frames of a line, the newest at the bottom; its last page sums them up."""
+
+    LOOK = 0.5
+    AUTO_FOCUS: ClassVar = ""
+    """None: while the field has the focus, Space is text and stops nothing."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._source: KeptLine
+        """Whose frames are listed; each screen sets its own."""
+        self._heading = "Frames on the line"
+        self._held: tuple[Frame, ...] | None = None
+        self._up = 0
+        """How many frames below the last one shown are out of sight."""
+        self._page: Page = "words"
+        self._filter = ""
+        self._asking: Literal["", "filter", "find"] = ""
+        self._found: Frame | None = None
+        self._room = 1
+        self._since_epoch = 0.0
+        """What is added to a frame's time; taken once, or times that stay would tremble."""
+
+    def body(self) -> ComposeResult:
+        """One list, and under it the field for what is wanted of it."""
+        yield Lines(id="frames")
+        with Horizontal(id="wanted"):
+            yield Plain("", id="which")
+            yield Field(id="typed")
+
+    def on_mount(self) -> None:
+        """Nothing is asked for yet."""
+        self._since_epoch = self.app.clock.wall() - self.app.clock.monotonic()
+        self.query_one("#wanted").display = False
+
+    # What a screen of this kind adds
+
+    def sum_lines(self, width: int, height: int) -> list[Text]:
+        """The last page as it is now."""
+        raise NotImplementedError
+
+    def _begin_sum(self) -> None:
+        """The last page is shown from now on."""
+
+    def _scroll_sum(self, lines: int) -> None:
+        """Up or down the last page, where it can be longer than the screen."""
+
+    @property
+    def _shows_sum(self) -> bool:
+        """Whether the last page stands in the place of the frames."""
+        return self._page == "sum"
+
+    def draw(self, width: int) -> None:
+        """Show the last page, or the newest frames that fit."""
+        super().draw(width)
+        self._room = max(1, self.size.height - (6 if self._asking else 5))
+        if self._shows_sum:
+            self.put("frames", self.sum_lines(width, self._room + 1))
+            return
+        frames = self._kept
+        room, columns, few = self._room, width, ""
+        if self.app.low_bandwidth and self._held is None:
+            # all of them anew each time is more than a slow link carries
+            room, columns, few = min(room, FEW), min(width, BESIDE_BYTES - 1), "h shows all, "
+        places = self._places(frames)
+        self._up = min(self._up, max(0, len(places) - room))
+        end = len(places) - self._up
+        count = f"{len(places)} of {len(frames)}" if self._filter else f"{len(frames)}"
+        lines = [rule(self._title(), width, f"{few}j finds, {count} kept")]
+        shown = places[max(0, end - room) : end]
+        self.put("frames", lines + self._lines(frames, shown, columns))
+
+    def _title(self) -> str:
+        held = " (held)" if self._held is not None else ""
+        only = f", only {self._filter}" if self._filter else ""
+        return f"{self._heading}{only}{held}"
+
+    @property
+    def _kept(self) -> tuple[Frame, ...]:
+        return self._held if self._held is not None else self._source.frames
+
+    def _places(self, frames: Sequence[Frame]) -> list[int]:
+        """Places of the frames that are wanted."""
+        return chosen(frames, choice_of(self._filter), self._told, tcp=self._is_tcp)
+
+    def _lines(self, frames: Sequence[Frame], places: Sequence[int], width: int) -> list[Text]:
+        between, told = gaps(frames), dict(zip(places, self._words(frames, places), strict=True))
+        return [
+            frame_line(
+                frames[at],
+                self._since_epoch + frames[at].time,
+                between[at],
+                width,
+                told[at] if self._page == "words" else "",
+                found=frames[at] is self._found,
+            )
+            for at in places
+        ]
+
+    def _words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
+        """What some frames say; a reply is told by its request, seen or not."""
+        if not places:
+            return []
+        first = places[0] - 1 if places[0] else 0
+        told = self._told(frames[first : places[-1] + 1])
+        return [told[at - first] for at in places]
+
+    def _told(self, frames: Sequence[Frame]) -> list[str]:
+        return decoded(frames, self._source.profile, self._source.raws, tcp=self._is_tcp)
+
+    @property
+    def _is_tcp(self) -> bool:
+        return isinstance(self._source.link, TcpLink)
+
+    # Holding, scrolling, pages
+
+    def action_hold(self) -> None:
+        """Hold the list still, or let it run."""
+        self._held = self._source.frames if self._held is None else None
+        self._up, self._found = 0, None
+        self.look()
+
+    def action_scroll(self, frames: int) -> None:
+        """Older frames or newer ones; the list is held."""
+        if self._shows_sum:
+            self._scroll_sum(-frames)
+            return
+        if self._held is None:
+            self._held = self._source.frames
+        self._up = max(0, self._up - frames)
+        self.look()
+
+    def action_other_page(self) -> None:
+        """Words, bytes, the last page in turn."""
+        self._page = PAGES[(PAGES.index(self._page) + 1) % len(PAGES)]
+        if self._shows_sum:
+            self._end_asking()
+            self._begin_sum()
+        self.look()
+
+    # Filtering and finding
+
+    def action_only(self) -> None:
+        """Show only some frames: of a drive, a function, with errors, that say something."""
+        self._ask_for("filter", " only ", self._filter, FILTER_HINT)
+
+    def action_find_frame(self) -> None:
+        """Find a frame: the list is held, and the newest that fits is shown and marked."""
+        self._found = None
+        self._ask_for("find", " find ", "", FIND_HINT)
+
+    def _ask_for(self, what: Literal["filter", "find"], title: str, text: str, hint: str) -> None:
+        if self._shows_sum:
+            self._page = "words"
+        self._asking = what
+        self.query_one("#wanted").display = True
+        self.query_one("#which", Plain).update(title)
+        field = self.query_one("#typed", Input)
+        field.placeholder = hint
+        with field.prevent(Input.Changed):
+            field.value = text
+        self.set_focus(field)
+        self.call_after_refresh(self.look)
+
+    def _end_asking(self) -> None:
+        self._asking = ""
+        self.set_focus(None)
+        self.query_one("#wanted").display = False
+        self.call_after_refresh(self.look)
+
+    def on_input_changed(self, event: Input.Changed) -> None:
+        """What is typed into the filter has its effect at once."""
+        if self._asking == "filter":
+            self._filter = " ".join(event.value.split())
+            self._up = 0
+            self.look()
+
+    def on_input_submitted(self, event: Input.Submitted) -> None:
+        """Keep the filter; or the next older frame that fits."""
+        if self._asking == "filter":
+            self._end_asking()
+        elif event.value.strip():
+            self._find(event.value)
+
+    def _find(self, text: str) -> None:
+        if self._held is None:
+            self._held = self._source.frames
+        frames = self._held
+        places = self._places(frames)
+        shown = [frames[at] for at in places]
+        fits = chosen(shown, choice_of(text), self._told, tcp=self._is_tcp)
+        before = next((at for at, one in enumerate(shown) if one is self._found), len(shown))
+        older = [at for at in fits if at < before]
+        if not older:
+            self.app.tell("No older frame fits." if self._found else "No frame fits.")
+            self._found = None
+            self.look()
+            return
+        self._found = shown[older[-1]]
+        # in the middle of the list, so that what came before and after it is seen
+        self._up = max(0, len(shown) - older[-1] - 1 - self._room // 2)
+        self.look()
+
+    def action_leave(self) -> None:
+        """Out of the field, then out of a filter, then out of the screen."""
+        if self._asking or self._filter:
+            if self._asking != "find":
+                self._filter = ""
+            self._end_asking()
+            return
+        self._go_out()
+
+    def _go_out(self) -> None:
+        """Back to the screen below."""
+        super().action_leave()
+
+    # Saving
+
+    def action_save_file(self) -> None:
+        """Save the frames that the list has, filtered as it is: for tshark, or as a text."""
+        frames = self._kept
+        places = self._places(frames)
+        line = label(self._source.link)
+        heading = [line, self._title(), f"{len(places)} of {len(frames)} frames"]
+        text = frames_text(
+            frames, places, self._all_words(frames, places), self._since_epoch, heading
+        )
+        shown = [frames[at] for at in places]
+        ask_where(self.app, KeptFrames(shown, text, line, self._is_tcp, self._since_epoch))
+
+    def _all_words(self, frames: Sequence[Frame], places: Sequence[int]) -> list[str]:
+        told = self._told(frames)
+        return [told[at] for at in places]

@@ -1,0 +1,49 @@
+"""What listening came to, as lines of a screen. Pure functions."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from tui.session.listening.summary import ListeningSummary, summary_lines
+from tui.widgets.drawing import rule, wrapped
+from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
+
+MOST_ROWS = 6
+"""Rows of one sentence at most."""
+OF_A_DRIVE, HANGING = 3, 5
+"""Columns before a sentence about a drive, and before the rest of it."""
+WARNINGS = ("NOT FED", "ANSWERED TWICE", "A SECOND MASTER", "no answer", "damaged", "Broken")
+"""What of a sentence wants to be seen."""
+
+
+def heard_lines(
+    summary: ListeningSummary, width: int, height: int, top: int
+) -> tuple[list[Text], int]:
+    """A heading and as many lines as there is room for, from `top` on; and the `top` that fits."""
+    lines = [line for text in summary_lines(summary) for line in _sentence(_here(text), width)]
+    room = max(1, height - 1)
+    top = max(0, min(top, len(lines) - room))
+    shown = lines[top : top + room]
+    drives = sum(bool(one.tally.device) for one in summary.drives)
+    more = "" if len(lines) <= room else f"{top + 1} to {top + len(shown)} of {len(lines)}"
+    heading = f"Heard of {drives} drive{'' if drives == 1 else 's'}"
+    return [rule(heading, width, more), *shown], top
+
+
+def _here(text: str) -> str:
+    """In the words of the panel, which has a field in the place of an option."""
+    return text.replace("-p names it", "Profile on Line names it").replace("as -p says", "as typed")
+
+
+def _sentence(text: str, width: int) -> list[Text]:
+    """A sentence on as many rows as it takes; those about a drive stand behind its name."""
+    about_drive = text.startswith(" ")
+    first = OF_A_DRIVE if about_drive else 1
+    name = not about_drive and text.startswith(("Device", "All devices"))
+    style = STRONG if name else FAINT if about_drive else PLAIN
+    if any(one in text for one in WARNINGS):
+        style = ALARM
+    rows = wrapped(text.strip(), max(10, width - HANGING), MOST_ROWS)
+    return [
+        Text(" " * (HANGING if number else first) + row, style) for number, row in enumerate(rows)
+    ]

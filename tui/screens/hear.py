@@ -1,0 +1,102 @@
+"""The key that listens to a line: which one, whether the panel may fall silent there, and going."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import TYPE_CHECKING
+
+from tui.bus.errors import LineError
+from tui.bus.link import SerialLink
+from tui.drive.errors import DriveError
+
+if TYPE_CHECKING:
+    from tui.drive.profile.profile import Profile
+    from tui.session.fleet import Fleet
+
+    from .app_port import Panel
+
+NO_LINE = "No line is meant yet: choose one on Line, then H listens to it."
+CLOSES = (
+    "The panel asks these drives no more: the port is opened for reading only, and nothing is sent"
+    " until you end it, no stop either. Another master has to be there that asks and stops them."
+)
+CLOSE_FIRST = "To leave it alone all the same, close the line first: Ctrl+P, close."
+
+
+def why_not_hear(fleet: Fleet) -> str:
+    """Why the panel may not fall silent on a line, in a sentence; empty where it may."""
+    from tui.session.monitor.timeout import left_alone_text, names_of
+
+    line, watch = fleet.line, fleet.line_watch
+    if not isinstance(line.link, SerialLink):
+        return "Over a network nobody hears what others say; this list is all that goes over it."
+    if others := line.facts.others:
+        who = ", ".join(one.text for one in others)
+        return f"Not listened to: {who} uses the line too, and a port like that has no other user."
+    if running := watch.under_command():
+        who = "; ".join(names_of([one]) for one in running)
+        return f"Not listened to: {who} runs by a command from here. Stop it first."
+    if acting := watch.left_alone():
+        told = next(one for one in fleet.sessions if one.device in acting)
+        text = left_alone_text(told, watch=acting[told.device])
+        return f"Not listened to, as the panel feeds drives. {text} {CLOSE_FIRST}"
+    if unread := watch.unread():
+        who = names_of([unread[0]])
+        return f"Not listened to yet: what {who} does when it is asked no more was not read."
+    unknown = [device for device, one in fleet.found.items() if one.console is None]
+    if unknown:
+        return (
+            f"Not listened to: what device {unknown[0]} does when it is asked no more is not known."
+            f" {CLOSE_FIRST}"
+        )
+    return ""
+
+
+async def hear(app: Panel) -> None:
+    """Listen to the line under the cursor of Line, else to the one that is shown."""
+    if app.hearing:
+        app.tell("The panel listens already; Esc ends that.")
+        return
+    meant = getattr(app.screen, "line_to_hear", None)
+    text, profile = meant() if meant is not None else (app.line_text, "")
+    if not text:
+        app.tell(NO_LINE)
+        return
+    if (here := app.open_line_of(text)) is not None:
+        if why := why_not_hear(here.fleet):
+            app.notify(why, severity="warning")
+            return
+        app.show_line(here)
+        about = f"{here.opened.label} is closed for the panel. {CLOSES}" if here.fleet.found else ""
+        if not await app.may_let_go("Listen to the line?", yes="listens", no="stays", always=about):
+            return
+        if why := why_not_hear(here.fleet):  # it may have changed while that was asked
+            app.notify(why, severity="warning")
+            return
+        app.show_line(here)
+        await app.disconnect()
+    await _listen(app, text, profile)
+
+
+async def _listen(app: Panel, text: str, profile: str) -> None:
+    from tui.session.listening.background import HeardLine
+
+    from .frames.heard import HeardScreen
+
+    app.action_goto("line")
+    try:
+        named = await asyncio.to_thread(_named, profile)
+        heard = HeardLine(text, "panel", named)
+        await asyncio.to_thread(heard.open)
+    except (LineError, DriveError) as error:
+        app.say_first(str(error), "Enter opens the line; H tries to listen again.", "error")
+        return
+    app.hearing = text
+    app.push_screen(HeardScreen(heard))
+
+
+def _named(profile: str) -> dict[int | None, Profile] | None:
+    """The profile that was typed, for all drives; reads files."""
+    from tui.drive.profile import library
+
+    return {None: library.load(profile)} if profile else None

@@ -1,0 +1,118 @@
+"""A line that is listened to in a thread of its own, for whoever looks at it now and then."""
+
+from __future__ import annotations
+
+import logging
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import ExitStack
+
+from tui.bus.errors import LineError
+from tui.bus.link import Link
+from tui.bus.trace import Frame, Trace
+from tui.drive.profile.profile import Profile
+from tui.wire.heard.splitting import HeardFrame
+
+from ..connect.strangers import known_profiles
+from .families import Families, remembered_families
+from .hearing import Hearing
+from .listener import ToldExchange
+from .place import PlaceToListen, line_to_listen
+from .summary import ListeningSummary
+
+FRAMES_HEARD = 1000
+"""Frames that are kept."""
+READ_WITHIN = 0.1
+"""Seconds within which it ends when that is wanted."""
+SUMMED_UP_EVERY = 1.0
+"""Seconds for which a summary is good: it costs a read plan a drive."""
+
+log = logging.getLogger(__name__)
+
+
+class HeardLine:
+    """Opened by `open`; everything may be looked at from any thread.
+
+    `named` gives profiles by device, with None for that of all others.
+    """
+
+    def __init__(
+        self, text: str, program: str, named: Mapping[int | None, Profile] | None = None
+    ) -> None:
+        self.text = text
+        self._program, self._named = program, named
+        self._lock = threading.Lock()
+        self._over = threading.Event()
+        self._stack = ExitStack()
+        self._thread: threading.Thread | None = None
+        self._trace = Trace(FRAMES_HEARD)
+        self._summed: tuple[float, ListeningSummary] | None = None
+        self.trouble = ""
+        """Why it has ended by itself; empty while it goes on."""
+
+    def open(self) -> None:
+        """Open the line and begin; reads files. Raises as `line_to_listen` does."""
+        with ExitStack() as opening:
+            place: PlaceToListen = opening.enter_context(line_to_listen(self.text, self._program))
+            self.link: Link = place.line.link
+            self._families = Families(
+                known_profiles(), self._named, remembered_families(place.line.link)
+            )
+            self._hearing = Hearing(place.line, self._families, _forget, self._keep)
+            place.begin()
+            self._stack = opening.pop_all()
+        self._thread = threading.Thread(target=self._listen, name="listening", daemon=True)
+        self._thread.start()
+
+    def close(self) -> None:
+        """Give the port back; may be called twice."""
+        self._over.set()
+        if self._thread is not None:
+            self._thread.join()
+        self._stack.close()
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """The last frames, oldest first: requests are `out`, replies `in`, whoever sent them."""
+        return self._trace.frames()
+
+    def summary(self) -> ListeningSummary:
+        """What it came to; at most a second old."""
+        with self._lock:
+            now = time.monotonic()
+            if self._summed is None or now - self._summed[0] > SUMMED_UP_EVERY:
+                self._summed = now, self._hearing.summary(now)
+            return self._summed[1]
+
+    def profile(self, device: int) -> Profile | None:
+        """The profile that a drive is taken for now."""
+        with self._lock:
+            family = self._families.family(device)
+        return family.profile if family is not None else None
+
+    def raws(self, device: int) -> Mapping[str, int]:
+        """The last raw value of each parameter that was heard of a drive."""
+        with self._lock:
+            tally = self._hearing.listener.tally.drives.get(device)
+            return dict(tally.raws) if tally is not None else {}
+
+    def _listen(self) -> None:
+        try:
+            while not self._over.is_set():
+                data, now = self._hearing.read(READ_WITHIN)
+                with self._lock:
+                    self._hearing.take(data, now)
+        except LineError as error:
+            self.trouble = str(error)
+        except Exception as error:
+            log.exception("listening to %s failed", self.text)
+            self.trouble = f"Listening has failed: {error}"
+
+    def _keep(self, frame: HeardFrame, request: bool | None) -> None:
+        note = "noise" if request is None else ""
+        self._trace.add(frame.ended, "out" if request else "in", frame.data, note)
+
+
+def _forget(_: ToldExchange) -> None:
+    """Exchanges are told by their frames, and counted."""

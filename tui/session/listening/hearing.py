@@ -1,0 +1,57 @@
+"""Listening to an opened line: reading what comes, a step at a time, and summing it up."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+
+from tui.bus.link import character_time, silence
+from tui.bus.listening_line import ListeningLine
+from tui.drive.read_plan import WireTiming
+
+from .families import Families
+from .listener import FrameHeard, LineListener, ToldExchange
+from .summary import ListeningSummary, summary_of
+
+ExchangeTold = Callable[[ToldExchange], None]
+
+
+class Hearing:
+    """One line that is listened to; times are those of the system's monotonic clock."""
+
+    def __init__(
+        self,
+        line: ListeningLine,
+        families: Families,
+        told: ExchangeTold,
+        frame_heard: FrameHeard = lambda _frame, _request: None,
+    ) -> None:
+        self._line, self._told = line, told
+        self._timing = WireTiming(character_time(line.link), silence(line.link))
+        self.listener = LineListener(
+            families,
+            time.monotonic(),
+            character=line.character,
+            silence=line.silence,
+            frame_heard=frame_heard,
+        )
+
+    def read(self, wait: float) -> tuple[bytes, float]:
+        """What comes within `wait` seconds, and when that was. Raises LineLost."""
+        data = self._line.read(min(self.listener.pause, wait))
+        return data, time.monotonic()
+
+    def take(self, data: bytes, now: float) -> None:
+        """Tell what follows from what was read, or from a pause in which nothing came."""
+        found = self.listener.take(data, now) if data else self.listener.idle(now)
+        for one in found:
+            self._told(one)
+
+    def end(self, now: float) -> None:
+        """Tell what is still open."""
+        for one in self.listener.end(now):
+            self._told(one)
+
+    def summary(self, now: float) -> ListeningSummary:
+        """What it came to by now."""
+        return summary_of(self.listener, now, self._timing)

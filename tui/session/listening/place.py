@@ -1,0 +1,63 @@
+"""The line that is meant to be listened to, opened: a port, or simulated drives with a master."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from tui.bus.errors import LineError
+from tui.bus.link import SerialLink, parse_link
+from tui.bus.listening_line import ListeningLine
+
+from ..connect.line_key import SIMULATED_PREFIX
+from ..connect.share_place import share_place, this_program
+
+
+class NothingToHear(LineError):
+    """A line on which nobody can hear what others say."""
+
+
+@dataclass(frozen=True, slots=True)
+class PlaceToListen:
+    """An opened line, and what is to be done once all is ready for what comes."""
+
+    line: ListeningLine
+    begin: Callable[[], None] = lambda: None
+
+
+@contextmanager
+def line_to_listen(text: str, program: str) -> Iterator[PlaceToListen]:
+    """The line that is meant, opened for a program of that name.
+
+    Raises NothingToHear for one that is no serial line, LinkSyntaxError, and those of
+    ListeningLine.
+    """
+    if text.casefold().startswith(SIMULATED_PREFIX):
+        with _simulated(text, program) as place:
+            yield place
+        return
+    link = parse_link(text)
+    if not isinstance(link, SerialLink):
+        raise NothingToHear(
+            f"{text}: listening needs a serial port. Over a network nobody hears what others say;"
+            " the Frames screen shows what goes over a line of this program."
+        )
+    with ListeningLine(link, share_place(text), this_program(program)) as line:
+        yield PlaceToListen(line)
+
+
+@contextmanager
+def _simulated(text: str, program: str) -> Iterator[PlaceToListen]:
+    """Simulated drives with a master that asks them, as soon as it is listened to."""
+    from tui.simulator import PlcOnLine, Simulation, parse_drives, plc_cycle
+
+    with Simulation(parse_drives(text[len(SIMULATED_PREFIX) :])) as simulation:
+        cycle = plc_cycle([(drive.address, drive.profile) for drive in simulation.drives])
+        master = PlcOnLine(simulation, cycle)
+        try:
+            link = SerialLink(master.path)
+            with ListeningLine(link, None, this_program(program)) as line:
+                yield PlaceToListen(line, master.start)
+        finally:
+            master.stop()
