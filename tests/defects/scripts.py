@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from .defect import Defect
 
+INPUTS = "tests/line/test_simulate_inputs.py"
+
 DEFECTS = (
     Defect(
         "misspelt-command-opens-the-panel",
@@ -167,5 +169,13 @@ DEFECTS = (
         'return f"{item.type},{item.value}"',
         "Completing sim:atv makes sim:sim:atv of it.",
         ("tests/cli/test_completion.py",),
+    ),
+    Defect(
+        "output-beside-in-a-buffer",
+        "tui/cli/shared/say.py",
+        "line = line[os.write(stream.fileno(), line) :]",
+        "stream.write(line.decode()); stream.flush(); line = b''",
+        "A program is aborted at its end, where nobody reads what a thread of it says.",
+        (f"{INPUTS}::test_it_ends_well_while_nobody_reads_what_it_says",),
     ),
 )

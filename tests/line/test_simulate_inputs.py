@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import subprocess
+import termios
+from array import array
 from pathlib import Path
+from typing import IO
 
 import pytest
 
-from tests.programs import Served, drivepanel, port_of, simulated, wait_until
+from tests.programs import PATIENCE, Served, drivepanel, port_of, simulated, wait_until
+
+NEARLY_FULL = 60_000
+"""Bytes in a pipe that takes 64 KiB."""
 
 
 def typed(simulation: Served, line: str) -> str:
@@ -54,3 +61,25 @@ def test_another_baud_is_not_understood_unless_any_settings_are(
         assert own.returncode == 0, own.stderr
         other = drivepanel("read", f"serial:{link},9600,8E1", "-d", "2", "-p", "atv312", "ETA")
         assert other.returncode == status, other.stderr
+
+
+def test_it_ends_well_while_nobody_reads_what_it_says() -> None:
+    """A thread that waits for its reader in a buffer of Python aborted the program at its end."""
+    with simulated("atv312@2", "--tcp", "0", stdin=subprocess.PIPE) as simulation:
+        process = simulation.process
+        assert process.stdin is not None
+        process.stdin.write("2: LI9=1\n" * 3000)  # its answers are more than a pipe takes
+        process.stdin.flush()
+        assert process.stderr is not None
+        pipe = process.stderr
+        wait_until(lambda: waiting(pipe) > NEARLY_FULL, "its thread waits for a reader")
+        process.terminate()
+        process.wait(PATIENCE)
+        assert process.returncode == 0
+
+
+def waiting(pipe: IO[str]) -> int:
+    """Bytes in a pipe that nobody has read."""
+    count = array("i", [0])
+    fcntl.ioctl(pipe, termios.FIONREAD, count)
+    return count[0]

@@ -14,8 +14,8 @@ from ..shared.completion import complete_profile
 from ..shared.errors import told
 from ..shared.host_port import host_port, written_host_port
 from ..shared.options import json_option
-from ..shared.output import print_json
-from ..shared.say import say
+from ..shared.output import document, json_text, print_json
+from ..shared.say import say, say_beside
 from ..shared.standard_input import stay_in_background, typed_lines
 
 if TYPE_CHECKING:
@@ -169,14 +169,14 @@ def _follow(simulation: Simulation, as_json: bool) -> None:
             try:
                 text = set_inputs(simulation, line)
             except SimulatorError as error:
-                say(str(error), err=True)
+                say_beside(str(error), err=True)
                 continue
             if as_json:
                 # click knows no command in a thread
                 told = {"command": "simulate", "event": "inputs", "text": text}
-                print_json(told, compact=True)
+                say_beside(json_text(document(told)), as_it_is=True)
             else:
-                say(text)
+                say_beside(text)
 
 
 def _serve(

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sys
+from contextlib import suppress
 from shutil import get_terminal_size
 
 import click
@@ -15,10 +17,28 @@ def say(text: str = "", *, err: bool = False, indent: int = 0, to_copy: bool = F
 
     What does not fit goes on `indent` characters from the left. What is `to_copy` is not broken.
     """
+    click.echo(_laid_out(text, err=err, indent=indent, to_copy=to_copy), err=err)
+
+
+def say_beside(text: str, *, err: bool = False, as_it_is: bool = False) -> None:
+    """Print lines from a thread beside the main one; what nobody takes is lost.
+
+    Past Python's own buffers: a thread that waits there for its reader holds their lock, and the
+    program that ends meanwhile is aborted. Text that `as_it_is` goes out is for machines.
+    """
+    stream = sys.stderr if err else sys.stdout
+    told = text if as_it_is else _laid_out(text, err=err)
+    line = f"{told}{os.linesep}".encode(stream.encoding or "utf-8", "replace")
+    with suppress(OSError):
+        while line:
+            line = line[os.write(stream.fileno(), line) :]
+
+
+def _laid_out(text: str, *, err: bool, indent: int = 0, to_copy: bool = False) -> str:
     stream = sys.stderr if err else sys.stdout
     width = get_terminal_size().columns if stream.isatty() and not to_copy else 0
     told = printable(text, stream.encoding)
-    click.echo("\n".join(_broken(line, width, indent) for line in told.split("\n")), err=err)
+    return "\n".join(_broken(line, width, indent) for line in told.split("\n"))
 
 
 def say_row(title: str, text: str, width: int) -> None:
