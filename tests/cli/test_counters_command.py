@@ -46,6 +46,9 @@ def test_the_drives_counters_are_reset_armed_only_and_where_it_has_them() -> Non
         after = counted(0, line, "-d", "2", "--reset-drive", "--arm", "--frames", "0")
         assert after["drive"][0]["frames"] < before
         assert after["reset"] is True
+        (entry,) = json.loads(ended(0, "journal", "--json").stdout)["entries"]
+        assert (entry["kind"], entry["code"], entry["answer"]) == ("reset", "function 8, 0A", "ok")
+        assert "function 8, 0A: the drive's own counters" in ended(0, "journal").stdout
         refused = ended(5, "counters", line, "-d", "2", "--reset-drive", "--arm", "--read-only")
         assert "read-only" in refused.stderr
     lacking = ended(5, "counters", "sim:atv312", "--reset-drive", "--arm")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from hypothesis import given
@@ -26,6 +27,8 @@ from tui.session.counters.compare import (
 )
 from tui.session.counters.watch import THIS_PORT, CounterWatch
 from tui.session.drive import DriveSession
+from tui.session.journal import Journal
+from tui.session.journal_reading import entries_of
 from tui.simulator.simulation import Simulation
 from tui.simulator.spec import DriveSpec, FaultRates
 
@@ -181,14 +184,19 @@ async def test_damaged_frames_and_those_of_another_master() -> None:
         assert kinds == {"damaged-there": 1, "not-from-here": 2}
 
 
-async def test_the_drives_counters_are_reset_and_compared_from_there() -> None:
+async def test_the_drives_counters_are_reset_and_compared_from_there(tmp_path: Path) -> None:
     with simulated() as (_, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
         await ask(line, 7)
         await watch.look()
         assert dict(watch.now().drive)[THIS_PORT].last.frames > 7
-        await watch.reset_drive()
+        journal = Journal(tmp_path)
+        await watch.reset_drive(journal)
         assert dict(watch.now().drive)[THIS_PORT].last.frames < 5
+        (entry,) = entries_of(journal, watch.session.line_text, 2)
+        assert (entry.kind, entry.code, entry.new, entry.answer) == (
+            "reset", "function 8, 0A", "0", "ok",
+        )  # fmt: skip
         await ask(line, 4)
         await watch.look()
         now = watch.now()
@@ -212,7 +220,7 @@ async def test_counters_that_somebody_else_reset_are_told() -> None:
         assert watch.now().agree
 
 
-async def test_a_read_only_line_resets_no_drive() -> None:
+async def test_a_read_only_line_resets_no_drive(tmp_path: Path) -> None:
     with Simulation([DriveSpec("atv71", 2)]) as simulation:
         line = Line(SerialLink(simulation.serve_pty()), timing=QUICK, read_only=True)
         try:
@@ -220,7 +228,7 @@ async def test_a_read_only_line_resets_no_drive() -> None:
             watch = CounterWatch(DriveSession(line, 2, library.load("atv71")))
             assert not watch.can_reset_drive
             with pytest.raises(RequestRefused):
-                await watch.reset_drive()
+                await watch.reset_drive(Journal(tmp_path))
             await watch.look()
             assert not watch.trouble
         finally:

@@ -61,10 +61,11 @@ class Entry:
     read_back: int | None
     why: str
     """The command or edit that it belongs to."""
-    kind: Literal["write", "fault", "read-back", "proof"] = "write"
+    kind: Literal["write", "fault", "read-back", "proof", "reset"] = "write"
     """`fault` for a trip that was seen: `code` and `new` are the fault's, nothing was written.
     `read-back` completes a write whose answer was lost: `read_back` is what the drive held then.
-    `proof` is a proof of communication loss, whose words are in `new`."""
+    `proof` is a proof of communication loss, whose words are in `new`.
+    `reset` set the drive's own counters to 0, by the function that `code` names."""
     of: str = ""
     """The time of the write that a `read-back` completes."""
 

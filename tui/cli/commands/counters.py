@@ -22,7 +22,7 @@ from ..shared.options import (
 )
 from ..shared.output import drive_json, print_json
 from ..shared.say import say, say_row
-from .orders import arm_option, need_arming
+from .orders import arm_option, close_journal, need_arming, told_journal
 
 if TYPE_CHECKING:
     from tui.bus.api import DeviceCounters
@@ -119,7 +119,11 @@ async def _reset(watch: CounterWatch) -> None:
         why = "the line is read-only" if watch.session.line.read_only else "it has no such command"
         told = f"The counters of device {watch.session.device} are not reset: {why}."
         raise Failure(told, REFUSED_HERE)
-    await watch.reset_drive()
+    journal = told_journal()
+    try:
+        await watch.reset_drive(journal)
+    finally:
+        await asyncio.to_thread(close_journal, journal)
 
 
 def _rows(found: CountersNow) -> Iterator[tuple[str, str]]:

@@ -140,6 +140,8 @@ def entry_line(entry: Entry) -> str:
         return f"{head}  FAULT {entry.code} {entry.new}: {entry.answer}"
     if entry.kind == "proof":
         return f"{head}  {entry.why}: {entry.new}  {entry.answer}"
+    if entry.kind == "reset":
+        return f"{head}  {entry.code}: {entry.why} set to {entry.new}  {entry.answer}"
     if entry.kind == "read-back":
         return f"{head}  {entry.code}: {entry.answer}"
     change = f"{entry.old} -> {entry.new}" if entry.old else f"-> {entry.new}"

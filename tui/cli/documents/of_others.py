@@ -172,7 +172,7 @@ class JournalEntryTold(msgspec.Struct, kw_only=True):
     answer: str
     read_back: int | None
     why: str
-    kind: Literal["write", "fault", "read-back", "proof"]
+    kind: Literal["write", "fault", "read-back", "proof", "reset"]
     of: str
 
 

@@ -102,7 +102,7 @@ class CounterKeys(PanelScreen):
     async def _reset_drive(self) -> None:
         device = self.session.device
         try:
-            await self.console.counters.reset_drive()
+            await self.console.counters.reset_drive(self.console.journal)
         except LineError as error:
             self.app.events.add("refused", f"Counters not reset: {error}", device)
         else:

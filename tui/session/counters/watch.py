@@ -12,6 +12,7 @@ from tui.drive.chart import watched_codes
 from tui.drive.profile.schema import PortCounters
 
 from ..drive import DriveSession
+from ..journal import Entry, Journal, now_text
 from ..read.reader import Reader
 from .compare import (
     Bounds,
@@ -133,15 +134,24 @@ class CounterWatch:
         self._begun = self.session.clock.monotonic()
         self._drive = {name: Comparison(one.last, one.last) for name, one in self._drive.items()}
 
-    async def reset_drive(self) -> None:
+    async def reset_drive(self, journal: Journal) -> None:
         """Set the drive's counters to 0 (sub-function 0A). Raises the line's errors.
 
-        By the manual that resets what monitors the exchanges, and nothing else.
+        By the manual that resets what monitors the exchanges, and nothing else. It is put into the
+        journal, as is whatever came of it.
         """
         if why := self.session.contradiction:
             raise RequestRefused(f"Not reset: {why}")
         device, line = self.session.device, self.session.line
-        await line.diagnose(device, RESET, priority=Priority.OPERATOR_WRITE)
+        answer = "ended on the way: not known whether it was taken"
+        try:
+            await line.diagnose(device, RESET, priority=Priority.OPERATOR_WRITE)
+            answer = "ok"
+        except LineError as error:
+            answer = str(error)
+            raise
+        finally:
+            journal.add(_reset_entry(self.session, answer))
         self._drive = {}
         self.reset_ours()
         await self.look()
@@ -237,6 +247,15 @@ class CounterWatch:
             self.trouble,
         )
         return replace(found, differences=_told(found.compared, since))
+
+
+def _reset_entry(session: DriveSession, answer: str) -> Entry:
+    """The entry of a reset: no register was written, and what was counted is not read before."""
+    return Entry(
+        now_text(), session.line_text, session.device, session.profile.id,
+        f"function {DIAGNOSTICS}, {RESET:02X}", 0, None, "", 0, "0", answer, None,
+        "the drive's own counters of its exchanges", kind="reset",
+    )  # fmt: skip
 
 
 def _told(mine: Comparison | None, since: DeviceCounters) -> tuple[Difference, ...]:
