@@ -73,4 +73,23 @@ DEFECTS = (
         "A script goes on with a drive that does not answer.",
         (f"{COMMAND}::test_a_port_that_is_not_there",),
     ),
+    Defect(
+        "another-speed-for-the-same-one",
+        "tui/session/diagnosis/garbled.py",
+        "if not came or not due or same_speed(sight) or not isinstance(sight.link, SerialLink):",
+        "if not came or not due or not isinstance(sight.link, SerialLink):",
+        "It is said that the speed is right, and to open the line at another one.",
+        (
+            "tests/session/test_diagnosis.py::"
+            "test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed",
+        ),
+    ),
+    Defect(
+        "wires-of-who-answers",
+        "tui/session/diagnosis/next_steps.py",
+        "yield from wiring_hints(sight, answers=True)",
+        "yield from wiring_hints(sight)",
+        "A person changes over the wires of a drive that answers by them.",
+        ("tests/session/test_diagnosis.py::test_who_answers_has_the_right_wires",),
+    ),
 )

@@ -7,6 +7,7 @@ import socket
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 from hypothesis import given
@@ -98,6 +99,45 @@ def told(found: Diagnosis) -> Diagnosis:
 
 def of(sight: Sight) -> Diagnosis:
     return told(diagnosed(sight))
+
+
+def heard(**seen: Any) -> Sight:
+    """What a drive answered on a good port."""
+    return Sight(LINK, 2, PROFILE, heard=Heard(asked=3, **seen))
+
+
+def test_garbage_at_the_same_speed_leads_to_another_format_and_to_no_other_speed() -> None:
+    same = of(heard(garbage=12, compared=(12, 14)))
+    assert "the speed is right" in same.text
+    assert "another format: 8O1, 8N1 or 8N2." in same.steps[0]
+    assert not any("open serial:" in step for step in same.steps)
+    faster = of(heard(garbage=2, compared=(2, 7)))
+    assert any("open serial:/dev/ttyUSB0,38400,8E1" in step for step in faster.steps)
+
+
+def test_who_answers_has_the_right_wires() -> None:
+    damaged = of(heard(answered=2, damaged=1))
+    assert damaged.rung == "checksum"
+    said = " ".join(damaged.steps)
+    assert "Termination" in said
+    assert "Polarity" not in said
+    assert "Pins" not in said
+
+
+def test_what_is_not_as_it_left_the_factory_is_looked_at_first() -> None:
+    other = replace(heard(), link=SerialLink(PORT, 9600, "8E1"))
+    assert "this line has 9600 8E1" in of(other).steps[0]
+    assert of(heard()).steps[0].startswith("Address")
+    assert any("--all-settings" in step for step in of(other).steps)
+
+
+@pytest.mark.parametrize(
+    ("code", "step"), [(2, "what was asked is not known"), (6, "Ask again"), (4, "has a trouble")]
+)
+def test_a_refusal_is_told_by_its_code(code: int, step: str) -> None:
+    found = of(heard(exceptions=(code,)))
+    assert found.rung == "exception"
+    assert step in found.steps[0]
 
 
 # The port

@@ -49,6 +49,14 @@ def address_hint(sight: Sight) -> str:
     return f"Address: {setting}; it leaves the factory at {known.factory}."
 
 
+def as_factory(sight: Sight) -> bool:
+    """Whether the line has the settings with which the drive leaves the factory."""
+    profile, link = sight.profile, sight.link
+    if profile is None or not isinstance(link, SerialLink):
+        return True
+    return (link.baud, link.format) == (profile.data.link.baud, profile.data.link.format)
+
+
 def settings_hints(sight: Sight) -> Iterator[str]:
     """Baud and format: those that the drive leaves the factory with, beside those of the line."""
     profile, link = sight.profile, sight.link
@@ -58,8 +66,7 @@ def settings_hints(sight: Sight) -> Iterator[str]:
     codes = ", ".join(filter(None, (_code(profile, role) for role in SPEED_ROLES)))
     leaves = f"{profile.name} leaves the factory with {known.baud} {known.format} ({codes})"
     if isinstance(link, SerialLink):
-        same = (link.baud, link.format) == (known.baud, known.format)
-        line = "as this line" if same else f"this line has {link.baud} {link.format}"
+        line = "as this line" if as_factory(sight) else f"this line has {link.baud} {link.format}"
         yield f"Baud and format: {leaves}; {line}."
     else:
         yield f"Baud and format, which the gateway sets: {leaves}."
@@ -69,21 +76,16 @@ def settings_hints(sight: Sight) -> Iterator[str]:
             yield f"{port}: {setting.choices[0].text} only, whatever the other port has."
 
 
-def wiring_hints(sight: Sight) -> Iterator[str]:
-    """Polarity, pins, polarisation and termination, as the family's manual names them."""
+def wiring_hints(sight: Sight, *, answers: bool = False) -> Iterator[str]:
+    """Polarity, pins, polarisation and termination, as the family's manual names them.
+
+    The wires of a drive that answers are the right ones: then nothing of polarity and pins.
+    """
     if sight.profile is None:
         return
     data = sight.profile.data
-    if polarity := _polarity(sight.profile):
-        yield f"Polarity: {polarity}"
-    for connector in data.connectors:
-        pins = [
-            f"{pin.pin} {pin.signal}"
-            for pin in connector.pins
-            if pin.signal.casefold().startswith(USED_PINS)
-        ]
-        if pins:
-            yield f"Pins, {connector.name}: {', '.join(pins)}."
+    if not answers:
+        yield from _wire_hints(sight.profile)
     for rule in data.line_rules:
         subject = rule.subject.casefold()
         if subject in WIRED or subject.endswith(f", {WIRED[1]}"):
@@ -93,6 +95,19 @@ def wiring_hints(sight: Sight) -> Iterator[str]:
             yield rule.rule
     if data.link.note:
         yield data.link.note
+
+
+def _wire_hints(profile: Profile) -> Iterator[str]:
+    if polarity := _polarity(profile):
+        yield f"Polarity: {polarity}"
+    for connector in profile.data.connectors:
+        pins = [
+            f"{pin.pin} {pin.signal}"
+            for pin in connector.pins
+            if pin.signal.casefold().startswith(USED_PINS)
+        ]
+        if pins:
+            yield f"Pins, {connector.name}: {', '.join(pins)}."
 
 
 def _polarity(profile: Profile) -> str:

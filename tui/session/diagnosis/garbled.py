@@ -9,6 +9,7 @@ from tui.bus.link import SerialLink
 from .sight import Sight
 
 USUAL_BAUDS = (1200, 2400, 4800, 9600, 19200, 38400, 57600, 115200)
+USUAL_FORMATS = ("8E1", "8N1", "8N2", "8O1")
 SAME_SPEED = 1.3
 """Times by which the bytes that came may differ from those due where the speed is the same."""
 
@@ -18,19 +19,35 @@ def speed_told(sight: Sight) -> str:
     came, due = sight.heard.compared
     if not came or not due:
         return ""
-    ratio = came / due
     counts = f"{came} bytes came where {due} were due"
-    if 1 / SAME_SPEED < ratio < SAME_SPEED:
+    if same_speed(sight):
         return f"{counts}: the speed is right, the format hardly"
     likely = likely_baud(sight)
     at = f", at {likely} bit/s most likely" if likely else ""
-    return f"{counts}: the drive sends {'slower' if ratio > 1 else 'faster'}{at}"
+    return f"{counts}: the drive sends {'slower' if came > due else 'faster'}{at}"
+
+
+def same_speed(sight: Sight) -> bool:
+    """Whether about as many bytes came as were due."""
+    came, due = sight.heard.compared
+    return bool(came and due) and 1 / SAME_SPEED < came / due < SAME_SPEED
+
+
+def other_formats(sight: Sight) -> tuple[str, ...]:
+    """The formats of the family that the line does not have; none behind a device server."""
+    if not isinstance(sight.link, SerialLink):
+        return ()
+    known = sight.profile.data.link.formats if sight.profile is not None else ()
+    return tuple(one for one in known or USUAL_FORMATS if one != sight.link.format)
 
 
 def likely_baud(sight: Sight) -> int | None:
-    """The baud of the family that the bytes fit best; None behind a device server."""
+    """The other baud of the family that the bytes fit best.
+
+    None where the present one fits, and behind a device server.
+    """
     came, due = sight.heard.compared
-    if not came or not due or not isinstance(sight.link, SerialLink):
+    if not came or not due or same_speed(sight) or not isinstance(sight.link, SerialLink):
         return None
     known = sight.profile.data.link.bauds if sight.profile is not None else ()
     wanted = sight.link.baud * due / came

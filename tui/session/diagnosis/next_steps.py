@@ -9,10 +9,14 @@ from tui.bus.errors import PortMissing
 from tui.bus.link import SerialLink
 from tui.bus.transport.ports import USUAL_GROUP
 
-from .family import address_hint, settings_hints, speed_hint, wiring_hints
-from .garbled import likely_baud
+from .family import address_hint, as_factory, settings_hints, speed_hint, wiring_hints
+from .garbled import likely_baud, other_formats, same_speed
 from .sight import Sight
 
+LATER = frozenset({5, 6})
+"""Exceptions by which a request is put off."""
+NOT_KNOWN = frozenset({1, 2, 3})
+"""Exceptions by which what was asked is not known: function, register, value."""
 NAME_A_FAMILY = "Name the drive's profile: then what its manual says of all this stands here."
 
 
@@ -89,6 +93,8 @@ def mend_settings(sight: Sight) -> Iterator[str]:
         yield hint
     if (likely := likely_baud(sight)) and isinstance(sight.link, SerialLink):
         yield f"Close the line and open serial:{sight.path},{likely},{sight.link.format}."
+    elif same_speed(sight) and (formats := other_formats(sight)):
+        yield f"Close the line and open it at the same speed with another format: {_any(formats)}."
     yield from settings_hints(sight)
     if sight.profile is None:
         yield NAME_A_FAMILY
@@ -105,10 +111,19 @@ def end_silence(sight: Sight) -> Iterator[str]:
         yield "Are baud and format those of the drive? Some take new ones at power-up only."
         yield "Are the two wires changed over, the common missing, the ends not terminated?"
         yield NAME_A_FAMILY
+        yield from search(sight)
         return
-    yield address_hint(sight)
-    yield from settings_hints(sight)
+    hints = [address_hint(sight), *settings_hints(sight)]
+    # what is not as the drive left the factory is looked at first
+    yield from hints[1:] + hints[:1] if not as_factory(sight) else hints
+    yield from search(sight)
     yield from wiring_hints(sight)
+
+
+def search(sight: Sight) -> Iterator[str]:
+    """That the panel itself can look for the drive elsewhere."""
+    settings = ", --all-settings at other baud rates" if isinstance(sight.link, SerialLink) else ""
+    yield f"drivepanel scan, or s on Line, looks for it at other addresses{settings}."
 
 
 def wait_longer(sight: Sight) -> Iterator[str]:
@@ -129,7 +144,7 @@ def end_damage(sight: Sight) -> Iterator[str]:
         yield from settings_hints(sight)
     yield "Look at shield and routing, polarisation, termination at both ends alone, taps."
     yield "Two drives at one address, or a second master, break answers too."
-    yield from wiring_hints(sight)
+    yield from wiring_hints(sight, answers=True)
 
 
 def sort_addresses(sight: Sight) -> Iterator[str]:
@@ -159,9 +174,21 @@ def ask_gateway(sight: Sight) -> Iterator[str]:
 
 def ask_otherwise(sight: Sight) -> Iterator[str]:
     """A drive that refuses a read."""
+    code = sight.heard.exceptions[-1]
+    if code in LATER:
+        yield "Line, baud and format are right. Ask again: it, or a gateway before it, is at work."
+        return
+    if code not in NOT_KNOWN:
+        yield "Line, baud and format are right: the drive, or a gateway before it, has a trouble."
+        return
     yield "Line, baud and format are right: only what was asked is not known there."
     name = sight.profile.name if sight.profile is not None else ""
     yield f"Is it of the family {name}?" if name else NAME_A_FAMILY
     if sight.profile is not None and sight.profile.data.addresses.servers:
         others = ", ".join(server.name for server in sight.profile.data.addresses.servers)
         yield f"Other servers in the same drive have addresses of their own: {others}."
+
+
+def _any(names: tuple[str, ...]) -> str:
+    """Names of which one is right."""
+    return f"{', '.join(names[:-1])} or {names[-1]}" if len(names) > 1 else names[0]

@@ -9,6 +9,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from tui.bus.errors import LineLost, NotShared, PortBusy, PortMissing, PortRefused
+from tui.bus.limits import STANDARD_EXCEPTIONS
 
 from . import next_steps as steps
 from .garbled import speed_told
@@ -175,7 +176,7 @@ def _refused(sight: Sight) -> bool:
 def _says_refused(sight: Sight) -> str:
     code = sight.heard.exceptions[-1]
     known = sight.profile.data.exceptions if sight.profile is not None else []
-    meaning = next((e.meaning for e in known if e.code == code), "")
+    meaning = next((e.meaning for e in known if e.code == code), STANDARD_EXCEPTIONS.get(code, ""))
     why = f": {meaning.rstrip('.')}" if meaning else ""
     return f"The drive is there, and refuses what is asked with exception {code}{why}."
 
