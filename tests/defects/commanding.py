@@ -7,6 +7,7 @@ from .defect import Defect
 WRITING = "tests/session/test_writing.py"
 WORK = "tests/session/test_work.py"
 STOP = "tests/session/test_stop_words.py"
+PROVER = "tests/session/test_prover.py"
 
 DEFECTS = (
     Defect(
@@ -270,5 +271,37 @@ DEFECTS = (
             "tests/session/test_exchange.py"
             "::test_an_exchange_needs_arming_and_the_interlocks_of_an_order",
         ),
+    ),
+    Defect(
+        "turning-motor-left-for-a-proof",
+        "tui/session/proof/prover.py",
+        "            self._check_rest(state)\n",
+        "",
+        "A motor that the terminals start during a proof is left alone on the run, unasked.",
+        (f"{PROVER}::test_a_motor_that_begins_to_turn_meanwhile_is_asked_on",),
+    ),
+    Defect(
+        "proved-against-another-setting",
+        "tui/session/proof/prover.py",
+        "            await self._check_same(rules, readings)\n",
+        "",
+        "A drive whose time-out was changed meanwhile is said not to react as set.",
+        (f"{PROVER}::test_what_is_set_otherwise_meanwhile_proves_nothing",),
+    ),
+    Defect(
+        "proof-on-the-run-unasked",
+        "tui/cli/commands/prove.py",
+        "if turning and not yes:",
+        "if False:",
+        "A hoist falls by one word of a command.",
+        ("tests/cli/test_prove.py::test_on_the_run_without_a_terminal_takes_a_yes",),
+    ),
+    Defect(
+        "time-out-of-one-port-alone",
+        "tui/session/proof/prover.py",
+        "told = await timeouts_of_ports(self._reader, rules, Priority.STOP)",
+        "told = (await self._reader.read([rules.timeout], priority=Priority.STOP)).values()",
+        "A drive that watches its other port is said not to notice a dead line.",
+        ("tests/cli/test_prove.py::test_the_time_out_of_each_port_counts",),
     ),
 )

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.errors import DIFFERENT, DRIVE_REFUSED, Failure, told
+from ..shared.errors import DIFFERENT, DRIVE_REFUSED, REFUSED_HERE, Failure, told
 from ..shared.options import (
     Target,
     drive_options,
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from tui.session.fleet import Fleet
     from tui.session.proof.result import ProofResult
 
+ON_THE_RUN = (
+    "The motor turns while it is proved: it does what is set, and may coast; a hoist falls. It is"
+    " stopped when the proof ends."
+)
 STOPPED_AFTER_PROOF_WITHIN = 60.0
 """Seconds that a motor may take to its standstill after a proof on the run."""
 
@@ -39,6 +43,7 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
     is_flag=True,
     help="Prove it with the motor turning: it may coast, and a hoist falls. It is stopped after.",
 )
+@click.option("--yes", is_flag=True, help="With --turning: prove it without being asked.")
 @click.option(
     "--reset", is_flag=True, help="Reset the fault in which the proof has left the drive."
 )
@@ -46,7 +51,13 @@ STOPPED_AFTER_PROOF_WITHIN = 60.0
 @json_option
 @told
 def prove(
-    target: Target, arm: bool, turning: bool, reset: bool, read_only: bool, as_json: bool
+    target: Target,
+    arm: bool,
+    turning: bool,
+    yes: bool,
+    reset: bool,
+    read_only: bool,
+    as_json: bool,
 ) -> None:
     """Prove that a drive reacts to a silent line, by leaving it alone for longer and longer.
 
@@ -57,6 +68,8 @@ def prove(
 
     async def work(opened: OpenLine) -> bool:
         async with watched(opened, target) as (fleet, console):
+            if turning and not yes:
+                await _ask_on_the_run(console.device)
             arm_drive(console)
             result = await _proved(fleet, console, turning, quiet=as_json)
             if reset and result.fault:
@@ -66,6 +79,17 @@ def prove(
 
     if not on_line(target, work, read_only=read_only):
         raise click.exceptions.Exit(DIFFERENT)
+
+
+async def _ask_on_the_run(device: int) -> None:
+    """A motor that turns is left to its drive only with a yes; raises Failure without one."""
+    from ..running.asking import may_ask, says_yes
+
+    if not may_ask():
+        raise Failure(f"{ON_THE_RUN} --yes says that this is meant.", REFUSED_HERE)
+    complain(ON_THE_RUN)
+    if not await says_yes(f"Prove the communication loss of device {device} on the run?"):
+        raise Failure("Nothing was proved.", REFUSED_HERE)
 
 
 async def _proved(
@@ -104,4 +128,7 @@ def _tell(about: dict[str, Any], result: ProofResult, reset: bool, as_json: bool
     if result.changed:
         say(result.changed)
     if result.fault and not reset:
-        say(f"It is in the fault {result.fault} now; `drivepanel reset` with --arm ends that.")
+        from tui.session.proof.result import UNNAMED_FAULT
+
+        now = f"the fault {result.fault}" if result.fault != UNNAMED_FAULT else UNNAMED_FAULT
+        say(f"It is in {now} now; `drivepanel reset` with --arm ends that.")

@@ -60,7 +60,7 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
     rules = session.profile.data.communication_fault
     if rules is None or not rules.timeout:
         return Timeout(known=True)
-    readings = await _of_its_ports(reader, rules, priority)
+    readings = await timeouts_of_ports(reader, rules, priority)
     found = await reader.read([*_told_with_it(session, rules), *besides], priority=priority)
     told = [one for one in readings if one.raw is not None]
     running = [(timeout_seconds(one, rules.off), one.parameter.code) for one in told]
@@ -76,7 +76,7 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
     return Timeout(True, TimeoutWatch(shortest[0], reaction, begun, shortest[1], fault, sure))
 
 
-async def _of_its_ports(
+async def timeouts_of_ports(
     reader: Reader, rules: CommunicationFault, priority: Priority
 ) -> list[Reading]:
     """The time-out of each port of a drive; a port that it does not have may meet silence."""

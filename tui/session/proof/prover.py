@@ -17,12 +17,12 @@ from tui.drive.profile.schema import CommunicationFault, Reaction
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
 from ..journal import Journal
-from ..monitor.timeout import timeout_seconds
+from ..monitor.timeout import timeout_seconds, timeouts_of_ports
 from ..read.reader import Reader
 from ..reading import Reading
 from ..settings.write import Writer
 from ..work import Permit
-from .result import ProofResult
+from .result import UNNAMED_FAULT, ProofResult
 from .silences import Bracket, silences
 
 LEFT_ALONE_FOR_PROOF = "Its communication time-out is being proved: nobody asks it meanwhile."
@@ -72,28 +72,44 @@ class Prover:
         rules = session.profile.data.communication_fault
         if rules is None or not rules.timeout:
             raise NothingToProve(f"{session.profile.name} has no communication time-out.")
-        before = {code: session.image.get(code) for code in (rules.timeout, rules.reaction) if code}
+        watch = (rules.timeout, *rules.other_timeouts, rules.reaction)
+        before = {code: session.image.get(code) for code in watch if code}
         facts.hush(session.device, LEFT_ALONE_FOR_PROOF)
         try:
-            readings = await self._read(self._codes(rules))
-            timeout = timeout_seconds(readings[rules.timeout], rules.off)
-            if timeout is None:
-                raise NothingToProve(
-                    f"{rules.timeout} is {readings[rules.timeout].text}: the drive does not notice"
-                    " a dead line, and a motor that runs goes on."
-                )
+            readings = await self._settings(rules)
+            timeout = self._timeout(rules, readings)
+            readings |= await self._read(self._codes(rules))
             reaction = self._reaction(rules, readings)
             self._check_fit(drive_state(session.profile, readings), reaction)
             await self._begin_watch(rules)
             changed = self._changed(before, readings)
-            return await self._grow(rules, timeout, reaction, changed)
+            result = await self._grow(rules, timeout, reaction, changed)
+            await self._check_same(rules, readings)
+            return result
         finally:
             facts.unhush(session.device)
             session.stir()
 
+    async def _settings(self, rules: CommunicationFault) -> dict[str, Reading]:
+        """The time-out of each port that the drive has."""
+        told = await timeouts_of_ports(self._reader, rules, Priority.STOP)
+        return {one.parameter.code: one for one in told if one.raw is not None}
+
+    @staticmethod
+    def _timeout(rules: CommunicationFault, told: dict[str, Reading]) -> float:
+        """The shortest that is not off; raises NothingToProve where all are."""
+        running = [s for one in told.values() if (s := timeout_seconds(one, rules.off)) is not None]
+        if not running:
+            off = " and ".join(f"{code} is {one.text}" for code, one in told.items())
+            raise NothingToProve(
+                f"{off or rules.timeout + ' is not told'}: the drive does not notice a dead line,"
+                " and a motor that runs goes on."
+            )
+        return min(running)
+
     def _codes(self, rules: CommunicationFault) -> list[str]:
         profile = self.session.profile
-        codes = [rules.timeout, rules.reaction, *self._state_codes()]
+        codes = [rules.reaction, *self._state_codes()]
         return [*dict.fromkeys(code for code in codes if code), *deciding_codes(profile)]
 
     def _state_codes(self) -> list[str]:
@@ -148,12 +164,27 @@ class Prover:
             priority=Priority.STOP,
         )
 
+    async def _check_same(self, rules: CommunicationFault, began: dict[str, Reading]) -> None:
+        """Raise OrderRefused where somebody set the drive otherwise while it was proved."""
+        now = await self._settings(rules)
+        if rules.reaction:
+            now |= await self._read([rules.reaction])
+        for code in now:
+            if code in began and now[code].raw != began[code].raw:
+                raise OrderRefused(
+                    f"{code} is {now[code].text} {now[code].unit}".rstrip()
+                    + " now, and was another when the proof began: nothing is proved."
+                )
+
     def _changed(self, before: dict[str, Reading | None], readings: dict[str, Reading]) -> str:
         changed = [
             f"{code} is {readings[code].text} {readings[code].unit}".rstrip()
             + f", and was {held.text or held.raw} when it was read before."
             for code, held in before.items()
-            if held is not None and held.raw is not None and held.raw != readings[code].raw
+            if held is not None
+            and held.raw is not None
+            and code in readings
+            and held.raw != readings[code].raw
         ]
         return " ".join(changed)
 
@@ -161,8 +192,9 @@ class Prover:
         self, rules: CommunicationFault, timeout: float, reaction: Reaction | None, changed: str
     ) -> ProofResult:
         clock, bracket = self.session.clock, Bracket()
+        begun = clock.monotonic()  # the drive may have counted from the start of a request on
         readings = await self._read(self._state_codes())
-        speed, begun, ended = self._hertz(readings), clock.monotonic(), clock.monotonic()
+        speed, ended = self._hertz(readings), clock.monotonic()
         for seconds in silences(timeout):
             self.tell(f"Silent for {seconds:.1f} s; set are {timeout:g} s.")
             await self._silence(ended + seconds)
@@ -175,9 +207,17 @@ class Prover:
                 # at most from the start of the request before to the end of this one's reply
                 bracket = bracket.reacted(heard - begun)
                 return await self._result(rules, timeout, reaction, bracket, seen, changed)
+            self._check_rest(state)
             bracket = bracket.alive(asked - ended)
             begun, ended = asked, heard
         return await self._result(rules, timeout, reaction, bracket, "", changed)
+
+    def _check_rest(self, state: DriveState) -> None:
+        """Raise OrderRefused where a motor turns by now that was at rest: nobody agreed to that."""
+        if not self.turning and state.motion in ENABLED_KINDS:
+            raise OrderRefused(
+                "The motor began to turn: the proof has ended, and the drive is asked on."
+            )
 
     async def _silence(self, until: float) -> None:
         clock = self.session.clock
@@ -222,7 +262,7 @@ class Prover:
         expected = codes.get(rules.fault, "") if trips and rules.fault is not None else ""
         fault = ""
         if state is not None and state.kind == "fault":
-            fault = f"{state.fault.code}, {state.fault.name}" if state.fault else "a fault"
+            fault = f"{state.fault.code}, {state.fault.name}" if state.fault else UNNAMED_FAULT
         return ProofResult(
             self.session.device, timeout, reaction, bracket, self.turning, seen, fault,
             expected, changed,

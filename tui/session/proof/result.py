@@ -9,6 +9,9 @@ from tui.drive.profile.schema import Reaction
 
 from .silences import Bracket
 
+UNNAMED_FAULT = "a fault"
+"""One of which the drive tells no code."""
+
 
 @dataclass(frozen=True, slots=True)
 class ProofResult:

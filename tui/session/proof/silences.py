@@ -13,7 +13,9 @@ LATEST_FINE = 1.3
 PAST_TIMEOUT = (1.6, 2.2, 3.0)
 """Silences after the time-out should have run out; none longer is tried."""
 LONGEST_SILENCE = 90.0
-"""Seconds that no silence exceeds."""
+"""Seconds that no silence exceeds, unless the time-out itself needs longer ones."""
+LONGEST_SHARE = 1.6
+"""Of a long time-out, the longest silence."""
 TIMEOUT_TOLERANCE, LEAST_TIMEOUT_TOLERANCE = 0.05, 0.05
 """Share of the time-out, and seconds, by which a drive may be earlier or later than set."""
 
@@ -25,8 +27,8 @@ def silences(timeout: float) -> Iterator[float]:
     while share < LATEST_FINE:
         shares.append(round(share, 3))
         share += SILENCE_STEP
-    for one in (*shares, *PAST_TIMEOUT):
-        yield min(one * timeout, LONGEST_SILENCE)
+    longest = max(LONGEST_SILENCE, LONGEST_SHARE * timeout)
+    yield from dict.fromkeys(min(one * timeout, longest) for one in (*shares, *PAST_TIMEOUT))
 
 
 @dataclass(frozen=True, slots=True)
