@@ -148,4 +148,20 @@ DEFECTS = (
         "A search that is as good as done goes on for a minute and a half, and nobody knows why.",
         (f"{SCAN}::test_what_is_slow_is_told_before_it_is_tried",),
     ),
+    Defect(
+        "drive-being-proved-told-silent",
+        "tui/session/connect/search.py",
+        "if hushed := line.facts.hushed.get(device):",
+        "if False and (hushed := ('', '')):",
+        "Who comes to a line looks for a broken wire, at a drive that is being proved.",
+        (f"{SEARCH}::test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one",),
+    ),
+    Defect(
+        "unclear-answer-told-silent",
+        "tui/screens/connection/scanning.py",
+        "if not self.found and self.search is not None and self.search.answered:",
+        "if False:",
+        "It is said that nobody answers where two drives answer at once.",
+        (f"{SETTINGS}::test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked",),
+    ),
 )  # fmt: skip

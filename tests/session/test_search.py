@@ -25,6 +25,7 @@ from tui.bus.errors import (
 from tui.bus.line import Line, Timing
 from tui.bus.link import Link, SerialLink, TcpLink
 from tui.bus.schedule.pace import Pace
+from tui.bus.shared_facts import SharedFacts
 from tui.drive.profile import library
 from tui.session.connect.identify import ScanResult, identify_drive
 from tui.session.connect.open_line import demo_line, open_line
@@ -48,6 +49,7 @@ class Replies:
     pace: Pace = field(default_factory=Pace)
     timing: Timing = field(default_factory=Timing)
     link: Link = field(default_factory=lambda: SerialLink("/dev/null", 19200, "8E1"))
+    facts: SharedFacts = field(default_factory=SharedFacts)
     heard_late: set[int] = field(default_factory=set)
     waits: list[float | None] = field(default_factory=list)
     """How long each answer was waited for that did not come."""
@@ -158,6 +160,16 @@ async def test_what_is_left_counts_the_silent_ones_once_more_and_what_they_reall
     assert once == pytest.approx(4 * (search.cost + search.cost + SECOND_WAIT - within))
     assert again == pytest.approx(3 * (search.cost + SECOND_WAIT - within))
     assert search.left == 0
+
+
+async def test_a_drive_that_is_left_alone_on_purpose_is_no_silent_one() -> None:
+    line = Replies({1})
+    line.facts.hush(2, "It is being proved.")
+    search = Search(range(1, 4), line.no_time, once=True)
+    (_, told) = await searched(search, line)
+    assert (told.device, told.identity, told.error) == (2, None, "It is being proved.")
+    assert [device for device, _ in line.asked] == [1, 3]
+    assert 2 in search.answered
 
 
 async def test_silent_addresses_that_take_longer_tell_more_time() -> None:

@@ -98,6 +98,8 @@ async def test_where_an_answer_is_no_reply_no_other_setting_is_tried_unasked() -
 
     with PtyPeer(garbled) as peer:
         async with panel_on(peer.path) as (app, pilot):
+            assert "The address is taken" in said(app)
+            assert "No drive answered" not in said(app)
             app.connection.action_scan_settings()
             await until(pilot, lambda: isinstance(app.screen, Confirm))
             assert "Something answered at 2: what it does" in dialog(app)

@@ -102,7 +102,7 @@ async def _proved(
     session = console.session
     prover = Prover(session, console.journal, session.work.permit(), turning)
     if not quiet:
-        prover.tell = complain
+        prover.tell = lambda text: complain(f"Proof: {text}")
     try:
         result = await prover.prove()
     except NothingToProve as error:

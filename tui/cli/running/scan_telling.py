@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from tui.drive.finding import LineSetting, WatchingFamily, watching_text
 from tui.drive.plain import plain
+from tui.session.connect.search import LEFT_ALONE
 
 from ..shared.say import say, say_over
 
@@ -107,7 +108,8 @@ class ScanTelling:
             where = _setting_json(setting)
             told = {"event": "unclear", "device": result.device, **where, "text": result.error}
             self._print(told)
-        self.note(f"{result.error} The address is taken, perhaps twice.")
+        twice = "" if result.by == LEFT_ALONE else ", perhaps twice"
+        self.note(f"{result.error} The address is taken{twice}.")
 
     def progress(self, progress: Progress) -> None:
         """How far it is, in one line that is written over; on a terminal only."""

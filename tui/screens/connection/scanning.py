@@ -139,6 +139,8 @@ class Scanning(LineView):
         """What a search that was done has come to."""
         from tui.session.connect.addresses import addresses_text
 
+        if not self.found and self.search is not None and self.search.answered:
+            return  # that something came, and why it is no drive, was told
         if not self.found:
             self.say(
                 f"No drive answered at address {addresses_text(devices)}, asked twice.",

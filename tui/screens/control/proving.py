@@ -15,7 +15,7 @@ from tui.session.drive import DriveSession
 from tui.session.proof.prover import Prover
 from tui.session.proof.record import proof_entry
 from tui.session.timeout_told import TimeoutWatch
-from tui.session.work import Permit, Task
+from tui.session.work import OutcomeKind, Permit, Task
 from tui.widgets.drawing import wrapped
 from tui.widgets.palette import ALARM, FAINT, PLAIN, STRONG
 
@@ -95,11 +95,12 @@ def ask_to_prove(
 
 def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: bool) -> None:
     """Hand the proof to the drive's queue of work. Raises OrderRefused."""
-    session = console.session
+    session, working = console.session, "Proof of communication loss: nobody asks the drive."
 
     async def carry_out(permit: Permit) -> str:
         def tell(text: str) -> None:
-            fleet.events.add("told", text, session.device)
+            # in the place of what is told of the work, which stands before all that was said
+            session.work.tell(OutcomeKind.WORKING, f"Proof: {text} Nobody asks the drive.")
 
         prover = Prover(session, console.journal, permit, turning, tell)
         try:
@@ -116,5 +117,4 @@ def begin_proof(fleet: Fleet, console: DriveConsole, stamp: int, *, turning: boo
                     fleet.stop([session], by="the end of the proof")
         return "" if turning else text
 
-    working = "Proof of communication loss: nobody asks the drive."
     session.work.put(Task(carry_out, owner=console, working=working), stamp)

@@ -24,6 +24,9 @@ LATE_WAIT = 0.3
 """Seconds behind the last request in which late replies are heard: there are drives that may be
 set to answer 250 ms after a request."""
 
+LEFT_ALONE = "left alone"
+"""How it is known that a drive is there which a program leaves alone on purpose."""
+
 Rests = Callable[[float], Awaitable[None]]
 Found = Callable[[ScanResult], Awaitable[None]]
 
@@ -145,6 +148,11 @@ class Search:
         for number, device in enumerate(devices, start=1):
             self._between()
             self.asked, self.at, began = number, device, self._now()
+            if hushed := line.facts.hushed.get(device):
+                # left alone on purpose: it is there, and not silent
+                self.answered |= {device}
+                await found(ScanResult(device, None, hushed[1], LEFT_ALONE))
+                continue
             try:
                 result = await find_drive(
                     asks,

@@ -196,7 +196,7 @@ class Prover:
         readings = await self._read(self._state_codes())
         speed, ended = self._hertz(readings), clock.monotonic()
         for seconds in silences(timeout):
-            self.tell(f"Silent for {seconds:.1f} s; set are {timeout:g} s.")
+            self.tell(f"silent for {seconds:.1f} s; set are {timeout:g} s.")
             await self._silence(ended + seconds)
             asked = clock.monotonic()
             readings = await self._read(self._state_codes())
