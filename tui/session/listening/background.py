@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import logging
 import threading
-import time
 from collections.abc import Mapping
 from contextlib import ExitStack
 
@@ -80,7 +79,7 @@ class HeardLine:
     def summary(self) -> ListeningSummary:
         """What it came to; at most a second old."""
         with self._lock:
-            now = time.monotonic()
+            now = self._hearing.clock.monotonic()
             if self._summed is None or now - self._summed[0] > SUMMED_UP_EVERY:
                 self._summed = now, self._hearing.summary(now)
             return self._summed[1]

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import time
 from collections.abc import Callable
 
 from tui.bus.link import character_time, silence
 from tui.bus.listening_line import ListeningLine
 from tui.drive.read_plan import WireTiming
 
+from ..clock import REAL_CLOCK, Clock
 from .families import Families
 from .listener import FrameHeard, LineListener, ToldExchange
 from .summary import ListeningSummary, summary_of
@@ -17,7 +17,7 @@ ExchangeTold = Callable[[ToldExchange], None]
 
 
 class Hearing:
-    """One line that is listened to; times are those of the system's monotonic clock."""
+    """One line that is listened to; times are those of its clock."""
 
     def __init__(
         self,
@@ -25,12 +25,14 @@ class Hearing:
         families: Families,
         told: ExchangeTold,
         frame_heard: FrameHeard = lambda _frame, _request: None,
+        clock: Clock = REAL_CLOCK,
     ) -> None:
+        self.clock = clock
         self._line, self._told = line, told
         self._timing = WireTiming(character_time(line.link), silence(line.link))
         self.listener = LineListener(
             families,
-            time.monotonic(),
+            self.clock.monotonic(),
             character=line.character,
             silence=line.silence,
             frame_heard=frame_heard,
@@ -39,7 +41,7 @@ class Hearing:
     def read(self, wait: float) -> tuple[bytes, float]:
         """What comes within `wait` seconds, and when that was. Raises LineLost."""
         data = self._line.read(min(self.listener.pause, wait))
-        return data, time.monotonic()
+        return data, self.clock.monotonic()
 
     def take(self, data: bytes, now: float) -> None:
         """Tell what follows from what was read, or from a pause in which nothing came."""
