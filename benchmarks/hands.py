@@ -14,6 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 import random
+import sys
 import time
 from dataclasses import asdict, dataclass
 
@@ -129,6 +130,8 @@ def bursts(panel: PtyPanel, chance: random.Random, count: int, counted: Counted)
         counted.stops += sum(map(is_stop, sent))
         _count(sent[at or 0 :], counted)
         counted.still_armed += not typed and not _disarmed(panel)
+        if at is None and not typed:
+            print(f"no stop: {before_keys} {stop!r}\n{panel.text()}", file=sys.stderr)
         if after_keys:
             mark = len(panel.log.writes)
             send(panel, chance, after_keys)
