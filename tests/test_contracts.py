@@ -193,7 +193,7 @@ def test_what_the_test_command_leaves_out_is_run_by_the_gate() -> None:
     options = settings["tool"]["pytest"]["ini_options"]
     assert options["addopts"].endswith(" -m 'not sweep'")
     assert [marker.partition(":")[0] for marker in options["markers"]] == ["sweep", "drawn"]
-    layer = ".venv/bin/python -m pytest -q -n 7"
+    layer = ".venv/bin/python -m pytest -q -n 10"
     assert f"{layer} -m sweep" in README
     assert re.search(rf"PEERS=required {layer} .*-m sweep$", CI.read_text("utf-8"), re.MULTILINE)
 

@@ -363,7 +363,7 @@ def test_numbers_references_and_addresses_take_no_space() -> None:
         "dialogs/palette.py": {"Field"},
         "parameters/screen.py": {"Field"},
         "blocks/pick_parameter.py": {"Field"},
-        "frames/screen.py": {"Field"},
+        "frames/frame_list.py": {"Field"},
     }
     numbers = {
         ast.unparse(call.args[0])

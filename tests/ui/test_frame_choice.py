@@ -84,7 +84,7 @@ def test_gaps_are_those_on_the_line_whichever_frames_are_shown() -> None:
     assert gaps(LOG)[:3] == [None, pytest.approx(0.01), pytest.approx(0.49)]
     texts = [gap_text(one) for one in (None, 0.0, 0.0123, 9.99, 10.0, 3600.0)]
     assert [one.strip() for one in texts] == [
-        "", "+0.0 ms", "+12.3 ms", "+9990.0 ms", "+10 s", "+3600 s",
+        "", "+0.0 ms", "+12.3 ms", "+9.99 s", "+10.00 s", "+3600 s",
     ]  # fmt: skip
 
 
