@@ -21,7 +21,7 @@ from tui.bus.gateway.pdu import (
     words_pdu,
     written_pdu,
 )
-from tui.bus.gateway.server import HEADER, TcpClient, TcpGateway
+from tui.bus.gateway.server import HEADER, MOST_AT_ONCE, TcpGateway, TcpRequest
 
 
 def test_what_each_function_asks() -> None:
@@ -103,10 +103,10 @@ async def test_requests_that_pile_up_get_the_answers_of_their_own_transactions()
     """The first answer is awaited for long; the second request comes in meanwhile."""
     free = asyncio.Event()
 
-    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
-        if unit == 1:
+    async def answer(request: TcpRequest) -> bytes:
+        if request.unit == 1:
             await free.wait()
-        return bytes([3, 2, 0, unit])
+        return bytes([3, 2, 0, request.unit])
 
     gateway = TcpGateway(answer)
     reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
@@ -125,11 +125,11 @@ async def test_a_write_waits_for_no_read_before_it() -> None:
     """It may be a stop, and the drive before it may be silent."""
     free = asyncio.Event()
 
-    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
-        if pdu[0] == 3:
+    async def answer(request: TcpRequest) -> bytes:
+        if request.pdu[0] == 3:
             await free.wait()
             return bytes([3, 2, 0, 0])
-        return pdu
+        return request.pdu
 
     gateway = TcpGateway(answer)
     reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
@@ -143,16 +143,63 @@ async def test_a_write_waits_for_no_read_before_it() -> None:
     await gateway.close()
 
 
+async def test_a_write_that_does_not_wait_for_its_turn_goes_past_those_before_it() -> None:
+    """A stop does, whatever the drive before it takes to be silent."""
+    free = asyncio.Event()
+
+    async def answer(request: TcpRequest) -> bytes:
+        if request.unit == 1:
+            await free.wait()
+        if request.unit == 2:
+            await request.turn()
+        return request.pdu
+
+    gateway = TcpGateway(answer)
+    reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
+    write = struct.pack(">BHH", 6, 8501, 7)
+    for number in (1, 2, 3):
+        await _asked(writer, number, number, write)
+    assert (await asyncio.wait_for(_answer(reader), 30))[0] == 3
+    free.set()
+    assert [(await _answer(reader))[0] for _ in range(2)] == [1, 2]
+    writer.close()
+    await gateway.close()
+
+
+async def test_reads_that_pile_up_keep_no_write_in_the_socket() -> None:
+    """Further ones are told to come again: a stop may be behind them."""
+    free = asyncio.Event()
+
+    async def answer(request: TcpRequest) -> bytes:
+        if request.pdu[0] == 3:
+            await free.wait()
+        return request.pdu
+
+    gateway = TcpGateway(answer)
+    reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
+    for number in range(MOST_AT_ONCE + 2):
+        await _asked(writer, number, 1, bytes([3, 0, 0, 0, 1]))
+    stop = struct.pack(">BHH", 6, 8501, 7)
+    await _asked(writer, 999, 1, stop)
+    answers = [await asyncio.wait_for(_answer(reader), 30) for _ in range(3)]
+    assert [pdu for number, _, pdu in answers if number != 999] == [bytes([0x83, 6])] * 2
+    assert (999, 1, stop) in answers
+    free.set()
+    writer.close()
+    await gateway.close()
+
+
 async def test_what_was_sent_before_the_connection_closed_is_carried_out() -> None:
     done: list[bytes] = []
     both = asyncio.Event()
 
-    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
+    async def answer(request: TcpRequest) -> bytes:
         await asyncio.sleep(0.05)
-        done.append(pdu)
+        await request.turn()
+        done.append(request.pdu)
         if len(done) == 2:
             both.set()
-        return pdu
+        return request.pdu
 
     gone = asyncio.Event()
     gateway = TcpGateway(answer, lambda _: gone.set())
@@ -169,12 +216,12 @@ async def test_what_was_sent_before_the_connection_closed_is_carried_out() -> No
 async def test_one_client_that_waits_holds_up_no_other() -> None:
     gone: list[str] = []
 
-    async def answer(_client: TcpClient, unit: int, pdu: bytes) -> bytes:
-        if unit == 1:
+    async def answer(request: TcpRequest) -> bytes:
+        if request.unit == 1:
             await asyncio.Event().wait()
-        if unit == 2:
+        if request.unit == 2:
             raise KeyError("a fault of the program")
-        return bytes([3, 2, 0, unit])
+        return bytes([3, 2, 0, request.unit])
 
     gateway = TcpGateway(answer, lambda client: gone.append(client.peer))
     place = await gateway.listen("127.0.0.1", 0)

@@ -13,7 +13,7 @@ import pytest
 import pytest_asyncio
 
 from tests.programs import wait_until
-from tui.bus.gateway.server import TcpClient
+from tui.bus.gateway.server import TcpClient, TcpRequest
 from tui.bus.line import Line
 from tui.bus.program import Program
 from tui.drive.profile import library
@@ -43,7 +43,7 @@ class Bench:
     client: TcpClient
 
     async def ask(self, pdu: bytes, unit: int = 1) -> bytes:
-        return await self.gateway.answer(self.client, unit, pdu)
+        return await self.gateway.answer(TcpRequest(self.client, unit, pdu))
 
     async def read(self, address: int, count: int = 1, unit: int = 1) -> tuple[int, ...] | int:
         """The words, or the number of the exception."""
@@ -181,6 +181,54 @@ async def test_a_stop_word_passes_while_a_panel_commands_and_a_run_word_does_not
     assert made.written() == []
     assert await made.write(CMD, 0x0007) == 0
     assert made.written() == [(CMD, 0x0007)]
+
+
+async def test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them(
+    bench: Make,
+) -> None:
+    """They may wait for a drive that is silent for many seconds."""
+    made = bench(commands=True, writes=allowed_codes("ACC"))
+    assert await made.write(ACC, 57) == 0
+    silent = asyncio.Event()
+
+    async def turn() -> None:
+        await silent.wait()
+
+    def send(address: int, word: int) -> asyncio.Task[bytes]:
+        pdu = struct.pack(">BHH", 6, address, word)
+        answer = made.gateway.answer(TcpRequest(made.client, 1, pdu, turn))
+        return asyncio.create_task(answer)
+
+    before = [send(ACC, 58), send(LFR, 300), send(CMD, 0x000F)]
+    stop, behind = send(CMD, 0x0007), send(LFR, 200)
+    assert (await asyncio.wait_for(stop, 30))[0] == 6
+    assert made.written() == [(ACC, 57), (CMD, 0x0007)]
+    silent.set()
+    assert [(await one)[:2] for one in before] == [bytes([0x86, 6])] * 3
+    assert (await behind)[0] == 6
+    assert made.written() == [(ACC, 57), (CMD, 0x0007), (LFR, 200)]
+
+
+async def test_a_word_that_stops_by_what_was_set_before_it_waits_for_that(bench: Make) -> None:
+    """16#0007 stops in one profile of commands, and runs the motor in another."""
+    made = bench(DriveSpec("atv71", 1, sets={"CHCF": 1, "TCC": 0}), writes=allowed_codes("CHCF"))
+    silent = asyncio.Event()
+
+    async def turn() -> None:
+        await silent.wait()
+
+    assert await made.write(CMD, 0x0007) == 0
+    sent = len(made.line.trace)
+    setting = struct.pack(">BHH", 6, ATV71["CHCF"].address, 3)
+    stop = struct.pack(">BHH", 6, CMD, 0x0007)
+    tasks = [
+        asyncio.create_task(made.gateway.answer(TcpRequest(made.client, 1, pdu, turn)))
+        for pdu in (setting, stop)
+    ]
+    await asyncio.sleep(0.1)
+    assert len(made.line.trace) == sent
+    silent.set()
+    assert [(await one)[:2].hex() for one in tasks] == ["0620", "8601"]
 
 
 async def test_a_stop_among_words_that_are_not_allowed_goes_out_alone(bench: Make) -> None:
@@ -382,7 +430,9 @@ async def test_a_sign_of_life_is_that_of_the_client_that_commands(
         assert await made.write(CMD, word) == 0
     started = gate.sign(1)
     assert started is not None
-    await made.gateway.answer(TcpClient(2, "10.0.0.8:1"), 1, struct.pack(">BHH", 3, ETA, 1))
+    await made.gateway.answer(
+        TcpRequest(TcpClient(2, "10.0.0.8:1"), 1, struct.pack(">BHH", 3, ETA, 1))
+    )
     assert gate.sign(1) == started
     await made.read(ETA)
     seen = gate.sign(1)

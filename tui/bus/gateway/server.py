@@ -2,7 +2,8 @@
 
 pymodbus' server keeps one request of a connection at hand: an answer that is awaited would leave
 with the transaction id of whatever came meanwhile, so frames are taken apart and put together
-here. Requests of one connection are answered in their order, those of several beside each other.
+here. Reads of one connection are answered in their order; a write waits for its turn behind the
+writes before it where who answers asks for that: a stop does not.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
-from .pdu import DEVICE_FAILURE, WRITE_FUNCTIONS, exception_pdu
+from .pdu import BUSY, DEVICE_FAILURE, WRITE_FUNCTIONS, exception_pdu
 
 log = logging.getLogger(__name__)
 
@@ -23,23 +24,40 @@ HEADER = struct.Struct(">HHHB")
 LONGEST_PDU = 253
 MOST_CLIENTS = 64
 """Connections at a time; one more is closed at once."""
-MOST_AT_ONCE = 16
-"""Requests of one connection that may be under way; further ones stay in its socket."""
+MOST_AT_ONCE = 128
+"""Requests of one connection that may be under way; a further read is told to come again."""
 IDLE_CLIENT_ENDS_AFTER = 600.0
 """Seconds after which a connection that asks nothing, or takes no answer, is closed."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(slots=True, eq=False)
 class TcpClient:
     """One connection, for as long as it lasts."""
 
     number: int
     peer: str
     """Host and port that it comes from."""
+    left: bool = False
+    """Whether it sends nothing any more: it may be gone."""
 
 
-TcpAnswer = Callable[[TcpClient, int, bytes], Awaitable[bytes]]
-"""Is given the client, the unit id and the bytes of a request; gives the bytes of the answer."""
+async def at_once() -> None:
+    """The turn of a request that has none before it."""
+
+
+@dataclass(frozen=True, slots=True)
+class TcpRequest:
+    """A request as it came in."""
+
+    client: TcpClient
+    unit: int
+    pdu: bytes
+    turn: Callable[[], Awaitable[None]] = at_once
+    """Returns once the writes that came before it on its connection are answered."""
+
+
+TcpAnswer = Callable[[TcpRequest], Coroutine[Any, Any, bytes]]
+"""Gives the bytes of the answer; is called as soon as the request has come, awaited afterwards."""
 
 
 class TcpGateway:
@@ -106,36 +124,55 @@ class TcpGateway:
                     return
                 async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
                     pdu = await reader.readexactly(length - 1)
-                await talk.room.acquire()
-                talk.begin(self._one(talk, transaction, unit, pdu))
+                await self._begin(talk, transaction, unit, pdu)
         except asyncio.CancelledError:
             talk.cancel()
             raise
         finally:
+            client.left = True
             # what a client sent before it went is carried out: a stop may be among it
             await talk.ended()
 
-    async def _one(self, talk: _Talk, transaction: int, unit: int, pdu: bytes) -> None:
-        """Answer one request, in the turn of its kind."""
+    async def _begin(self, talk: _Talk, transaction: int, unit: int, pdu: bytes) -> None:
+        """Have one request answered, beside those before it; no read keeps what is behind it."""
+        writes = pdu[0] in WRITE_FUNCTIONS
+        if not writes and talk.full:
+            await self._send(talk, transaction, unit, exception_pdu(pdu[0], BUSY))
+            return
+        await talk.room_for_writes()
+        request = TcpRequest(talk.client, unit, pdu, talk.turn())
+        answer = self._answer(request)
+        task = talk.begin(self._one(talk, transaction, request, answer), writes=writes)
+        # one that is cancelled before it began awaits nothing
+        task.add_done_callback(lambda _: answer.close())
+
+    async def _one(
+        self, talk: _Talk, transaction: int, request: TcpRequest, answer: Awaitable[bytes]
+    ) -> None:
+        """Answer one request; reads of a connection take turns."""
+        if request.pdu[0] in WRITE_FUNCTIONS:
+            reply = await self._replied(request, answer)
+        else:
+            async with talk.reads:
+                reply = await self._replied(request, answer)
+        await self._send(talk, transaction, request.unit, reply)
+
+    async def _send(self, talk: _Talk, transaction: int, unit: int, reply: bytes) -> None:
         try:
-            async with talk.writes if pdu[0] in WRITE_FUNCTIONS else talk.reads:
-                reply = await self._replied(talk.client, unit, pdu)
             talk.writer.write(HEADER.pack(transaction, 0, len(reply) + 1, unit) + reply)
             async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
                 await talk.writer.drain()
         except (OSError, TimeoutError) as error:
             log.info("Modbus TCP client %s took no answer: %s", talk.client.peer, error or "idle")
             talk.writer.transport.abort()
-        finally:
-            talk.room.release()
 
-    async def _replied(self, client: TcpClient, unit: int, pdu: bytes) -> bytes:
+    async def _replied(self, request: TcpRequest, answer: Awaitable[bytes]) -> bytes:
         try:
-            return await self._answer(client, unit, pdu)
+            return await answer
         except Exception:
             # one request that nobody foresaw ends no connection
-            log.exception("a request of %s: %s", client.peer, pdu.hex())
-            return exception_pdu(pdu[0], DEVICE_FAILURE)
+            log.exception("a request of %s: %s", request.client.peer, request.pdu.hex())
+            return exception_pdu(request.pdu[0], DEVICE_FAILURE)
 
 
 class _Talk:
@@ -144,14 +181,36 @@ class _Talk:
     def __init__(self, client: TcpClient, writer: asyncio.StreamWriter) -> None:
         self.client = client
         self.writer = writer
-        self.reads, self.writes = asyncio.Lock(), asyncio.Lock()
-        self.room = asyncio.Semaphore(MOST_AT_ONCE)
+        self.reads = asyncio.Lock()
         self._under_way: set[asyncio.Task[None]] = set()
+        self._writes: set[asyncio.Task[None]] = set()
 
-    def begin(self, work: Coroutine[Any, Any, None]) -> None:
+    @property
+    def full(self) -> bool:
+        """Whether no further read is taken."""
+        return len(self._under_way) >= MOST_AT_ONCE
+
+    def turn(self) -> Callable[[], Awaitable[None]]:
+        """The turn of a write that comes now."""
+        before = tuple(self._writes)
+
+        async def turn() -> None:
+            if before:
+                await asyncio.wait(before)
+
+        return turn
+
+    async def room_for_writes(self) -> None:
+        """Return once not too many writes are under way; further ones stay in the socket."""
+        while len(self._writes) >= MOST_AT_ONCE:
+            await asyncio.wait(tuple(self._writes), return_when=asyncio.FIRST_COMPLETED)
+
+    def begin(self, work: Coroutine[Any, Any, None], *, writes: bool) -> asyncio.Task[None]:
         task = asyncio.create_task(work)
-        self._under_way.add(task)
-        task.add_done_callback(self._under_way.discard)
+        for tasks in (self._under_way, self._writes) if writes else (self._under_way,):
+            tasks.add(task)
+            task.add_done_callback(tasks.discard)
+        return task
 
     def cancel(self) -> None:
         """Answer nothing any more."""

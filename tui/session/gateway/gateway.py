@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Coroutine, Mapping, Sequence
+from functools import partial
+from typing import Any
 
 from tui.bus.api import IdentificationObjects, ModbusLine, Priority
 from tui.bus.errors import (
@@ -23,7 +25,6 @@ from tui.bus.gateway.pdu import (
     NO_RESPONSE,
     WRITE_FUNCTIONS,
     DiagnoseAsked,
-    GatewayAsked,
     IdentifyAsked,
     ReadAsked,
     Unanswerable,
@@ -34,10 +35,11 @@ from tui.bus.gateway.pdu import (
     identified_pdu,
     words_pdu,
 )
-from tui.bus.gateway.server import TcpClient
+from tui.bus.gateway.server import TcpClient, TcpRequest
 from tui.drive.errors import DriveError
 
 from ..command.stop_report import StopSummary
+from .in_turn import PendingWrite
 from .line import GatewayLine
 from .rules import GatewayRules
 from .writes import GatewayWrite
@@ -67,19 +69,41 @@ class Gateway:
         for line in self._lines:
             line.commanding.gone(client.peer)
 
-    async def answer(self, client: TcpClient, unit: int, pdu: bytes) -> bytes:
-        """The answer to a request; whatever is wrong is an exception of Modbus."""
-        function = pdu[0]
-        place = self._units.get(unit)
+    def answer(self, request: TcpRequest) -> Coroutine[Any, Any, bytes]:
+        """The answer to a request; whatever is wrong is an exception of Modbus.
+
+        Called when the request comes: a stop that is given from then on voids it.
+        """
+        function = request.pdu[0]
+        place = self._units.get(request.unit)
         if place is None:
-            return exception_pdu(function, NO_PATH)
+            return _refused(function, NO_PATH)
         line, device = self._lines[place[0]], place[1]
-        line.commanding.heard(device, client.peer)
+        line.commanding.heard(device, request.client.peer)
         try:
-            return await self._answer(line, device, client, gateway_asked(pdu))
+            asked = gateway_asked(request.pdu)
         except Unanswerable as refused:
             if function in WRITE_FUNCTIONS:
-                log.info("device %s, client %s: %s", device, client.peer, refused)
+                log.info("device %s, client %s: %s", device, request.client.peer, refused)
+            return _refused(function, refused.code)
+        if isinstance(asked, WriteAsked):
+            write = line.pending.came(request.client, device, asked.words)
+            return self._write(line, request, asked, write)
+        return self._told(line, device, request, partial(self._answer, line, device, asked))
+
+    async def _told(
+        self,
+        line: GatewayLine,
+        device: int,
+        request: TcpRequest,
+        answer: Callable[[], Coroutine[Any, Any, bytes]],
+    ) -> bytes:
+        function = request.pdu[0]
+        try:
+            return await answer()
+        except Unanswerable as refused:
+            if function in WRITE_FUNCTIONS:
+                log.info("device %s, client %s: %s", device, request.client.peer, refused)
             return exception_pdu(function, refused.code)
         except LineError as error:
             if isinstance(error, NoAnswer):
@@ -91,13 +115,11 @@ class Gateway:
             return exception_pdu(function, DEVICE_FAILURE)
 
     async def _answer(
-        self, line: GatewayLine, device: int, client: TcpClient, asked: GatewayAsked
+        self, line: GatewayLine, device: int, asked: ReadAsked | DiagnoseAsked | IdentifyAsked
     ) -> bytes:
         match asked:
             case ReadAsked():
                 return await self._read(line, device, asked)
-            case WriteAsked():
-                return await self._write(line, device, client, asked)
             case DiagnoseAsked():
                 return await self._diagnose(line, device, asked)
             case IdentifyAsked():
@@ -125,26 +147,28 @@ class Gateway:
         return words_pdu(asked.function, reply.words)
 
     async def _write(
-        self, line: GatewayLine, device: int, client: TcpClient, asked: WriteAsked
+        self, line: GatewayLine, request: TcpRequest, asked: WriteAsked, write: PendingWrite
     ) -> bytes:
-        stamp = line.line.facts.stops.stamp(device)
+        try:
+            answer = partial(self._written, line, request, asked, write)
+            return await self._told(line, write.device, request, answer)
+        finally:
+            line.pending.ended(write)
+
+    async def _written(
+        self, line: GatewayLine, request: TcpRequest, asked: WriteAsked, write: PendingWrite
+    ) -> bytes:
+        device = write.device
         # a stop does not wait until a drive that was silent has said again who it is
         session = line.drives.known(device) or await line.drives.found(device)
-        if session is None:
-            return await self._stop_nameless(line, device, client, asked, stamp)
-        write = GatewayWrite(line, session, asked, client.peer, self._rules, stamp)
-        return await write.carry_out()
-
-    async def _stop_nameless(
-        self, line: GatewayLine, device: int, client: TcpClient, asked: WriteAsked, stamp: int
-    ) -> bytes:
-        """Stop a drive that does not say who it is, by a word that stops all it may be."""
+        if session is not None:
+            return await GatewayWrite(line, session, asked, request, self._rules, write).carry_out()
+        # a drive that does not say who it is is stopped by a word that stops all it may be
         session = line.drives.stoppable(device, asked.words)
         if session is None:
             raise Unanswerable(ILLEGAL_FUNCTION, "what no profile fits is only read")
         try:
-            write = GatewayWrite(line, session, asked, client.peer, self._rules, stamp)
-            return await write.carry_out()
+            return await GatewayWrite(line, session, asked, request, self._rules, write).carry_out()
         finally:
             line.drives.unknown_again(device)
 
@@ -164,6 +188,10 @@ class Gateway:
             return await line.line.identify(device, priority=_patience(line.line, device))
         except RequestRefused as refused:
             raise Unanswerable(ILLEGAL_FUNCTION, str(refused)) from refused
+
+
+async def _refused(function: int, code: int) -> bytes:
+    return exception_pdu(function, code)
 
 
 CHANGING_SUBFUNCTIONS = frozenset({1, 3, 4, 10})

@@ -14,6 +14,7 @@ from ..journal import Journal
 from ..read.reader import Reader
 from .commanding import GatewayCommanding
 from .drives import GatewayDrives, Note
+from .in_turn import PendingWrites
 from .started import StartedMotors
 
 NONE_NAMED: Mapping[int, str] = MappingProxyType({})
@@ -33,6 +34,7 @@ class GatewayLine:
         self.line = line
         self.journal = journal
         self.drives = GatewayDrives(line, note, profiles)
+        self.pending = PendingWrites(line)
         self.started = StartedMotors(line, journal)
         self.commanding = GatewayCommanding(line, self._stands, self.started)
 

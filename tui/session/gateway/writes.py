@@ -17,6 +17,7 @@ from tui.bus.gateway.pdu import (
     words_pdu,
     written_pdu,
 )
+from tui.bus.gateway.server import TcpRequest
 from tui.drive.chart import read_chart
 from tui.drive.foreign_write import (
     ForeignWord,
@@ -37,6 +38,7 @@ from ..drive import DriveSession
 from ..journal import Entry, now_text
 from ..read.reader import Reader
 from ..reading import Reading
+from .in_turn import PendingWrite
 from .line import GatewayLine
 from .rules import GatewayRules
 
@@ -54,20 +56,25 @@ class GatewayWrite:
         line: GatewayLine,
         session: DriveSession,
         asked: WriteAsked,
-        client: str,
+        request: TcpRequest,
         rules: GatewayRules,
-        stamp: int,
+        write: PendingWrite,
     ) -> None:
         self._line = line
         self._session = session
         self._asked = asked
-        self._client = client
+        self._client = request.client.peer
+        self._turn = request.turn
         self._rules = rules
-        self._stamp = stamp
-        """The drive's count of stops when it came: one that comes later voids it."""
+        self._write = write
 
     async def carry_out(self) -> bytes:
-        """Write what is allowed; the answer. Raises Unanswerable and the line's errors."""
+        """Write what is allowed; the answer. Raises Unanswerable and the line's errors.
+
+        What only stops goes past the writes that its client sent before it, and voids them.
+        """
+        if not self._may_go_first():
+            await self._turn()
         words = await self._told_apart()
         stops = [one for one in words if one.kind is WordKind.STOP]
         if len(stops) == len(words):
@@ -75,9 +82,22 @@ class GatewayWrite:
         for one in stops:
             # first of all: whatever becomes of the rest
             await self._send_alone(one)
+        await self._turn()
         await self._check(words)
         order = starts_by(self._session.profile, words)
         return await (self._start(order) if order else self._send(Priority.OPERATOR_WRITE))
+
+    def _may_go_first(self) -> bool:
+        """Whether a stop may be in it, which no write before it turns into something else."""
+        profile = self._session.profile
+        kinds = {one.kind for one in foreign_words(profile, self._asked.words, {})}
+        if WordKind.COMMAND not in kinds:
+            return WordKind.STOP in kinds
+        # the command before it tells the state, not what the word means
+        own = {chart.command for chart in profile.data.charts}
+        deciding = [profile.find(one) for one in stop_deciding_codes(profile) if one not in own]
+        registers = {one.address + i for one in deciding for i in range(word_count(one))}
+        return not self._line.pending.changes_before(self._write, registers)
 
     async def _told_apart(self) -> list[ForeignWord]:
         """What each word does; what decides about a stop is read where it is not sure yet."""
@@ -98,6 +118,8 @@ class GatewayWrite:
 
     async def _check(self, words: list[ForeignWord]) -> None:
         """Raise Unanswerable where the request is not allowed as a whole."""
+        if why := self._voided():
+            self._refuse(BUSY, why)
         drive = await self._line.drives.found(self._session.device)
         if drive is None or drive.profile.id != self._session.profile.id:
             self._refuse(BUSY, "another drive answers now")
@@ -156,9 +178,13 @@ class GatewayWrite:
             if begun or sent:
                 self._line.started.sent(self._session, sent=sent)
 
-    async def _send_alone(self, one: ForeignWord) -> None:
+    def _stop(self) -> None:
+        """Void what was meant for the drive before this request."""
         self._line.commanding.stop(self._session.device, self._client)
-        self._stamp = self._session.line.facts.stops.stamp(self._session.device)
+        self._line.pending.stops_by(self._write)
+
+    async def _send_alone(self, one: ForeignWord) -> None:
+        self._stop()
         answer = "ok"
         try:
             await self._session.line.write(
@@ -174,7 +200,7 @@ class GatewayWrite:
         """The request as it came; its answer. Each parameter of it goes to the journal."""
         stops = priority is Priority.STOP
         if stops:
-            self._line.commanding.stop(self._session.device, self._client)
+            self._stop()
         parameters = _each(foreign_words(self._session.profile, self._asked.words, {}))
         before = {one.code: self._session.image.get(one.code) for one in parameters}
         answer = "ok"
@@ -207,8 +233,7 @@ class GatewayWrite:
 
     def _voided(self) -> str:
         """Why it must not go out any more; asked in the line's thread just before."""
-        now = self._session.line.facts.stops.stamp(self._session.device)
-        return "" if now == self._stamp else "Not sent: a stop came meanwhile."
+        return "Not sent: a stop came meanwhile." if self._line.pending.void(self._write) else ""
 
     def _refusal_code(self) -> int:
         """The exception for what the line did not send."""
