@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tui.bus.gateway.awake import Awake
 from tui.bus.gateway.pdu import (
     IdentifyAsked,
     ReadAsked,
@@ -210,6 +211,28 @@ async def test_what_was_sent_before_the_connection_closed_is_carried_out() -> No
     await asyncio.wait_for(both.wait(), 30)
     assert [pdu[-1] for pdu in done] == [15, 7]
     await asyncio.wait_for(gone.wait(), 30)
+    await gateway.close()
+
+
+async def test_what_waited_while_the_loop_stood_still_is_told_apart() -> None:
+    stale: list[bool] = []
+    now = 100.0
+    awake = Awake(lambda: now)
+
+    async def answer(request: TcpRequest) -> bytes:
+        stale.append(request.stale)
+        return request.pdu
+
+    gateway = TcpGateway(answer, awake=awake)
+    reader, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
+    for moment in (100.0, 104.0, 104.5, 105.5):
+        now = moment
+        if moment != 104.0:
+            awake.look()
+        await _asked(writer, 1, 1, struct.pack(">BHH", 6, 8501, 15))
+        await _answer(reader)
+    assert stale == [False, True, True, False]
+    writer.close()
     await gateway.close()
 
 

@@ -8,6 +8,7 @@ import struct
 from collections.abc import AsyncIterator, Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import pytest
 import pytest_asyncio
@@ -20,6 +21,7 @@ from tui.drive.profile import library
 from tui.session.gateway.gateway import Gateway
 from tui.session.gateway.line import NONE_NAMED, GatewayLine
 from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
+from tui.session.gateway.started import StartedMotors
 from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
 
@@ -196,7 +198,7 @@ async def test_a_stop_goes_past_the_writes_of_its_own_connection_and_voids_them(
 
     def send(address: int, word: int) -> asyncio.Task[bytes]:
         pdu = struct.pack(">BHH", 6, address, word)
-        answer = made.gateway.answer(TcpRequest(made.client, 1, pdu, turn))
+        answer = made.gateway.answer(TcpRequest(made.client, 1, pdu, turn=turn))
         return asyncio.create_task(answer)
 
     before = [send(ACC, 58), send(LFR, 300), send(CMD, 0x000F)]
@@ -222,7 +224,7 @@ async def test_a_word_that_stops_by_what_was_set_before_it_waits_for_that(bench:
     setting = struct.pack(">BHH", 6, ATV71["CHCF"].address, 3)
     stop = struct.pack(">BHH", 6, CMD, 0x0007)
     tasks = [
-        asyncio.create_task(made.gateway.answer(TcpRequest(made.client, 1, pdu, turn)))
+        asyncio.create_task(made.gateway.answer(TcpRequest(made.client, 1, pdu, turn=turn)))
         for pdu in (setting, stop)
     ]
     await asyncio.sleep(0.1)
@@ -310,6 +312,50 @@ async def test_a_client_that_is_gone_commands_nothing_and_all_are_told(bench: Ma
     made.gateway.gone(made.client)
     assert 1 not in made.line.facts.commanders
     assert "10.0.0.9:5000, which commanded this drive, has gone" in said[0]
+
+
+async def test_a_command_of_a_client_that_is_gone_is_not_sent_and_its_stop_is(
+    bench: Make,
+) -> None:
+    """Nobody would stop the motor: it waited behind another write, or for the drive."""
+    made = bench(commands=True, writes=allowed_codes("ACC"))
+    made.client.left = True
+    assert await made.write(LFR, 300) == 6
+    assert await made.write(CMD, 0x000F) == 6
+    assert made.written() == []
+    assert 1 not in made.line.facts.commanders
+    assert await made.write(CMD, 0x0007) == 0
+    assert await made.write(ACC, 57) == 0
+
+
+async def test_a_client_that_goes_while_its_start_is_put_on_record_starts_nothing(
+    bench: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = bench(commands=True)
+    assert await made.write(LFR, 300) == 0
+    begin = StartedMotors.begin
+
+    async def slow(*args: Any) -> bool:
+        made.client.left = True
+        return await begin(*args)
+
+    monkeypatch.setattr(StartedMotors, "begin", slow)
+    assert await made.write(CMD, 0x000F) == 6
+    assert made.written() == [(LFR, 300)]
+
+
+async def test_what_came_while_the_gateway_stood_still_only_stops(bench: Make) -> None:
+    """A client that has given up long ago would have its motor started."""
+    made = bench(commands=True, writes=allowed_codes("ACC"))
+
+    async def late(address: int, word: int) -> bytes:
+        pdu = struct.pack(">BHH", 6, address, word)
+        return await made.gateway.answer(TcpRequest(made.client, 1, pdu, stale=True))
+
+    for address, word in ((LFR, 300), (CMD, 0x000F), (ACC, 57)):
+        assert await late(address, word) == bytes([0x86, 6])
+    assert made.written() == []
+    assert (await late(CMD, 0x0007))[0] == 6
 
 
 async def test_a_second_client_that_commands_the_drive_is_told_of(bench: Make) -> None:

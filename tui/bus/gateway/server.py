@@ -11,11 +11,12 @@ from __future__ import annotations
 import asyncio
 import logging
 import struct
-from collections.abc import Awaitable, Callable, Coroutine
+from collections.abc import Awaitable, Callable, Coroutine, Iterable
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, SupportsIndex
 
+from .awake import Awake
 from .pdu import BUSY, DEVICE_FAILURE, WRITE_FUNCTIONS, exception_pdu
 
 log = logging.getLogger(__name__)
@@ -41,6 +42,34 @@ class TcpClient:
     """Whether it sends nothing any more: it may be gone."""
 
 
+class _Incoming(asyncio.StreamReader):
+    """The bytes of a connection; knows which of them waited while this program stood still."""
+
+    def __init__(self, awake: Awake, loop: asyncio.AbstractEventLoop) -> None:
+        super().__init__(loop=loop)
+        self._awake = awake
+        self._came = self._taken = self._stale = 0
+
+    def feed_data(self, data: Iterable[SupportsIndex]) -> None:
+        came = bytes(data)
+        self._came += len(came)
+        if self._awake.just_woke:
+            self._stale = self._came
+        super().feed_data(came)
+
+    async def take(self, count: int) -> bytes:
+        """The next bytes; waits for them as long as a client may be idle."""
+        async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
+            data = await self.readexactly(count)
+        self._taken += count
+        return data
+
+    @property
+    def stale(self) -> bool:
+        """Whether what was taken last waited while this program stood still."""
+        return self._taken <= self._stale
+
+
 async def at_once() -> None:
     """The turn of a request that has none before it."""
 
@@ -52,6 +81,8 @@ class TcpRequest:
     client: TcpClient
     unit: int
     pdu: bytes
+    stale: bool = False
+    """Whether it waited while this program stood still: nobody may expect its effect now."""
     turn: Callable[[], Awaitable[None]] = at_once
     """Returns once the writes that came before it on its connection are answered."""
 
@@ -64,22 +95,36 @@ class TcpGateway:
     """Listens, and answers until it is closed; lives in one loop."""
 
     def __init__(
-        self, answer: TcpAnswer, gone: Callable[[TcpClient], None] = lambda _: None
+        self,
+        answer: TcpAnswer,
+        gone: Callable[[TcpClient], None] = lambda _: None,
+        awake: Awake | None = None,
     ) -> None:
         self._answer = answer
         self._gone = gone
         self._server: asyncio.Server | None = None
         self._tasks: set[asyncio.Task[None]] = set()
         self._count = 0
+        self._awake = awake or Awake()
 
     async def listen(self, host: str, port: int) -> tuple[str, int]:
         """Listen at an address; returns it with the port that was found for 0. Raises OSError."""
-        self._server = await asyncio.start_server(self._serve, host, port)
+        self._awake.start()
+        loop = asyncio.get_running_loop()
+        self._server = await loop.create_server(self._protocol, host, port)
         found = self._server.sockets[0].getsockname()
         return found[0], found[1]
 
+    def _protocol(self) -> asyncio.StreamReaderProtocol:
+        loop = asyncio.get_running_loop()
+        incoming = _Incoming(self._awake, loop)
+        return asyncio.StreamReaderProtocol(
+            incoming, lambda _, writer: self._serve(incoming, writer), loop=loop
+        )
+
     async def close(self) -> None:
         """Take no more connections, and end those that are."""
+        self._awake.close()
         if self._server is not None:
             self._server.close()
         tasks = tuple(self._tasks)
@@ -87,7 +132,7 @@ class TcpGateway:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
 
-    async def _serve(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    async def _serve(self, reader: _Incoming, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
         if len(self._tasks) >= MOST_CLIENTS:
@@ -111,20 +156,20 @@ class TcpGateway:
                 writer.close()
 
     async def _converse(
-        self, client: TcpClient, reader: asyncio.StreamReader, writer: asyncio.StreamWriter
+        self, client: TcpClient, reader: _Incoming, writer: asyncio.StreamWriter
     ) -> None:
         talk = _Talk(client, writer)
         try:
             while True:
-                async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
-                    head = await reader.readexactly(HEADER.size)
+                head = await reader.take(HEADER.size)
                 transaction, protocol, length, unit = HEADER.unpack(head)
                 if protocol != 0 or not 2 <= length <= LONGEST_PDU + 1:
                     log.warning("what %s sends is no Modbus TCP; it is let go", client.peer)
                     return
-                async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
-                    pdu = await reader.readexactly(length - 1)
-                await self._begin(talk, transaction, unit, pdu)
+                pdu = await reader.take(length - 1)
+                await talk.room_for_writes()
+                request = TcpRequest(client, unit, pdu, reader.stale, talk.turn())
+                await self._begin(talk, transaction, request)
         except asyncio.CancelledError:
             talk.cancel()
             raise
@@ -133,14 +178,13 @@ class TcpGateway:
             # what a client sent before it went is carried out: a stop may be among it
             await talk.ended()
 
-    async def _begin(self, talk: _Talk, transaction: int, unit: int, pdu: bytes) -> None:
+    async def _begin(self, talk: _Talk, transaction: int, request: TcpRequest) -> None:
         """Have one request answered, beside those before it; no read keeps what is behind it."""
-        writes = pdu[0] in WRITE_FUNCTIONS
+        function = request.pdu[0]
+        writes = function in WRITE_FUNCTIONS
         if not writes and talk.full:
-            await self._send(talk, transaction, unit, exception_pdu(pdu[0], BUSY))
+            await self._send(talk, transaction, request.unit, exception_pdu(function, BUSY))
             return
-        await talk.room_for_writes()
-        request = TcpRequest(talk.client, unit, pdu, talk.turn())
         answer = self._answer(request)
         task = talk.begin(self._one(talk, transaction, request, answer), writes=writes)
         # one that is cancelled before it began awaits nothing

@@ -79,7 +79,9 @@ class Gateway:
         if place is None:
             return _refused(function, NO_PATH)
         line, device = self._lines[place[0]], place[1]
-        line.commanding.heard(device, request.client.peer)
+        if not request.stale:
+            # what waited while this program stood still says nothing of its client now
+            line.commanding.heard(device, request.client.peer)
         try:
             asked = gateway_asked(request.pdu)
         except Unanswerable as refused:

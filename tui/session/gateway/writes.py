@@ -64,9 +64,11 @@ class GatewayWrite:
         self._session = session
         self._asked = asked
         self._client = request.client.peer
-        self._turn = request.turn
+        self._request = request
         self._rules = rules
         self._write = write
+        self._commands = False
+        """Whether it commands the drive, and does not only stop it."""
 
     async def carry_out(self) -> bytes:
         """Write what is allowed; the answer. Raises Unanswerable and the line's errors.
@@ -74,7 +76,7 @@ class GatewayWrite:
         What only stops goes past the writes that its client sent before it, and voids them.
         """
         if not self._may_go_first():
-            await self._turn()
+            await self._request.turn()
         words = await self._told_apart()
         stops = [one for one in words if one.kind is WordKind.STOP]
         if len(stops) == len(words):
@@ -82,7 +84,7 @@ class GatewayWrite:
         for one in stops:
             # first of all: whatever becomes of the rest
             await self._send_alone(one)
-        await self._turn()
+        await self._request.turn()
         await self._check(words)
         order = starts_by(self._session.profile, words)
         return await (self._start(order) if order else self._send(Priority.OPERATOR_WRITE))
@@ -118,6 +120,7 @@ class GatewayWrite:
 
     async def _check(self, words: list[ForeignWord]) -> None:
         """Raise Unanswerable where the request is not allowed as a whole."""
+        self._commands = any(one.kind is WordKind.COMMAND for one in words)
         if why := self._voided():
             self._refuse(BUSY, why)
         drive = await self._line.drives.found(self._session.device)
@@ -126,8 +129,7 @@ class GatewayWrite:
         if any(one.kind is WordKind.UNKNOWN for one in words):
             lacking = [one.address for one in words if one.kind is WordKind.UNKNOWN]
             self._refuse(ILLEGAL_FUNCTION, f"nothing is known to be written at {lacking}")
-        commands = any(one.kind is WordKind.COMMAND for one in words)
-        if commands and not self._rules.commands:
+        if self._commands and not self._rules.commands:
             self._refuse(ILLEGAL_FUNCTION, "commands are not allowed: --allow-commands")
         settings = [one for one in words if one.kind is WordKind.SETTING]
         for one in settings:
@@ -135,7 +137,7 @@ class GatewayWrite:
             if why:
                 self._refuse(ILLEGAL_FUNCTION, why)
         await self._check_values(settings)
-        if commands:
+        if self._commands:
             why = self._line.commanding.claim(self._session.device, self._client)
             if why:
                 self._refuse(BUSY, why)
@@ -233,7 +235,12 @@ class GatewayWrite:
 
     def _voided(self) -> str:
         """Why it must not go out any more; asked in the line's thread just before."""
-        return "Not sent: a stop came meanwhile." if self._line.pending.void(self._write) else ""
+        if self._line.pending.void(self._write):
+            return "Not sent: a stop came meanwhile."
+        if self._request.stale:
+            return "Not sent: serve stood still when it came, and nobody may expect it now."
+        gone = self._commands and self._request.client.left
+        return "Not sent: its client has gone, and would not stop the motor." if gone else ""
 
     def _refusal_code(self) -> int:
         """The exception for what the line did not send."""
