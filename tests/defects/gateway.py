@@ -201,6 +201,14 @@ DEFECTS = (
         (GATEWAY,),
     ),
     Defect(
+        "foreign-stop-undone-by-another-client",
+        "tui/session/gateway/commanding.py",
+        "or self._barred.get((device, client))",
+        "",
+        "A controller that repeats its run word starts the motor that another client has stopped.",
+        (f"{GATEWAY}::test_a_client_that_repeats_its_run_word_does_not_undo_the_stop_of_another",),
+    ),
+    Defect(
         "half-a-value-written",
         "tui/bus/gateway/pdu.py",
         "if size != 2 * count or len(data) != size:",

@@ -371,6 +371,31 @@ async def test_a_second_client_that_commands_the_drive_is_told_of(bench: Make) -
     assert "10.0.0.10:5000 commands this drive now, as client 10.0.0.9:5000 did" in text
 
 
+async def test_a_client_that_repeats_its_run_word_does_not_undo_the_stop_of_another(
+    bench: Make,
+) -> None:
+    made = bench(commands=True)
+    controller, operator = made.client, TcpClient(2, "10.0.0.10:5000")
+    assert await made.write(LFR, 300) == 0
+    made.client = operator
+    assert await made.write(LFR, 310) == 0
+    made.client = controller
+    assert await made.write(LFR, 300) == 0
+    made.client = operator
+    assert await made.write(CMD, 0x0007) == 0
+    sent = len(made.written())
+    made.client = controller
+    assert await made.write(CMD, 0x000F) == 6
+    assert len(made.written()) == sent
+    made.client = operator
+    assert await made.write(LFR, 100) == 0
+    made.client = TcpClient(3, "10.0.0.9:5001")  # one that connects anew for each request
+    assert await made.write(LFR, 110) == 0
+    made.client = controller
+    assert await made.write(CMD, 0x0007) == 0  # it has seen the stop
+    assert await made.write(LFR, 120) == 0
+
+
 async def test_a_drive_without_a_profile_is_only_read(bench: Make) -> None:
     leroy = DriveSpec("powerdrive", 1)
     made = bench(leroy, writes=allowed_codes("all"), commands=True)

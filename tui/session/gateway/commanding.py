@@ -28,7 +28,8 @@ class GatewayCommanding:
 
     A client that repeats its words would start a motor again that a person has just stopped: after
     such a stop its commands are refused until a client has sent a stop word, as a controller does
-    that has seen the motor stand.
+    that has seen the motor stand. A stop by another client counts the same for those that have
+    commanded the drive: they have to send their own.
     """
 
     def __init__(
@@ -47,6 +48,10 @@ class GatewayCommanding:
         """Devices that were stopped from elsewhere since a client's last stop: by whom."""
         self._signs: dict[int, float] = {}
         """When the client that commands was last heard, by device (monotonic)."""
+        self._commanded: dict[int, set[str]] = {}
+        """The clients that have commanded each device since it was stopped."""
+        self._barred: dict[tuple[int, str], str] = {}
+        """Clients whose drive another client has stopped: by whom, by device and client."""
         facts = line.facts
         self._leave = (
             facts.on_stop(self._stopped_elsewhere),
@@ -66,7 +71,7 @@ class GatewayCommanding:
     def claim(self, device: int, client: str) -> str:
         """Command a drive for a client; returns why not, or nothing."""
         with self._lock:
-            by = self._stopped.get(device)
+            by = self._stopped.get(device) or self._barred.get((device, client))
         if by is not None:
             return f"Drive {device} {STOPPED_ELSEWHERE} ({by})."
         if why := self._line.facts.claim(device):
@@ -74,6 +79,7 @@ class GatewayCommanding:
         with self._lock:
             before, self._by[device] = self._by.get(device), client
             self._signs[device] = REAL_CLOCK.monotonic()
+            self._commanded.setdefault(device, set()).add(client)
         if before not in (None, client):
             text = f"Modbus TCP client {client} commands this drive now, as client {before} did."
             log.warning("drive %s: %s", device, text)
@@ -96,6 +102,9 @@ class GatewayCommanding:
         self._line.facts.give_stop([device], f"Modbus TCP client {client}")
         with self._lock:
             self._stopped.pop(device, None)
+            self._barred.pop((device, client), None)
+            for other in self._commanded.pop(device, set()) - {client}:
+                self._barred[device, other] = f"Modbus TCP client {client}"
         self._release(device)
         self._started.stopped(device)
 
@@ -103,6 +112,10 @@ class GatewayCommanding:
         """A client has closed its connection."""
         with self._lock:
             left = [device for device, by in self._by.items() if by == client]
+            for clients in self._commanded.values():
+                clients.discard(client)
+            for barred in [one for one in self._barred if one[1] == client]:
+                del self._barred[barred]
         for device in left:
             self._release(device)
             text = (
