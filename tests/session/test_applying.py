@@ -9,6 +9,9 @@ import pytest
 
 from tests.session.sets_bench import Bench, bench
 from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
+from tui.cli.shared.errors import REFUSED_HERE
+from tui.cli.shared.messages import Messages
+from tui.cli.shared.sets import ResultTelling, status_of_results
 from tui.drive.settings.memory_orders import MemoryRefused
 from tui.session.read import retrying_reader
 from tui.session.settings.applied import Applied, EditOutcome, Result
@@ -257,6 +260,14 @@ async def test_what_lets_nothing_more_through_ends_it_and_keeps_the_rest(end: st
         why = "a stop came after it (F12)" if end == "a stop" else "no longer armed"
         assert why in applied.stopped
         assert why in applied.results[1].text
+        assert "Not sent: " not in applied.results[2].text
+        assert [r.voided for r in applied.results] == [False, True, True]
+        assert status_of_results(applied.results) == REFUSED_HERE
+        telling = ResultTelling(Messages(as_json=True))
+        for number, result in enumerate(applied.results, start=1):
+            telling(number, 3, result)
+        assert len(telling.messages.texts) == 3
+        assert telling.messages.texts[-1] == f"The same of 1 more: {applied.results[2].edit.code}."
         assert len(made.writes()) == 1
 
 

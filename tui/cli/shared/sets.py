@@ -178,16 +178,31 @@ class ResultTelling:
         self.messages = messages
         self.results: dict[str, Result] = {}
         self._of = 0
+        self._alike = ""
+        """What was told of the last one that was not written, without its code."""
+        self._more: list[str] = []
+        """Codes of those behind it of which the same is true."""
 
     def __call__(self, done: int, of: int, result: Result) -> None:
-        """One setting: on standard output, or as an error."""
-        self.results[result.edit.code] = result
+        """One setting: on standard output, or as an error; those that fail alike in one line."""
+        code = result.edit.code
+        self.results[code] = result
         self._of = max(self._of, of)
-        text = f"{done}/{of}  {result.text}"
-        if result.done:
-            self.messages.tell(text)
+        alike = "" if result.done else result.text.replace(code, "", 1)
+        if alike and alike == self._alike:
+            self._more.append(code)
         else:
-            self.messages.complain(text)
+            self._tell_more()
+            self._alike = alike
+            tell = self.messages.tell if result.done else self.messages.complain
+            tell(f"{done}/{of}  {result.text}")
+        if done >= of:
+            self._tell_more()
+
+    def _tell_more(self) -> None:
+        more, self._more = self._more, []
+        if more:
+            self.messages.complain(f"The same of {len(more)} more: {', '.join(more)}.")
 
     def interrupted(self) -> Failure:
         """The end by Ctrl-C, with what was written and what is not known."""
@@ -241,7 +256,12 @@ def status_of_results(results: Iterable[Result]) -> int:
         EditOutcome.UNKNOWN: LINE_TROUBLE,
         EditOutcome.NOT_SENT: LINE_TROUBLE,
     }
-    statuses = {table[r.outcome] for r in results if r.outcome in table}
+    statuses = {
+        # a stop is no trouble on the line: what was meant is not to be tried again by itself
+        REFUSED_HERE if r.voided else table[r.outcome]
+        for r in results
+        if r.outcome in table
+    }
     order = (LINE_TROUBLE, DRIVE_REFUSED, REFUSED_HERE)
     return next((status for status in order if status in statuses), DONE)
 

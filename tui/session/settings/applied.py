@@ -34,6 +34,8 @@ class Result:
     outcome: EditOutcome
     text: str
     held: int | None = None
+    voided: bool = False
+    """Whether a stop, or the end of arming, kept it from being sent."""
 
     @property
     def done(self) -> bool:

@@ -67,7 +67,7 @@ async def apply_edits(
     order = ordered(session.profile, edits, work.retrying.raws)
     for number, edit in enumerate(order, start=1):
         if work.stopped:
-            result = Result(edit, EditOutcome.NOT_SENT, f"{edit.code} was not sent: {work.stopped}")
+            result = work.not_sent(edit)
         elif (base := work.missed_base(edit)) != "":
             text = f"{edit.code} is held back: {base}, which it builds on, was not written."
             result = Result(edit, EditOutcome.HELD_BACK, text, edit.old)
@@ -93,6 +93,8 @@ class _Work:
     confirmed: Collection[str]
     why: str
     stopped: str = ""
+    voided: bool = False
+    """Whether a stop, or the end of arming, ended it."""
     results: list[Result] = field(default_factory=list)
     links: list[LinkChange] = field(default_factory=list)
 
@@ -119,6 +121,12 @@ class _Work:
         raws = self.retrying.raws
         return builds_on(self.session.profile, edit, self.missed, self.edits, raws)
 
+    def not_sent(self, edit: Edit, held: int | None = None) -> Result:
+        """What becomes of an edit once nothing more is sent."""
+        why = self.stopped.removeprefix("Not sent: ")
+        text = f"{edit.code} was not sent: {why}"
+        return Result(edit, EditOutcome.NOT_SENT, text, held, self.voided)
+
     async def apply(self, edit: Edit) -> Result:
         """One edit, from the look before to the look after."""
         try:
@@ -126,17 +134,16 @@ class _Work:
                 return reason
         except LineError as error:
             self.stopped = str(error)
-            return Result(edit, EditOutcome.NOT_SENT, f"{edit.code} was not sent: {error}")
+            return self.not_sent(edit)
         try:
             return await self._write(edit)
         except (Stopped, NotArmed) as error:
-            self.stopped = str(error)
-            return Result(
-                edit, EditOutcome.NOT_SENT, f"{edit.code} was not sent: {error}", edit.old
-            )
+            self.stopped, self.voided = str(error), True
+            return self.not_sent(edit, edit.old)
         except RequestRefused as error:
             if self.writer.permit is not None and self.writer.permit.refusal():
-                self.stopped = str(error)
+                self.stopped, self.voided = str(error), True
+                return self.not_sent(edit, edit.old)
             return Result(edit, EditOutcome.REFUSED, str(error), edit.old)
         except LOST_ANSWERS as error:
             return await self._after_a_lost_answer(edit, error)
