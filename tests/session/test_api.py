@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 import tui.session.api as api
+from tui.bus.program import Program
 from tui.session.api import (
     Drive,
     DriveError,
@@ -188,6 +189,25 @@ def test_a_stop_stands_and_ends_arming() -> None:
             with pytest.raises(NotArmed, match="Stopped"):
                 drive.write({"ACC": 4})
         assert drive.read("RFR")["RFR"].number == 0
+
+
+def test_a_stop_of_another_program_voids_what_follows_inside_the_block_alone(
+    line: DriveLine, drive: Drive
+) -> None:
+    """A script that lives on may arm again; one stop is told of more than once."""
+    facts = line._fleet.line.facts
+    other = Program("another's id", "stop", 4711)
+    facts.hear_stop((1,), "drivepanel stop", other)
+    with drive.armed():
+        assert "5" in drive.write({"ACC": 5})["ACC"]
+        for _ in range(2):
+            facts.hear_stop((1,), "drivepanel stop", other)
+        with pytest.raises(NotArmed, match="Stopped: no longer armed"):
+            drive.write({"ACC": 6})
+        with pytest.raises(NotArmed, match="Stopped: no longer armed"):
+            drive.save()
+    with drive.armed():
+        assert "6" in drive.write({"ACC": 6})["ACC"]
 
 
 def test_a_motor_that_cannot_be_stopped_is_an_error() -> None:

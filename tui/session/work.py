@@ -27,6 +27,7 @@ log = logging.getLogger(__name__)
 MOST_WAITING = 4
 """Tasks that may wait behind the one that is being carried out."""
 BY_STOP = "ended by a stop"
+STOPPED_DISARMS = "Stopped: no longer armed."
 
 
 class Stopped(OrderRefused):
@@ -178,8 +179,10 @@ class WorkQueue:
             self.stopped_by = by
             worker, self._worker, self._doing = self._worker, None, None
             self._turn = object()
-            was_armed = self.arming.armed
-            self.arming.disarm("Stopped: no longer armed." if was_armed else "")
+            # one that is told of twice leaves the reason of the first
+            told = self.arming.why_disarmed == STOPPED_DISARMS
+            why = STOPPED_DISARMS if self.arming.armed or told else ""
+            self.arming.disarm(why)
         if worker is not None:
             worker.cancel()
         # a worker that had no time to begin would leave them to the next task
