@@ -30,7 +30,7 @@ from tui.drive.profile import library
 from tui.session.connect.identify import ScanResult, identify_drive
 from tui.session.connect.open_line import demo_line, open_line
 from tui.session.connect.search import LATE_WAIT, REST, SECOND_WAIT, Search
-from tui.session.connect.strangers import JITTER
+from tui.session.connect.strangers import JITTER, Strangers
 from tui.session.drive import DriveSession
 from tui.simulator import DriveSpec, Simulation
 
@@ -106,6 +106,33 @@ async def searched(
     return results
 
 
+async def test_a_single_drive_says_who_it_is_before_any_profile_is_read(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def read_them(*_: object, **__: object) -> Strangers:
+        raise AssertionError
+
+    monkeypatch.setattr("tui.session.connect.search.strangers_of", read_them)
+    line = Replies(present=set())
+    texts: list[str] = []
+    search = Search([7], line.no_time)
+    (result,) = await searched(search, line, texts)
+    assert result.identity is not None
+    assert result.identity.reference == "ATV71HU15M3"
+    assert (search.ended, texts) == ("done", ["1 of 1, 1 found"])
+    # nothing else was asked
+    assert line.asked == []
+
+
+async def test_a_single_drive_that_does_not_say_it_is_asked_as_any_other() -> None:
+    line = Replies(present={7}, errors={7: DeviceException(7, 43, 0, 1)})
+    search = Search([7], line.no_time)
+    (result,) = await searched(search, line)
+    assert (search.ended, search.answered) == ("done", frozenset({7}))
+    assert line.asked
+    assert result.identity is None or not result.identity.reference
+
+
 def devices(results: Iterable[ScanResult]) -> list[int]:
     return [result.device for result in results]
 
@@ -133,15 +160,15 @@ async def test_an_empty_address_costs_one_request_and_the_longest_turnaround() -
 
 async def test_slow_characters_are_waited_for() -> None:
     line = Replies(set(), link=SerialLink("/dev/null", 1200, "8N1"))
-    await searched(Search([1], line.no_time, once=True), line)
+    await searched(Search([1, 2], line.no_time, once=True), line)
     # the silence that ends the request, and the first character
-    assert line.waits == [pytest.approx(4.5 * 10 / 1200 + JITTER)]
+    assert line.waits == [pytest.approx(4.5 * 10 / 1200 + JITTER)] * 2
 
 
 async def test_a_network_is_waited_for_as_ever() -> None:
     line = Replies(set(), link=TcpLink("127.0.0.1"))
-    await searched(Search([1], line.no_time, once=True), line)
-    assert line.waits == [None]
+    await searched(Search([1, 2], line.no_time, once=True), line)
+    assert line.waits == [None, None]
 
 
 async def test_what_is_left_counts_the_silent_ones_once_more_and_what_they_really_take() -> None:

@@ -11,6 +11,7 @@ from typing import NamedTuple
 from tui.bus.api import IdentificationObjects, ModbusLine, Priority, Reply
 from tui.bus.errors import LineClosed, LineError, LineLost, NoAnswer
 from tui.bus.expectation import IDENTIFY
+from tui.drive.finding import PresenceProbe
 
 from ..clock import REAL_CLOCK
 from .identify import ScanResult, find_drive
@@ -110,6 +111,9 @@ class Search:
         What is wrong with one address ends nothing. Raises LineClosed and LineLost.
         """
         try:
+            if await self._said_at_once(line, found):
+                self.ended = "done"
+                return
             wait = line.timing.scan_timeout
             how = await asyncio.to_thread(strangers_of, line.link, wait, patient=self._patient)
             self.cost = how.cost
@@ -131,6 +135,32 @@ class Search:
         finally:
             self.ended = self.ended or "stopped"
             self.at = None
+
+    async def _said_at_once(self, line: ModbusLine, found: Found) -> bool:
+        """Whether the one device that was named has said who it is.
+
+        It is asked before all profiles are read, of which the questions to strangers are made:
+        that takes longer than most drives do to say it.
+        """
+        if len(self.devices) != 1 or self.devices[0] in line.facts.hushed:
+            return False
+        (device,) = self.devices
+        self._between()
+        self.asked, self.at = 1, device
+        asked_first = (PresenceProbe(None),)
+        try:
+            result = await find_drive(
+                line, device, asked_first, priority=Priority.BACKGROUND, within=None
+            )
+        except (LineClosed, LineLost):
+            raise
+        except LineError:
+            return False
+        if result.identity is None or not result.identity.reference:
+            return False
+        self.answered = frozenset(self.devices)
+        await found(result)
+        return True
 
     async def _round(
         self,
