@@ -81,8 +81,11 @@ def arm(panel: PtyPanel) -> None:
     """Arm the drive; a piece may have opened another screen or a field before."""
     for _ in range(10):
         settle(panel)
-        if panel.armed:
+        if panel.armed and "Output" in panel.text():
             return
+        if panel.armed:  # on another screen, where Enter may open a text
+            home(panel)
+            continue
         panel.type(b"a")
         settle(panel, 0.3)
         if not panel.armed:
@@ -128,7 +131,9 @@ def bursts(panel: PtyPanel, chance: random.Random, count: int, counted: Counted)
         counted.typed += typed
         counted.stopless += at is None and not typed
         counted.stops += sum(map(is_stop, sent))
-        _count(sent[at or 0 :], counted)
+        behind = Counted()
+        if at is not None:
+            _count(sent[at:], behind)
         counted.still_armed += not typed and not _disarmed(panel)
         if at is None and not typed:
             print(f"no stop: {before_keys} {stop!r}\n{panel.text()}", file=sys.stderr)
@@ -136,8 +141,14 @@ def bursts(panel: PtyPanel, chance: random.Random, count: int, counted: Counted)
             mark = len(panel.log.writes)
             send(panel, chance, after_keys)
             settle(panel)
-            _count(panel.log.writes[mark:], counted)
+            if at is not None:
+                _count(panel.log.writes[mark:], behind)
             counted.keys += len(after_keys)
+        counted.runs_after_stop += behind.runs_after_stop
+        counted.references_after_stop += behind.references_after_stop
+        counted.other_writes += behind.other_writes
+        if behind != Counted():
+            print(f"after a stop: {before_keys} {stop!r} {after_keys}: {sent}", file=sys.stderr)
 
 
 def _disarmed(panel: PtyPanel) -> bool:
