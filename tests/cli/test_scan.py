@@ -142,7 +142,10 @@ def test_another_master_ends_it_before_anything_is_sent(options: tuple[str, ...]
             master.join()
         assert peer.requests == []
     assert done.exit_code == 5
-    assert "Address 6: read of register 3201 on, 4 words, write of register 8501" in done.stderr
+    # whichever was heard first
+    assert "Address 6: " in done.stderr
+    assert "read of register 3201 on, 4 words" in done.stderr
+    assert "write of register 8501" in done.stderr
     assert "Nothing was sent." in done.stderr
 
 
