@@ -138,8 +138,10 @@ def same_line(one: str, other: str) -> bool:
     if one == other:
         return True
     from tui.bus.link import SerialLink, parse_link
-    from tui.session.connect.line_key import line_key
+    from tui.session.connect.line_key import SIMULATED_PREFIX, line_key
 
+    if len({text.casefold().startswith(SIMULATED_PREFIX) for text in (one, other)}) > 1:
+        return False  # to know more of a simulated line takes the simulator
     if line_key(one) != line_key(other):
         return False
     try:

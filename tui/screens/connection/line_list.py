@@ -107,7 +107,7 @@ class LineList(OptionList):
         for choice in group.choices:
             key = f"{group.title} {choice.name} {choice.text}"
             self._choices[key] = choice
-            line = _key(choice.text) if self._open else ""
+            line = _key(choice.text) if self._may_be_open(choice.text) else ""
             found.append(entry(choice_line(choice, width, self._mark(line)), id=key))
         if group.empty and (not group.choices or group.title == "Named"):
             found.append(entry(Text(short(f"  {group.empty}", width), FAINT), disabled=True))
@@ -119,6 +119,15 @@ class LineList(OptionList):
         if line == self._here:
             return "shown"
         return "fault" if line in self._faulty else "open"
+
+    def _may_be_open(self, text: str) -> bool:
+        """Whether a line has to be looked at closer; to know simulated ones takes the simulator."""
+        if not self._open:
+            return False
+        from tui.session.connect.line_key import SIMULATED_PREFIX
+
+        simulated = text.casefold().startswith(SIMULATED_PREFIX)
+        return any(line.startswith(SIMULATED_PREFIX) is simulated for line in self._open)
 
 
 def list_width(width: int) -> int:
