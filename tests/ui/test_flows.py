@@ -8,6 +8,7 @@ from collections.abc import Callable
 
 import pytest
 from rich.text import Text
+from textual.app import App
 from textual.pilot import Pilot
 from textual.screen import ModalScreen
 from textual.widgets import OptionList
@@ -51,8 +52,13 @@ async def until(pilot: Pilot[None], holds: Callable[[], bool], seconds: float = 
     """Wait for a condition of the screen; a slow machine only waits longer."""
     end = time.monotonic() + seconds
     while not holds():
-        assert time.monotonic() < end, "the screen did not get there"
+        assert time.monotonic() < end, f"the screen did not get there:\n{picture(pilot.app)}"
         await pilot.pause(0.05)
+
+
+def picture(app: App[None]) -> str:
+    """The screen on top, as text."""
+    return "\n".join(strip.text for strip in app.screen._compositor.render_strips())
 
 
 def shown(app: DrivePanelApp, part: str) -> str:

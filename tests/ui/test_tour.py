@@ -12,7 +12,7 @@ from tui.app import DrivePanelApp
 from tui.drive.profile.library import demo_drives
 from tui.session.connect.open_line import OpenLine, demo_line
 
-from .test_flows import until
+from .test_flows import picture, until
 
 pytestmark = pytest.mark.drawn
 
@@ -42,8 +42,7 @@ def plain(text: str) -> str:
 
 def on_screen(app: DrivePanelApp) -> str:
     """All that stands on the screen."""
-    strips = app.screen._compositor.render_strips()
-    return plain("\n".join(strip.text for strip in strips))
+    return plain(picture(app))
 
 
 def demo(*_: object, **__: object) -> OpenLine:
