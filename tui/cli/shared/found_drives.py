@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, TypeVar
 
 from .drives import failed
 from .errors import DONE, failure_of
-from .options import Target, connect_drive, silence_hint
+from .options import Target, connect_drive
 from .output import print_json
 from .several_lines import LineWish, connected
+from .silence import silence_hint
 
 if TYPE_CHECKING:
     from tui.session.connect.open_line import OpenLine

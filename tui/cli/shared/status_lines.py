@@ -13,10 +13,11 @@ from .drive_status import Status, drive_in_a_line, status_json, status_of_drive,
 from .drives import failed, failed_line
 from .errors import DONE, failure_of
 from .every_drive import every_drive
-from .options import Target, connect_drive, silence_hint
+from .options import Target, connect_drive
 from .output import print_json
 from .say import say, say_row
 from .several_lines import LineWish, connected
+from .silence import silence_hint
 from .watch_outputs import Several
 
 if TYPE_CHECKING:

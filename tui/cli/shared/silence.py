@@ -1,0 +1,38 @@
+"""What to look at where nothing answers, for commands on one line."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from tui.session.connect.open_line import OpenLine
+
+    from .options import Target
+
+
+def about_silence(opened: OpenLine, text: str, *, by_profile: bool) -> str:
+    """What to look at where nothing answers; empty for a line without settings of its own."""
+    from tui.bus.link import SerialLink, UsualSettings, parse_link
+
+    link = opened.line.link
+    if not isinstance(link, SerialLink) or opened.simulation is not None:
+        return ""
+    other = UsualSettings(link.baud + 1, "8N1" if link.format != "8N1" else "8E1")
+    plain = parse_link(text, other)
+    named = isinstance(plain, SerialLink) and (plain.baud, plain.format) == (link.baud, link.format)
+    whose = "as typed" if named else "the profile's own" if by_profile else "as no others are named"
+    return (
+        f"Are address, wiring, {link.baud} baud and {link.format} ({whose}) those of the drive?"
+        f" Others: serial:{link.path},BAUD,FORMAT."
+    )
+
+
+def silence_hint(error: Exception, opened: OpenLine, target: Target) -> str:
+    """The same behind an error, with a space; empty for any other error than silence."""
+    from tui.bus.errors import NoAnswer
+
+    if not isinstance(error, NoAnswer):
+        return ""
+    by_profile = target.profile_id is not None
+    hint = about_silence(opened, target.line_text, by_profile=by_profile)
+    return f" {hint}" if hint else ""
