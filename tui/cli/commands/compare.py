@@ -8,11 +8,11 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ..shared.completion import complete_profile, complete_side
+from ..shared.completion import complete_side
 from ..shared.devices import devices_option
 from ..shared.errors import DIFFERENT, USAGE, Failure, told
 from ..shared.line_argument import LINE_VARIABLE, named_line_of
-from ..shared.options import Target, json_option, never_forced
+from ..shared.options import Target, json_option, never_forced, profile_of
 from ..shared.say import say
 from ..shared.sets import set_in, set_of_drive
 
@@ -36,14 +36,7 @@ FACTORY = "factory"
     help="Format of the table.",
 )
 @json_option
-@click.option(
-    "-p",
-    "--profile",
-    "profile_id",
-    metavar="ID",
-    shell_complete=complete_profile,
-    help="Profile of the drives.",
-)
+@profile_of("Profile of the drives.")
 @devices_option("Slave address of the drive; twice where A and B are two drives.")
 @never_forced
 @told

@@ -13,7 +13,7 @@ from ..plant.broker import Broker, broker_of, mqtt_password_option
 from ..plant.wish import check_names
 from ..shared.completion import complete_line_or_code
 from ..shared.errors import told
-from ..shared.options import Target, drives_options, json_option
+from ..shared.options import Target, drives_options, every_option, json_option
 from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.several_lines import LineWish, further_lines, lines_argument, lines_wished, on_lines
@@ -34,14 +34,7 @@ if TYPE_CHECKING:
     help="The broker: mqtt://[USER@]HOST[:PORT][/TOPIC], or mqtts:// for TLS.",
 )
 @mqtt_password_option
-@click.option(
-    "--every",
-    type=click.FloatRange(min=0.05),
-    default=1.0,
-    show_default=True,
-    metavar="S",
-    help="Target cycle time in seconds.",
-)
+@every_option
 @json_option
 @told
 def publish(

@@ -17,13 +17,13 @@ from ..plant.wish import PlantWish, check_drives, check_names, plant_wish, read_
 from ..running.holding import BY_SIGNAL
 from ..running.service import Service
 from ..running.serving import GatewayWish, OpenedLine, ServedAt, served_until_signal
-from ..shared.completion import complete_line, complete_profile
+from ..shared.completion import complete_line
 from ..shared.devices import devices_option
 from ..shared.errors import told
 from ..shared.host_port import host_port
 from ..shared.line_argument import LINE_VARIABLE, line_options, mind_the_line
 from ..shared.looking_after import guard_motors
-from ..shared.options import CONNECT_WITHIN, json_option, usual_settings
+from ..shared.options import CONNECT_WITHIN, json_option, profile_of, usual_settings
 from ..shared.output import print_json
 from ..shared.say import say
 from ..shared.served_lines import ServedLine, served_lines
@@ -75,14 +75,7 @@ from ..shared.served_lines import ServedLine, served_lines
     help="Cycle time in seconds of what goes to --metrics and --mqtt; 1 unless told otherwise.",
 )
 @devices_option("Id of a drive that does not say who it is; -p names its profile.")
-@click.option(
-    "-p",
-    "--profile",
-    "profile_id",
-    metavar="ID",
-    shell_complete=complete_profile,
-    help="Profile of the drives of -d.",
-)
+@profile_of("Profile of the drives of -d.")
 @json_option
 @told
 def serve(

@@ -19,6 +19,7 @@ from ..shared.found_drives import find_drives
 from ..shared.options import (
     Target,
     drives_options,
+    every_option,
     force_profile_option,
     json_option,
     on_line,
@@ -77,14 +78,7 @@ class CsvWish:
 @lines_argument
 @click.argument("codes", nargs=-1, metavar="[CODE...]", shell_complete=complete_line_or_code)
 @drives_options
-@click.option(
-    "--every",
-    type=click.FloatRange(min=0.05),
-    default=1.0,
-    show_default=True,
-    metavar="S",
-    help="Target cycle time in seconds.",
-)
+@every_option
 @click.option("--count", type=click.IntRange(min=1), metavar="N", help="End after N cycles.")
 @click.option(
     "--csv",

@@ -32,14 +32,29 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON a
 
 read_only_option = click.option("--read-only", is_flag=True, help="Write nothing on this line.")
 
-profile_option = click.option(
-    "-p",
-    "--profile",
-    "profile_id",
-    metavar="ID",
-    shell_complete=complete_profile,
-    help="Profile of the drive; it must match the drive's identification.",
+every_option = click.option(
+    "--every",
+    type=click.FloatRange(min=0.05),
+    default=1.0,
+    show_default=True,
+    metavar="S",
+    help="Target cycle time in seconds.",
 )
+
+
+def profile_of(what: str) -> Option:
+    """The option that names a profile, with its help."""
+    return click.option(
+        "-p",
+        "--profile",
+        "profile_id",
+        metavar="ID",
+        shell_complete=complete_profile,
+        help=what,
+    )
+
+
+profile_option = profile_of("Profile of the drive; it must match the drive's identification.")
 rated_current_option = click.option(
     "--rated-current",
     "rated_current",
