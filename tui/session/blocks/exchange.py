@@ -18,7 +18,8 @@ from tui.drive.shown import depends_on
 from tui.drive.values import from_words, to_words
 
 from ..drive import DriveSession
-from ..journal import Entry, Journal, now_text
+from ..journal import Entry, Journal
+from ..journal_entries import parameter_entry, raw_text
 from ..read.retrying_reader import RetryingReader
 from ..settings.write import NotTaken, Writer
 from ..starts.keeper import record_start
@@ -216,30 +217,23 @@ class _Exchange:
         answer: str,
         back: Mapping[str, int],
     ) -> Entry:
-        session, code = self.session, parameter.code
-        old, new = held.get(code), raws[code]
+        code = parameter.code
         if code in self._not_held(raws, back):
             answer = "holds another value"
-        entry = Entry(
-            time=now_text(),
-            line=session.line_text,
-            device=session.device,
-            profile=session.profile.id,
-            code=code,
-            address=parameter.address,
-            old_raw=old,
-            old=self._text(parameter, old),
-            new_raw=new,
-            new=self._text(parameter, new),
+        entry = parameter_entry(
+            self.session,
+            parameter,
+            old=held.get(code),
+            new=raws[code],
             answer=answer,
-            read_back=back.get(code),
             why=f"through {self.outputs.block.name.lower()}",
+            read_back=back.get(code),
         )
         self.writer.journal.add(entry)
         return entry
 
     def _text(self, parameter: Parameter, raw: int | None) -> str:
-        return self.writer.text(parameter, raw)
+        return raw_text(self.session, parameter, raw)
 
     def _forbidden(self) -> str:
         """Why the frame must no longer go out, or nothing."""

@@ -31,11 +31,11 @@ from tui.drive.foreign_write import (
 )
 from tui.drive.profile.schema import Parameter
 from tui.drive.settings.writable import AT_REST, needs_standstill
-from tui.drive.shown import depends_on, shown_text
+from tui.drive.shown import depends_on
 from tui.drive.values import from_words, word_count
 
 from ..drive import DriveSession
-from ..journal import Entry, now_text
+from ..journal_entries import parameter_entry
 from ..read.reader import Reader
 from ..reading import Reading
 from .in_turn import PendingWrite
@@ -261,6 +261,7 @@ class GatewayWrite:
     ) -> None:
         """Put each parameter whose words were all written into the journal."""
         session, words = self._session, self._asked.words
+        why = f"{what} of Modbus TCP client {self._client}"
         for one in parameters:
             own = [one.address + offset for offset in range(word_count(one))]
             if any(address not in words for address in own):
@@ -268,26 +269,8 @@ class GatewayWrite:
             held = before.get(one.code)
             old, new = held.raw if held else None, from_words(one, [words[at] for at in own])
             self._line.journal.add(
-                Entry(
-                    time=now_text(),
-                    line=session.line_text,
-                    device=session.device,
-                    profile=session.profile.id,
-                    code=one.code,
-                    address=one.address,
-                    old_raw=old,
-                    old=self._text(one, old),
-                    new_raw=new,
-                    new=self._text(one, new),
-                    answer=answer,
-                    read_back=None,
-                    why=f"{what} of Modbus TCP client {self._client}",
-                )
+                parameter_entry(session, one, old=old, new=new, answer=answer, why=why)
             )
-
-    def _text(self, parameter: Parameter, raw: int | None) -> str:
-        image = self._session.image
-        return shown_text(self._session.profile, parameter, raw, image.raws, image.lacking)
 
 
 def _each(words: list[ForeignWord]) -> list[Parameter]:

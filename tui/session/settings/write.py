@@ -10,11 +10,12 @@ from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, LineError, RequestRefused, Superseded
 from tui.drive.errors import DriveError
 from tui.drive.profile.schema import Parameter
-from tui.drive.shown import depends_on, shown_text
+from tui.drive.shown import depends_on
 from tui.drive.values import from_words, is_field, to_words, word_count
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
+from ..journal_entries import parameter_entry, raw_text
 from ..read.reader import Reader
 from ..work import Permit
 
@@ -71,8 +72,8 @@ class Writer:
             if back is not None and (back ^ raw) & check & 0xFFFFFFFF:
                 answer = "holds another value"
                 raise NotTaken(
-                    f"{code}: written {self.text(parameter, raw)}, the drive holds"
-                    f" {self.text(parameter, back)}."
+                    f"{code}: written {raw_text(self.session, parameter, raw)}, the drive holds"
+                    f" {raw_text(self.session, parameter, back)}."
                 )
         except (RequestRefused, Superseded) as error:
             answer = str(error)
@@ -90,7 +91,9 @@ class Writer:
             raise
         finally:
             old = before.raw if before is not None else None
-            entry = self._entry(parameter, old, raw, answer, back, why)
+            entry = parameter_entry(
+                session, parameter, old=old, new=raw, answer=answer, why=why, read_back=back
+            )
             self.journal.add(entry)
             if lost:
                 self.complete_later(entry, parameter, check if read_back else 0)
@@ -108,7 +111,7 @@ class Writer:
     def _complete(self, entry: Entry, parameter: Parameter, check: int, back: int) -> None:
         taken = not (back ^ entry.new_raw) & check & 0xFFFFFFFF
         came = f"{'Taken' if taken else 'Not taken'}: it" if check else "It"
-        answer = f"{came} holds {self.text(parameter, back)}, read back later."
+        answer = f"{came} holds {raw_text(self.session, parameter, back)}, read back later."
         self.journal.add(
             replace(
                 entry,
@@ -153,34 +156,3 @@ class Writer:
         when = self.session.clock.of_line(reply.time)
         self.session.image.confirm(parameter.code, back, when)
         return back
-
-    def text(self, parameter: Parameter, raw: int | None) -> str:
-        """A raw value as a person reads it; nothing for None."""
-        image = self.session.image
-        return shown_text(self.session.profile, parameter, raw, image.raws, image.lacking)
-
-    def _entry(
-        self,
-        parameter: Parameter,
-        old: int | None,
-        raw: int,
-        answer: str,
-        back: int | None,
-        why: str,
-    ) -> Entry:
-        session = self.session
-        return Entry(
-            time=now_text(),
-            line=session.line_text,
-            device=session.device,
-            profile=session.profile.id,
-            code=parameter.code,
-            address=parameter.address,
-            old_raw=old,
-            old=self.text(parameter, old),
-            new_raw=raw,
-            new=self.text(parameter, raw),
-            answer=answer,
-            read_back=back,
-            why=why,
-        )

@@ -1,0 +1,43 @@
+"""What the journal keeps of a parameter that was written, by whichever way."""
+
+from __future__ import annotations
+
+from tui.drive.profile.schema import Parameter
+from tui.drive.shown import shown_text
+
+from .drive import DriveSession
+from .journal import Entry, now_text
+
+
+def raw_text(session: DriveSession, parameter: Parameter, raw: int | None) -> str:
+    """A raw value as a person reads it; nothing for None."""
+    image = session.image
+    return shown_text(session.profile, parameter, raw, image.raws, image.lacking)
+
+
+def parameter_entry(
+    session: DriveSession,
+    parameter: Parameter,
+    *,
+    old: int | None,
+    new: int,
+    answer: str,
+    why: str,
+    read_back: int | None = None,
+) -> Entry:
+    """A write of now: raw values before and after, what was answered, and what it then held."""
+    return Entry(
+        time=now_text(),
+        line=session.line_text,
+        device=session.device,
+        profile=session.profile.id,
+        code=parameter.code,
+        address=parameter.address,
+        old_raw=old,
+        old=raw_text(session, parameter, old),
+        new_raw=new,
+        new=raw_text(session, parameter, new),
+        answer=answer,
+        read_back=read_back,
+        why=why,
+    )
