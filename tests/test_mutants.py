@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.defects.defect import Defect
-from tests.mutants import DEFECTS, STALE, SURVIVED, Stale, judge, place_of, planted
+from tests.mutants import DEFECTS, ROOT, STALE, SURVIVED, Stale, judge, place_of, planted
 
 WHOLE = "def half(x):\n    return x / 2\n"
 
@@ -70,8 +70,12 @@ def test_only_a_test_that_ran_and_failed_has_noticed(status: int, output: str, b
     assert judge(status, output).startswith(by)
 
 
+def test_the_text_of_every_defect_stands_in_its_room() -> None:
+    for one in DEFECTS:
+        assert place_of(one, ROOT).is_file(), one.name
+
+
 def test_every_defect_has_a_name_a_sentence_and_tests_that_are_there() -> None:
-    root = Path(__file__).resolve().parent.parent
     assert len({one.name for one in DEFECTS}) == len(DEFECTS) >= 44
     for one in DEFECTS:
         assert one.suffers.endswith("."), one.name
@@ -79,4 +83,4 @@ def test_every_defect_has_a_name_a_sentence_and_tests_that_are_there() -> None:
         assert one.tests, one.name
         for test in one.tests:
             file, _, function = test.partition("::")
-            assert f"def {function}" in (root / file).read_text("utf-8"), test
+            assert f"def {function}" in (ROOT / file).read_text("utf-8"), test

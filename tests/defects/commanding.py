@@ -77,7 +77,7 @@ DEFECTS = (
     Defect(
         "stop-leaves-it-armed",
         "tui/session/work.py",
-        'self.arming.disarm("Stopped: no longer armed." if was_armed else "")',
+        "self.arming.disarm(why)",
         "self.arming.touch()",
         "A key pressed after a stop starts the motor again.",
         (WORK,),

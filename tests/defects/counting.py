@@ -41,7 +41,7 @@ DEFECTS = (
     ),
     Defect(
         "hidden-field-takes-the-focus",
-        "tui/screens/frames/screen.py",
+        "tui/screens/frames/frame_list.py",
         'AUTO_FOCUS: ClassVar = ""',
         'AUTO_FOCUS: ClassVar = "#typed"',
         "Space on Frames goes into a field that nobody sees, and stops no motor.",

@@ -11,7 +11,7 @@ DEFECTS = (
     Defect(
         "foreign-commands-unasked",
         "tui/session/gateway/writes.py",
-        "if commands and not self._rules.commands:",
+        "if self._commands and not self._rules.commands:",
         "if False:",
         "Any program that reaches the port starts motors.",
         (GATEWAY,),
@@ -59,8 +59,8 @@ DEFECTS = (
     Defect(
         "foreign-command-outlives-a-stop",
         "tui/session/gateway/writes.py",
-        'return "" if now == self._stamp else',
-        'return "" if True else',
+        "if self._line.pending.void(self._write):",
+        "if False:",
         "A command that was looked at during a stop goes out after it.",
         (GATEWAY,),
     ),

@@ -160,8 +160,8 @@ DEFECTS = (
     Defect(
         "newcomer-does-not-wait",
         "tui/bus/share/sharing.py",
-        'Owner(VERSION, me, "", now + quiet) if quiet > 0 else None',
-        "None",
+        "self._lock.give_back(last if quiet > 0 or stopped else None)",
+        "self._lock.give_back(None)",
         "Whoever opens the line just after another program gets that one's answer.",
         (f"{ENDS}::test_one_that_comes_after_an_owner_that_ended_keeps_it_too",),
     ),
