@@ -65,6 +65,18 @@ DEFECTS = (
         (GATEWAY,),
     ),
     Defect(
+        "cut-short-is-kept-as-done",
+        "tui/session/gateway/writes.py",
+        """answer = ENDED_BEFORE_ANSWER
+        try:
+            pdu =""",
+        """answer = "ok"
+        try:
+            pdu =""",
+        "The journal says that a drive took a value, and nobody knows.",
+        (f"{GATEWAY}::test_what_the_end_of_serve_cuts_short_is_not_kept_as_done",),
+    ),
+    Defect(
         "foreign-start-unrecorded",
         "tui/session/gateway/started.py",
         "await asyncio.to_thread(self._keeper.begin, session, order)",

@@ -73,6 +73,22 @@ DEFECTS = (
         ("tests/session/test_writing.py::test_a_lost_answer_is_completed_once_the_drive_is_read",),
     ),
     Defect(
+        "setting-cut-short-is-kept-as-done",
+        "tui/session/settings/write.py",
+        "answer, lost = CUT_SHORT, True",
+        "pass",
+        "A setting that a stop cut short stands in the journal as taken.",
+        ("tests/session/test_writing.py::test_a_write_that_a_stop_cuts_short_is_not_kept_as_done",),
+    ),
+    Defect(
+        "exchange-cut-short-is-kept-as-done",
+        "tui/session/blocks/exchange.py",
+        "answer, lost = CUT_SHORT, True",
+        "pass",
+        "Words of a block that a stop cut short stand in the journal as taken.",
+        ("tests/session/test_exchange.py::test_what_a_stop_cuts_short_is_not_kept_as_done",),
+    ),
+    Defect(
         "lost-answer-completed-by-another-write",
         "tui/session/image.py",
         "self._asked_of.pop(code, None)\n            self._doubted",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import AsyncIterator, Mapping
+from collections.abc import AsyncIterator, Coroutine, Mapping
 from contextlib import asynccontextmanager
 from typing import Any
 
@@ -24,6 +24,9 @@ from tui.session.blocks.outputs import Meant, meant, refuse_pending
 from tui.session.blocks.write import AssignmentRefused
 from tui.session.command.commander import Commander
 from tui.session.command.stop import Stopper
+from tui.session.journal import Entry
+from tui.session.journal_entries import CUT_SHORT
+from tui.session.journal_reading import read_journal
 from tui.session.monitor.monitor import Monitor
 from tui.session.settings.write import NotTaken
 from tui.session.starts.keeper import StartKeeper
@@ -259,6 +262,36 @@ async def test_a_write_block_that_stands_for_something_else_is_found_out() -> No
 
 
 # A stop
+
+
+async def test_what_a_stop_cuts_short_is_not_kept_as_done(monkeypatch: pytest.MonkeyPatch) -> None:
+    with bench("atv71", sets={"CHCF": 1}) as here:
+        _, outputs = await both(here)
+        task = await unanswered(monkeypatch, here, exchange(here, outputs, {"ACC": 45}))
+        task.cancel()
+        await asyncio.wait([task])
+        (kept,) = [e for e in here.journal.recent if e.code == "ACC"]
+        assert (kept.answer, kept.read_back) == (CUT_SHORT, None)
+        here.session.image.confirm("ACC", 45, here.session.clock.monotonic())
+        assert here.journal.flush(60)
+        *_, later = [e for e in read_journal(here.journal.files) if isinstance(e, Entry)]
+        assert (later.kind, later.of, later.read_back) == ("read-back", kept.time, 45)
+
+
+async def unanswered(
+    monkeypatch: pytest.MonkeyPatch, here: Bench, work: Coroutine[Any, Any, Any]
+) -> asyncio.Task[Any]:
+    """Work whose write has begun and gets no answer."""
+    begun = asyncio.Event()
+
+    async def write(*_: Any, **__: Any) -> None:
+        begun.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(here.session.line, "write", write)
+    task = asyncio.create_task(work)
+    await begun.wait()
+    return task
 
 
 async def settled(block_editor: BlockEditor) -> str:

@@ -22,6 +22,7 @@ from tui.session.gateway.gateway import Gateway
 from tui.session.gateway.line import NONE_NAMED, GatewayLine
 from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
 from tui.session.gateway.started import StartedMotors
+from tui.session.gateway.writes import ENDED_BEFORE_ANSWER
 from tui.session.journal import Journal
 from tui.simulator import DriveSpec, Simulation
 
@@ -148,6 +149,25 @@ async def test_a_setting_that_is_allowed_is_written_and_in_the_journal(bench: Ma
     assert await made.write(ACC + 1, 57) == 1  # DEC is another
     assert await made.write(ACC, 60000) == 3
     assert made.written() == [(ACC, 57)]
+
+
+async def test_what_the_end_of_serve_cuts_short_is_not_kept_as_done(
+    bench: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made = bench(writes=allowed_codes("ACC"))
+    begun = asyncio.Event()
+
+    async def unanswered(*_: object, **__: object) -> None:
+        begun.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(made.line, "write", unanswered)
+    task = asyncio.create_task(made.write(ACC, 57))
+    await begun.wait()
+    task.cancel()
+    await asyncio.wait([task])
+    (entry,) = made.journal.recent
+    assert (entry.code, entry.answer) == ("ACC", ENDED_BEFORE_ANSWER)
 
 
 async def test_all_is_no_command(bench: Make) -> None:

@@ -16,6 +16,7 @@ from tui.bus.requests import WriteOne
 from tui.session.arming import NotArmed
 from tui.session.drive import DriveSession
 from tui.session.journal import Entry, Journal
+from tui.session.journal_entries import CUT_SHORT
 from tui.session.journal_reading import completed, read_journal
 from tui.session.read.reader import Reader
 from tui.session.settings.write import NotTaken, Writer
@@ -265,6 +266,29 @@ async def test_a_lost_answer_is_completed_once_the_drive_is_read(
     came = "Taken: it holds 5.0 s" if taken else "Not taken: it holds 3.0 s"
     assert entry.answer == f"{lost.answer} {came}, read back later."
     assert entry.read_back == later.read_back
+
+
+async def test_a_write_that_a_stop_cuts_short_is_not_kept_as_done(
+    line: WilfulLine,
+    session: DriveSession,
+    journal: Journal,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    begun = asyncio.Event()
+
+    async def unanswered(*_: object, **__: object) -> None:
+        begun.set()
+        await asyncio.Event().wait()
+
+    monkeypatch.setattr(line, "write", unanswered)
+    work = writer(session, journal).write_parameter(PROFILE["ACC"], 50, why="setting")
+    task = asyncio.create_task(work)
+    await begun.wait()
+    task.cancel()
+    await asyncio.wait([task])
+    await Reader(session).read(["ACC"])
+    cut, later = told_of(journal)
+    assert (cut.answer, later.answer) == (CUT_SHORT, "Not taken: it holds 3.0 s, read back later.")
 
 
 async def test_a_word_that_the_drive_may_change_is_told_and_not_judged(

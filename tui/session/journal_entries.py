@@ -8,6 +8,9 @@ from tui.drive.shown import shown_text
 from .drive import DriveSession
 from .journal import Entry, now_text
 
+CUT_SHORT = "a stop came: not known whether it was taken"
+"""What is kept of a write that was ended before its answer."""
+
 
 def raw_text(session: DriveSession, parameter: Parameter, raw: int | None) -> str:
     """A raw value as a person reads it; nothing for None."""

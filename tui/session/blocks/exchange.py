@@ -6,6 +6,7 @@ slots are read before and after, and each parameter is read back.
 
 from __future__ import annotations
 
+import asyncio
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -19,7 +20,7 @@ from tui.drive.values import from_words, to_words
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal
-from ..journal_entries import parameter_entry, raw_text
+from ..journal_entries import CUT_SHORT, parameter_entry, raw_text
 from ..read.retrying_reader import RetryingReader
 from ..settings.write import NotTaken, Writer
 from ..starts.keeper import record_start
@@ -155,6 +156,9 @@ class _Exchange:
             raise
         except LineError as error:
             answer, lost = str(error), not isinstance(error, DeviceException)
+            raise
+        except asyncio.CancelledError:
+            answer, lost = CUT_SHORT, True
             raise
         finally:
             self.session.note_command()

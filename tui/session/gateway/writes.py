@@ -44,6 +44,7 @@ from .rules import GatewayRules
 
 log = logging.getLogger(__name__)
 
+ENDED_BEFORE_ANSWER = "serve ended: not known whether it was taken"
 JUST_READ = 2.0
 """Seconds up to which a word counts as read just now."""
 
@@ -187,11 +188,12 @@ class GatewayWrite:
 
     async def _send_alone(self, one: ForeignWord) -> None:
         self._stop()
-        answer = "ok"
+        answer = ENDED_BEFORE_ANSWER
         try:
             await self._session.line.write(
                 self._session.device, one.address, [one.word], priority=Priority.STOP
             )
+            answer = "ok"
         except LineError as error:
             answer = str(error)
             raise
@@ -205,9 +207,11 @@ class GatewayWrite:
             self._stop()
         parameters = _each(foreign_words(self._session.profile, self._asked.words, {}))
         before = {one.code: self._session.image.get(one.code) for one in parameters}
-        answer = "ok"
+        answer = ENDED_BEFORE_ANSWER
         try:
-            return await self._exchange(priority, parameters)
+            pdu = await self._exchange(priority, parameters)
+            answer = "ok"
+            return pdu
         except LineError as error:
             answer = str(error)
             if isinstance(error, RequestRefused):

@@ -15,7 +15,7 @@ from tui.drive.values import from_words, is_field, to_words, word_count
 
 from ..drive import DriveSession
 from ..journal import Entry, Journal, now_text
-from ..journal_entries import parameter_entry, raw_text
+from ..journal_entries import CUT_SHORT, parameter_entry, raw_text
 from ..read.reader import Reader
 from ..work import Permit
 
@@ -87,7 +87,7 @@ class Writer:
             answer, lost = str(error), True
             raise
         except asyncio.CancelledError:
-            answer, lost = "a stop came: not known whether it was taken", True
+            answer, lost = CUT_SHORT, True
             raise
         finally:
             old = before.raw if before is not None else None
