@@ -9,7 +9,8 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer
 from tui.session.drive import DriveSession
-from tui.session.read.reader import PLANS_KEPT, Reader
+from tui.session.read.kept_plans import PLANS_KEPT
+from tui.session.read.reader import Reader
 from tui.session.reading import Quality, Rating
 
 from .fakes import BlockDrive, OneDrive, parameter, profile_of

@@ -23,8 +23,8 @@ from tui.drive.shown import shown
 from tui.drive.values import NOT_AVAILABLE, from_words, word_count
 
 from ..drive import DriveSession
+from ..read.kept_plans import USUAL_TURNAROUND
 from ..read.proof import SURE, SlotEvidence
-from ..read.reader import USUAL_TURNAROUND
 from ..read.retrying_reader import RetryingReader
 from ..read.verdict import SlotMatch
 from ..reading import Reading

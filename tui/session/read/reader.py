@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Hashable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from tui.bus.api import ModbusLine, Priority, Reply
 from tui.bus.errors import DeviceException, NoAnswer
-from tui.bus.link import TcpLink, character_time, silence
 from tui.drive.chart import read_chart
 from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.profile.schema import Block, Parameter
-from tui.drive.read_plan import ReadPlan, ReadRequest, WireTiming, plan_reads
+from tui.drive.read_plan import ReadPlan, ReadRequest
 from tui.drive.values import from_words, word_count
 
 from ..drive import DriveSession
 from ..reading import Origin, Reading
 from .decoding import Decoding, sources_of
+from .kept_plans import KeptPlans
 from .slots import Slots
 
 SOURCE_AGE = 5.0
 """Seconds for which a poll trusts a word that others' values depend on; an operator's read
 never does."""
-USUAL_TURNAROUND = 0.005
-"""Seconds that a drive takes to answer, until it is measured."""
-TURNAROUND_STEP = 0.001
-PLANS_KEPT = 64
-"""Read plans that are remembered; sets of codes and turnarounds change without end."""
 ASK_AGAIN = 30.0
 """Seconds after which a poll asks again for a parameter that the drive refused."""
 
@@ -47,12 +42,11 @@ class Reader:
     """A poll takes what was read for another program up to so many seconds ago."""
     _met: set[str] = field(default_factory=set)
     """Unconfirmed words that this drive has answered."""
-    _plans: dict[tuple[Hashable, ...], ReadPlan] = field(default_factory=dict)
-    _planned_for: float = 0.0
-    """Turnaround in seconds that plans count with, while it is about that."""
+    _plans: KeptPlans = field(init=False)
     _slots: Slots = field(init=False)
 
     def __post_init__(self) -> None:
+        self._plans = KeptPlans(self.session)
         self._slots = Slots(self.line, self.device, self.profile, self.session.clock)
 
     @property
@@ -92,13 +86,13 @@ class Reader:
     def seconds(self, codes: Iterable[str]) -> float:
         """What reading these costs on the wire by plan, without retries."""
         sure, unsure = self._by_trust(frozenset(codes).difference(self.session.image.refused))
-        return self._plan(sure, self.in_force).seconds + self._plan(unsure).seconds
+        return self._plans.plan(sure, self.in_force).seconds + self._plans.plan(unsure).seconds
 
     def groups(self, codes: Iterable[str]) -> list[tuple[str, ...]]:
         """The codes that come in one request each."""
         wanted = frozenset(codes).difference(self.session.image.refused)
         trusts = self._by_trust(wanted)
-        requests = [request for trust in trusts for request in self._plan(trust).requests]
+        requests = [request for trust in trusts for request in self._plans.plan(trust).requests]
         return [tuple(place.code for place in request.places) for request in requests]
 
     def forget(self) -> None:
@@ -155,8 +149,8 @@ class Reader:
         image = self.session.image
         sure, unsure = self._by_trust(codes.difference(image.refused, found))
         slots = self.in_force if priority >= Priority.POLL else {}
-        found.update(await self._follow(self._plan(sure, slots), priority))
-        for request in self._plan(unsure).requests:
+        found.update(await self._follow(self._plans.plan(sure, slots), priority))
+        for request in self._plans.plan(unsure).requests:
             found.update(await self._exchange_unsure(request, priority))
         for code in codes.difference(found):
             found[code] = await self._alone(self.profile[code], priority)
@@ -217,31 +211,6 @@ class Reader:
         oldest = self.session.clock.monotonic() - ASK_AGAIN
         refused = self.session.image.refused
         return {c: r for c, r in refused.items() if c in codes and (r.silent or r.time > oldest)}
-
-    def _plan(self, codes: frozenset[str], slots: Mapping[str, int] | None = None) -> ReadPlan:
-        refused, turnaround = frozenset(self.session.image.refused), self._turnaround()
-        key = (codes, refused, turnaround, tuple(sorted((slots or {}).items())))
-        if key not in self._plans:
-            timing = self._timing(turnaround)
-            while len(self._plans) >= PLANS_KEPT:
-                del self._plans[next(iter(self._plans))]
-            self._plans[key] = plan_reads(self.profile, sorted(codes), timing, slots, refused)
-        return self._plans[key]
-
-    def _turnaround(self) -> float:
-        """The drive's measured turnaround in steps, so that plans do not change for nothing."""
-        measured = self.line.device_state(self.device).usual_turnaround
-        if measured is None:
-            return USUAL_TURNAROUND
-        if abs(measured - self._planned_for) > max(TURNAROUND_STEP, self._planned_for / 3):
-            self._planned_for = round(measured / TURNAROUND_STEP) * TURNAROUND_STEP
-        return self._planned_for
-
-    def _timing(self, turnaround: float) -> WireTiming:
-        link = self.line.link
-        if isinstance(link, TcpLink):
-            return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
-        return WireTiming(character_time(link), silence(link), turnaround)
 
     async def _exchange(self, request: ReadRequest, priority: Priority) -> dict[str, Reading]:
         """The raw values of one planned request.

@@ -1,0 +1,59 @@
+"""Read plans of one drive, made anew when what they count with has changed."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+
+from tui.bus.link import TcpLink, character_time, silence
+from tui.drive.read_plan import ReadPlan, WireTiming, plan_reads
+
+from ..drive import DriveSession
+
+USUAL_TURNAROUND = 0.005
+"""Seconds that a drive takes to answer, until it is measured."""
+TURNAROUND_STEP = 0.001
+PLANS_KEPT = 64
+"""Read plans that are remembered; sets of codes and turnarounds change without end."""
+
+
+class KeptPlans:
+    """Plans by the codes, the slots, what the drive refuses and how fast it answers."""
+
+    def __init__(self, session: DriveSession) -> None:
+        self._session = session
+        self._kept: dict[tuple[Hashable, ...], ReadPlan] = {}
+        self._turnaround = 0.0
+        """Seconds that plans count with, while the measured turnaround is about that."""
+
+    def __len__(self) -> int:
+        return len(self._kept)
+
+    def clear(self) -> None:
+        """Make all of them anew."""
+        self._kept.clear()
+
+    def plan(self, codes: frozenset[str], slots: Mapping[str, int] | None = None) -> ReadPlan:
+        """The plan for reading these codes, with the slots of blocks that may be used."""
+        refused, turnaround = frozenset(self._session.image.refused), self._measured()
+        key = (codes, refused, turnaround, tuple(sorted((slots or {}).items())))
+        if key not in self._kept:
+            while len(self._kept) >= PLANS_KEPT:
+                del self._kept[next(iter(self._kept))]
+            profile, timing = self._session.profile, self._timing(turnaround)
+            self._kept[key] = plan_reads(profile, sorted(codes), timing, slots, refused)
+        return self._kept[key]
+
+    def _measured(self) -> float:
+        """The drive's measured turnaround in steps, so that plans do not change for nothing."""
+        measured = self._session.line.device_state(self._session.device).usual_turnaround
+        if measured is None:
+            return USUAL_TURNAROUND
+        if abs(measured - self._turnaround) > max(TURNAROUND_STEP, self._turnaround / 3):
+            self._turnaround = round(measured / TURNAROUND_STEP) * TURNAROUND_STEP
+        return self._turnaround
+
+    def _timing(self, turnaround: float) -> WireTiming:
+        link = self._session.line.link
+        if isinstance(link, TcpLink):
+            return WireTiming(character=0.0, silence=0.0, turnaround=turnaround)
+        return WireTiming(character_time(link), silence(link), turnaround)
