@@ -51,6 +51,22 @@ DEFECTS = (
         ),
     ),
     Defect(
+        "slots-of-before-the-block-believed",
+        "tui/session/read/reader.py",
+        "raws = await self._exchange(check.request, priority, since)",
+        "raws = await self._exchange(check.request, priority)",
+        "Slots that another program changed are taken as they were: one value stands as another.",
+        ("tests/session/test_slots.py::test_slots_that_were_read_before_the_block_are_read_again",),
+    ),
+    Defect(
+        "block-of-before-its-slots-believed",
+        "tui/session/read/reader.py",
+        "since = self._slots.learned if self._block_of(request) else -math.inf",
+        "since = -math.inf",
+        "Words of slots that were changed since are told by the new ones.",
+        ("tests/session/test_slots.py::test_a_block_that_was_read_before_its_slots_is_read_again",),
+    ),
+    Defect(
         "equal-zeros-prove-a-slot",
         "tui/session/read/proof.py",
         'return left[0] if len(left) == 1 and self._confirmed(slot, left[0]) else ""',

@@ -6,19 +6,25 @@ import asyncio
 import itertools
 import time
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
 from typing import Protocol
 
 import pytest
+import pytest_asyncio
 
 from tests.programs import rtu_tcp
+from tui.bus.api import ModbusLine, Priority
 from tui.drive.profile import library
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
+from tui.session.read.reader import Reader
 from tui.session.reading import Quality
 from tui.simulator import DriveSpec, LineTiming, Simulation
 
+INPUTS = next(b.address for b in library.load("atv71").data.blocks if b.direction == "read")
+"""Where the words of the scanner's inputs begin."""
 SCATTERED = {"NCV": 7, "VCAL": 2, "INV": 120, "LSP": 41, "HSP": 523, "ACC": 37, "DEC": 59}
 """Words of an Altivar 71 that lie apart from each other and stay as they are set."""
 
@@ -105,6 +111,59 @@ async def test_the_scanner_is_used_as_soon_as_it_saves_time(start: Start) -> Non
     assert monitor.reader.seconds(words) < before / 2
     assert not wrong(snapshots, words)
     monitor.stop()
+
+
+@dataclass(slots=True)
+class Shared:
+    """A drive that another program reads as well: what that got is taken for a minute."""
+
+    simulation: Simulation
+    line: ModbusLine
+    reader: Reader
+    codes: list[str]
+    words: dict[str, int]
+
+    def change_slots(self) -> None:
+        """Turn the order of what the scanner brings round."""
+        for slot, address in assignment(self.codes[::-1]).items():
+            self.simulation.drive(1).set(slot, address)
+
+    async def another_reads(self, address: int) -> None:
+        """Another program has just read the words from an address on."""
+        count = len(self.codes)
+        await self.line.read(1, address, count, priority=Priority.POLL, max_age=1e-9)
+
+    async def read(self) -> dict[str, int]:
+        """What the reader tells that is not so."""
+        found = await self.reader.read(self.codes, priority=Priority.POLL)
+        good = {code: one.raw for code, one in found.items() if one.quality is Quality.GOOD}
+        return {code: raw for code, raw in good.items() if raw not in (None, self.words[code])}
+
+
+@pytest_asyncio.fixture
+async def shared(start: Start) -> Shared:
+    words = scattered(6)
+    codes = list(words)
+    simulation, opened = start(DriveSpec("atv71", 1, sets=words | assignment(codes)))
+    reader = Reader(DriveSession(opened.line, 1, library.load("atv71")), max_age=60.0)
+    await reader.learn_slots()
+    made = Shared(simulation, opened.line, reader, codes, words)
+    assert await made.read() == {}
+    assert reader.using == "Scanner inputs"
+    return made
+
+
+async def test_slots_that_were_read_before_the_block_are_read_again(shared: Shared) -> None:
+    shared.change_slots()
+    await shared.another_reads(INPUTS)
+    assert await shared.read() == {}
+
+
+async def test_a_block_that_was_read_before_its_slots_is_read_again(shared: Shared) -> None:
+    shared.change_slots()
+    await shared.another_reads(library.load("atv71")["NMA1"].address)
+    await shared.reader.learn_slots()
+    assert await shared.read() == {}
 
 
 async def test_a_scanner_changed_under_way_never_shows_one_value_as_another(start: Start) -> None:

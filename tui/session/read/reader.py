@@ -120,7 +120,12 @@ class Reader:
 
     async def compare_slots(self) -> None:
         """Go on to prove what an indirect block brings, by a few requests. Raises line errors."""
-        await self._slots.compare(self._poll)
+        # before and behind the block is what was read then, not for somebody else meanwhile
+        shared, self.max_age = self.max_age, 0.0
+        try:
+            await self._slots.compare(self._poll)
+        finally:
+            self.max_age = shared
 
     def compare_soon(self) -> None:
         """The drive does something else now: what looked alike in its block may no longer."""
@@ -164,10 +169,14 @@ class Reader:
             used = (self._block_of(request) for request in plan.requests)
             self.using = next((block.name for block in used if block), "")
         for request in plan.requests:
-            found.update(await self._exchange(request, priority))
+            # what a block brought before its slots were read may be of other slots
+            since = self._slots.learned if self._block_of(request) else -math.inf
+            found.update(await self._exchange(request, priority, since))
             self._slots.heard()
         for check in plan.checks:
-            raws = await self._exchange(check.request, priority)
+            # and slots that were read before the block say nothing of what it brought
+            since = max((found[c].time for c in check.governs if c in found), default=-math.inf)
+            raws = await self._exchange(check.request, priority, since)
             if {code: raw.raw for code, raw in raws.items()} != check.slots:
                 self._slots.forget()
                 for code in check.governs:
@@ -212,8 +221,10 @@ class Reader:
         refused = self.session.image.refused
         return {c: r for c, r in refused.items() if c in codes and (r.silent or r.time > oldest)}
 
-    async def _exchange(self, request: ReadRequest, priority: Priority) -> dict[str, Reading]:
-        """The raw values of one planned request.
+    async def _exchange(
+        self, request: ReadRequest, priority: Priority, since: float = -math.inf
+    ) -> dict[str, Reading]:
+        """The raw values of one planned request, read since a time.
 
         Where the drive refuses a longer read, or answers a word with the one that stands for
         "no value", the parameter is asked for alone: only then is the answer certain.
@@ -227,7 +238,7 @@ class Reader:
                 request.count,
                 priority=priority,
                 function=request.function,
-                max_age=self.max_age if priority >= Priority.POLL else 0.0,
+                max_age=self._oldest(priority, since),
             )
         except DeviceException as refusal:
             if several:
@@ -243,6 +254,12 @@ class Reader:
             if alone or unknown not in words:
                 found[place.code] = self._reading(parameter, words, reply.time, priority)
         return found
+
+    def _oldest(self, priority: Priority, since: float) -> float:
+        """The greatest age in seconds of what is taken in place of a read."""
+        if priority < Priority.POLL:
+            return 0.0
+        return max(0.0, min(self.max_age, self.session.clock.monotonic() - since))
 
     def _block_of(self, request: ReadRequest) -> Block | None:
         """The block or scanner that a request reads; None where it asks parameters directly."""

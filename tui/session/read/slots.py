@@ -8,6 +8,7 @@ parameters at a time, with direct reads of everything that could stand in it.
 
 from __future__ import annotations
 
+import math
 from collections import deque
 from collections.abc import Awaitable, Callable, Iterable, Mapping
 from dataclasses import dataclass, field
@@ -84,6 +85,8 @@ class Slots:
     device: int
     profile: Profile
     clock: Clock
+    learned: float = -math.inf
+    """When the slots of a scanner were read last (session's clock)."""
     _known: dict[str, int] = field(default_factory=dict)
     _comparisons: dict[str, _Comparison] = field(default_factory=dict)
     """By the id of the block; forgotten whenever the drive may have been reset."""
@@ -128,6 +131,7 @@ class Slots:
             raws = {c: r.raw for c, r in readings.items() if r.raw is not None}
             if block.effective == "at-once":
                 self._known.update(raws)
+                self.learned = max((r.time for r in readings.values()), default=self.learned)
             elif self.clock.monotonic() - self._doubted > CALM:
                 fresh = _Comparison(block, SlotEvidence(self.profile, block))
                 self._comparisons.setdefault(block.id, fresh).choose(raws, self.clock.monotonic())
