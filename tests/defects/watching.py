@@ -59,6 +59,17 @@ DEFECTS = (
         ("tests/session/test_slots.py::test_slots_that_were_read_before_the_block_are_read_again",),
     ),
     Defect(
+        "own-reading-taken-for-a-new-one",
+        "tui/session/read/reader.py",
+        "self.session.clock.monotonic() - max(newest, since)",
+        "self.session.clock.monotonic() - since",
+        "A value that was read in the cycle before is told as not read now.",
+        (
+            "tests/session/test_slots.py"
+            "::test_what_was_read_by_oneself_is_read_again_and_by_another_is_not",
+        ),
+    ),
+    Defect(
         "block-of-before-its-slots-believed",
         "tui/session/read/reader.py",
         "since = self._slots.learned if self._block_of(request) else -math.inf",

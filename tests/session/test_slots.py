@@ -166,6 +166,19 @@ async def test_a_block_that_was_read_before_its_slots_is_read_again(shared: Shar
     assert await shared.read() == {}
 
 
+async def test_what_was_read_by_oneself_is_read_again_and_by_another_is_not(
+    shared: Shared,
+) -> None:
+    reads = len(shared.line.trace)
+    assert await shared.read() == {}
+    assert len(shared.line.trace) > reads
+    await shared.another_reads(INPUTS)
+    await shared.another_reads(library.load("atv71")["NMA1"].address)
+    reads = len(shared.line.trace)
+    assert await shared.read() == {}
+    assert len(shared.line.trace) == reads
+
+
 async def test_a_scanner_changed_under_way_never_shows_one_value_as_another(start: Start) -> None:
     words = scattered(6)
     codes = list(words)

@@ -238,7 +238,7 @@ class Reader:
                 request.count,
                 priority=priority,
                 function=request.function,
-                max_age=self._oldest(priority, since),
+                max_age=self._longest(request, priority, since),
             )
         except DeviceException as refusal:
             if several:
@@ -255,11 +255,13 @@ class Reader:
                 found[place.code] = self._reading(parameter, words, reply.time, priority)
         return found
 
-    def _oldest(self, priority: Priority, since: float) -> float:
-        """The greatest age in seconds of what is taken in place of a read."""
-        if priority < Priority.POLL:
+    def _longest(self, request: ReadRequest, priority: Priority, since: float) -> float:
+        """The greatest age in seconds of what is taken in place of a read: nothing known before."""
+        if priority < Priority.POLL or not self.max_age:
             return 0.0
-        return max(0.0, min(self.max_age, self.session.clock.monotonic() - since))
+        held = (self.session.image.get(place.code) for place in request.places)
+        newest = max((one.time for one in held if one is not None), default=-math.inf)
+        return max(0.0, min(self.max_age, self.session.clock.monotonic() - max(newest, since)))
 
     def _block_of(self, request: ReadRequest) -> Block | None:
         """The block or scanner that a request reads; None where it asks parameters directly."""
