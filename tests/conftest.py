@@ -18,6 +18,8 @@ from tui.bus.line import Timing, timing_of
 from tui.bus.link import Link
 from tui.cli.shared.logs import stop_logging
 
+from .compiled import compile_tests
+
 # each worker and each program of a test would compile all that it imports again
 sys.dont_write_bytecode = False
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
@@ -28,6 +30,12 @@ FOLDERS = count()
 
 settings.register_profile("drivepanel", deadline=None)
 settings.load_profile("drivepanel")
+
+
+@pytest.hookimpl(optionalhook=True)
+def pytest_xdist_setupnodes() -> None:
+    """Called once, before the workers begin."""
+    compile_tests()
 
 
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:

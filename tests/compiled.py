@@ -1,0 +1,51 @@
+"""The tests compiled once, before several workers begin: each would compile all of them itself.
+
+What pytest does to the asserts of a module costs more than to import it. On a fresh checkout ten
+workers did that at the same time, each for all modules.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+TESTS = Path(__file__).resolve().parent
+FEW = 20
+"""Modules that are not compiled yet and may as well be by each worker."""
+COLLECT = (sys.executable, "-m", "pytest", "--collect-only", "-qq", "-p", "no:cacheprovider")
+AT_ONCE = 2
+
+
+def compile_tests() -> None:
+    """Have the modules of tests compiled, unless most of them are; what fails, workers tell."""
+    missing = [path for path in TESTS.rglob("test_*.py") if not is_compiled(path)]
+    if len(missing) > FEW:
+        halves = [part for part in dealt(missing, AT_ONCE) if part]
+        collecting = [
+            subprocess.Popen(
+                [*COLLECT, *map(str, part)],
+                cwd=TESTS.parent, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+            )
+            for part in halves
+        ]  # fmt: skip
+        for one in collecting:
+            one.wait()
+
+
+def is_compiled(path: Path) -> bool:
+    """Whether pytest has kept what it made of a module."""
+    kept = path.parent / "__pycache__"
+    return any(kept.glob(f"{path.stem}.{sys.implementation.cache_tag}-pytest-*.pyc"))
+
+
+def dealt(paths: Sequence[Path], parts: int) -> list[list[Path]]:
+    """The modules in so many parts that are about as long."""
+    made: list[list[Path]] = [[] for _ in range(parts)]
+    length = [0] * parts
+    for path in sorted(paths, key=lambda one: one.stat().st_size, reverse=True):
+        shortest = length.index(min(length))
+        made[shortest].append(path)
+        length[shortest] += path.stat().st_size
+    return made
