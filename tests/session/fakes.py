@@ -6,6 +6,7 @@ from collections.abc import Mapping
 
 import msgspec
 
+from tui.bus.api import Priority, Reply
 from tui.bus.fake import FakeLine
 from tui.bus.fake_device import FakeDevice
 from tui.bus.requests import Read
@@ -31,6 +32,23 @@ class OneDrive(FakeLine):
     def __init__(self, registers: Mapping[int, int], *, device: int = 1) -> None:
         super().__init__({device: registers})
         self.device = device
+
+    async def read(
+        self,
+        device: int,
+        address: int,
+        count: int = 1,
+        *,
+        priority: Priority = Priority.POLL,
+        function: int = 3,
+        max_age: float = 0.0,
+        within: float | None = None,
+    ) -> Reply:
+        await self.before_read(device, range(address, address + count), priority)
+        return await super().read(device, address, count, priority=priority, function=function)
+
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        """What a drive of a test does before it answers; what it raises is what comes."""
 
     @property
     def registers(self) -> dict[int, int]:

@@ -11,7 +11,6 @@ from typing import Any
 
 from tui.bus.api import Priority
 from tui.bus.errors import NoAnswer, RequestRefused
-from tui.bus.line import Reply
 from tui.drive.profile import library
 from tui.session.command.commander import Commander
 from tui.session.drive import DriveSession
@@ -44,21 +43,10 @@ class SlowDrive(OneDrive):
         self.before_write: Callable[[int], None] = lambda _address: None
         self._coming: list[int] = []
 
-    async def read(
-        self,
-        device: int,
-        address: int,
-        count: int = 1,
-        *,
-        priority: Priority = Priority.POLL,
-        function: int = 3,
-        max_age: float = 0.0,
-        within: float | None = None,
-    ) -> Reply:
-        if address <= STATUS < address + count and self._coming:
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        if STATUS in registers and self._coming:
             self.registers[STATUS] = self._coming.pop(0)
         await asyncio.sleep(0)
-        return await super().read(device, address, count, priority=priority, function=function)
 
     async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
         if (forbidden := how.get("forbidden")) is not None and (why := forbidden()):

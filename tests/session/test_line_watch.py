@@ -11,7 +11,7 @@ from typing import Any, cast
 
 import pytest
 
-from tui.bus.api import DeviceState, LineWorker, Priority, Reply
+from tui.bus.api import DeviceState, LineWorker, Priority
 from tui.session.drive import DriveSession
 from tui.session.monitor.line_watch import LineWatch
 from tui.session.monitor.monitor import Monitor
@@ -49,21 +49,9 @@ class HeardLine(OneDrive):
         self.looked: list[tuple[int, Priority]] = []
         self.workers: list[LineWorker] = []
 
-    async def read(
-        self,
-        device: int,
-        address: int,
-        count: int = 1,
-        *,
-        priority: Priority = Priority.POLL,
-        function: int = 3,
-        max_age: float = 0.0,
-        within: float | None = None,
-    ) -> Reply:
-        self.looked.append((address, priority))
-        reply = await super().read(device, address, count, priority=priority, function=function)
-        self.heard = reply.time
-        return reply
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        self.looked.append((registers.start, priority))
+        self.heard = time.monotonic()
 
     def device_state(self, device: int) -> DeviceState:
         return replace(super().device_state(device), heard=self.heard)

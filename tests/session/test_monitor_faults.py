@@ -11,7 +11,7 @@ from typing import Any
 
 import pytest
 
-from tui.bus.api import LineWorker, Priority, Reply
+from tui.bus.api import LineWorker, Priority
 from tui.bus.errors import LineLost, NoAnswer
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import FORGOTTEN_AFTER, Monitor
@@ -67,22 +67,11 @@ class FaultyLine(OneDrive):
         """What was asked, whether it came or not."""
         self.task: asyncio.Task[object] | None = None
 
-    async def read(
-        self,
-        device: int,
-        address: int,
-        count: int = 1,
-        *,
-        priority: Priority = Priority.POLL,
-        function: int = 3,
-        max_age: float = 0.0,
-        within: float | None = None,
-    ) -> Reply:
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
         fault = self.faults.pop(0) if self.faults else None
-        self.addresses.append(address)
+        self.addresses.append(registers.start)
         if fault is not None:
             raise fault
-        return await super().read(device, address, count, priority=priority, function=function)
 
     def spawn(self, work: Callable[[], Coroutine[Any, Any, object]], name: str) -> LineWorker:
         worker = super().spawn(work, name)

@@ -12,7 +12,6 @@ import pytest
 
 from tui.bus.api import Priority
 from tui.bus.errors import RequestRefused
-from tui.bus.line import Reply
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.session.clock import Clock
@@ -67,17 +66,7 @@ class WatchingDrive(OneDrive):
         self.asked_by: list[Priority] = []
         self._heard = math.inf
 
-    async def read(
-        self,
-        device: int,
-        address: int,
-        count: int = 1,
-        *,
-        priority: Priority = Priority.POLL,
-        function: int = 3,
-        max_age: float = 0.0,
-        within: float | None = None,
-    ) -> Reply:
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
         hushed = self.facts.hushed.get(device)
         if hushed and priority is not Priority.STOP:
             raise RequestRefused(hushed[1])
@@ -91,7 +80,6 @@ class WatchingDrive(OneDrive):
         if len(self.asked_by) == 12:
             self.at_twelfth()
         self.clock.now += EXCHANGE
-        return await super().read(device, address, count, priority=priority, function=function)
 
     async def write(self, device: int, address: int, values: Sequence[int], **how: Any) -> float:
         self._heard = self.clock.monotonic()

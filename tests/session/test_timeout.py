@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from tui.bus.api import Priority, Reply
+from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.drive.profile import library
 from tui.session.drive import DriveSession
@@ -40,23 +40,12 @@ class Ports(OneDrive):
         self.silent, self.refused = silent, refused
         self.read_so_far: list[int] = []
 
-    async def read(
-        self,
-        device: int,
-        address: int,
-        count: int = 1,
-        *,
-        priority: Priority = Priority.POLL,
-        function: int = 3,
-        max_age: float = 0.0,
-        within: float | None = None,
-    ) -> Reply:
-        self.read_so_far.append(address)
-        if self.silent in range(address, address + count):
-            raise NoAnswer(device, function, address)
-        if self.refused in range(address, address + count):
-            raise DeviceException(device, function, address, code=2)
-        return await super().read(device, address, count, priority=priority, function=function)
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        self.read_so_far.append(registers.start)
+        if self.silent in registers:
+            raise NoAnswer(device, 3, registers.start)
+        if self.refused in registers:
+            raise DeviceException(device, 3, registers.start, code=2)
 
 
 def session_of(line: OneDrive, **rules: Any) -> DriveSession:
