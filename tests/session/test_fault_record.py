@@ -15,13 +15,22 @@ def watched(made: Bench) -> Recorder:
     return recorder
 
 
+def speed(made: Bench) -> float:
+    """What Monitor shows, in Hz."""
+    assert made.console.latest is not None
+    return made.console.latest.readings["RFR"].number or 0.0
+
+
 async def test_a_trip_freezes_values_and_writes_of_the_seconds_before() -> None:
     async with bench("atv71") as made:
         recorder = watched(made)
-        made.commander.refer("20Hz")
+        made.commander.refer("10Hz")
         await made.done()
         await made.order("forward")
-        await made.until(lambda: made.drive.motor.frequency > 5)
+        await made.until(lambda: speed(made) > 5)
+        made.commander.refer("20Hz")
+        await made.done()
+        await made.until(lambda: speed(made) > 15)
         assert recorder.latest is None
         made.drive.provoke("ObF")
         await made.until(lambda: recorder.latest is not None)
