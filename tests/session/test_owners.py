@@ -51,6 +51,11 @@ class Bench:
         """The line."""
         return self.fleet.line
 
+    async def arm(self) -> None:
+        """Arm; a state that is not fresh is read before."""
+        self.console.commander.arm()
+        await until(lambda: self.session.arming.armed)
+
     def writes(self) -> list[tuple[int, int]]:
         """Register and word of every write of one word so far."""
         sent = [f.data for f in self.line.trace if f.direction == "out" and f.data[1] == 6]

@@ -46,7 +46,7 @@ async def test_an_emergency_stop_that_a_drive_lacks_becomes_its_quick_stop_and_s
 async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
     async with bench("atv71") as here:
         commander = here.console.commander
-        commander.arm()
+        await here.arm()
         commander.run("forward", "20Hz")
         await until(lambda: here.drive.motor.frequency > 5)
         await until(lambda: not here.session.work.busy)
@@ -60,7 +60,7 @@ async def test_after_our_own_stop_nobody_else_is_blamed() -> None:
 async def test_another_programs_stop_is_told_with_the_word() -> None:
     async with bench("atv71") as here:
         commander = here.console.commander
-        commander.arm()
+        await here.arm()
         commander.run("forward", "20Hz")
         await until(lambda: here.drive.motor.frequency > 5)
         await until(lambda: not here.session.work.busy)
@@ -75,7 +75,7 @@ async def test_a_step_past_a_limit_goes_to_the_limit(steps: int, ends: int) -> N
     """40 held Up wrote nothing once the sum lay above HSP."""
     async with bench("atv71", sets={"HSP": 500, "LSP": 0}) as here:
         commander = here.console.commander
-        commander.arm()
+        await here.arm()
         commander.refer("30Hz")
         await until(lambda: here.drive.raw("LFR") == 300)
         commander.step(Decimal(steps))
@@ -85,7 +85,7 @@ async def test_a_step_past_a_limit_goes_to_the_limit(steps: int, ends: int) -> N
 async def test_a_run_that_the_interlock_refuses_writes_no_reference() -> None:
     async with bench("atv71", sets={"FR1": 1, "LFR": 0}) as here:
         commander = here.console.commander
-        commander.arm()
+        await here.arm()
         commander.run("forward", "20Hz")
         await until(lambda: here.session.work.outcome is not None)
         assert here.session.work.outcome is not None
