@@ -21,7 +21,7 @@ from tui.session.blocks.editor import BlockEditor
 
 from .fakes import press
 from .test_command_flows import Bench, bench
-from .test_flows import shown, until
+from .test_flows import arm, shown, until
 from .test_parameter_flows import open_file
 from .walk import every_step
 
@@ -82,7 +82,7 @@ async def test_pick_move_write_and_verify() -> None:
         assert made.drive().raw("NMA2") == 8604
         await made.pilot.press("w")
         await message(made, "Not armed")
-        await made.pilot.press("a")
+        await arm(made.pilot)
         await until(made.pilot, lambda: " ARMED" in shown(made.app, "strip"))
         await write(made)
         await message(made, "Written and read back: NMA2, NMA3", "Lost at power-off")
@@ -114,7 +114,8 @@ async def test_nothing_is_written_while_the_motor_turns_and_stop_works_here() ->
 async def test_a_change_by_somebody_else_is_seen_and_not_overwritten() -> None:
     async with bench("atv71") as made:
         await to_blocks(made)
-        await made.pilot.press("a", "down", "down")
+        await arm(made.pilot)
+        await made.pilot.press("down", "down")
         await pick(made, "lcr")
         made.drive().set("NMA1", 9001)
         await until(made.pilot, lambda: "ACC" in shown(made.app, "first"))
@@ -153,7 +154,7 @@ async def test_outputs_are_written_when_armed_only() -> None:
         await until(made.pilot, lambda: "DEC" in shown(made.app, "second"))
         await made.pilot.press("X")
         await message(made, "Not armed")
-        await made.pilot.press("a")
+        await arm(made.pilot)
         await answer(made, "X", "ACC=5.5")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
@@ -183,7 +184,7 @@ async def test_an_indirect_block_waits_for_a_reset() -> None:
         await pick(made, "fd01")
         await made.pilot.press("down")
         await pick(made, "fd00")
-        await made.pilot.press("a")
+        await arm(made.pilot)
         await write(made)
         await message(made, "after the drive's next reset")
         await until(made.pilot, lambda: "pending" in shown(made.app, "first"))

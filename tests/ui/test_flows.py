@@ -56,6 +56,14 @@ async def until(pilot: Pilot[None], holds: Callable[[], bool], seconds: float = 
         await pilot.pause(0.05)
 
 
+async def arm(pilot: Pilot[None]) -> None:
+    """Press the key that arms; a state that is not fresh is read first."""
+    app = pilot.app
+    assert isinstance(app, DrivePanelApp)
+    await pilot.press("a")
+    await until(pilot, lambda: app.chosen is not None and app.chosen.session.arming.armed)
+
+
 def picture(app: App[None]) -> str:
     """The screen on top, as text."""
     return "\n".join(strip.text for strip in app.screen._compositor.render_strips())

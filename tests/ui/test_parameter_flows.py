@@ -23,7 +23,7 @@ from tui.screens.parameters.screen import ParametersScreen
 from . import fakes
 from .fakes import press
 from .test_command_flows import Bench, bench, writes
-from .test_flows import shown, until
+from .test_flows import arm, shown, until
 from .test_parameter_pictures import editor_of, failed, panel
 
 
@@ -100,7 +100,8 @@ async def test_find_edit_write_and_read_back() -> None:
         assert made.drive().raw("ACC") == 30
         await made.pilot.press("w")
         await message(made, "Not armed")
-        await made.pilot.press("a", "w")
+        await arm(made.pilot)
+        await made.pilot.press("w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
         await message(made, "1 written and read back")
@@ -273,7 +274,8 @@ async def test_back_up_change_compare_stage_and_write(
         await until(made.pilot, lambda: "2 staged" in shown(made.app, "status"))
         if not isinstance(made.app.screen, ParametersScreen):
             await made.pilot.press("escape")
-        await made.pilot.press("a", "w")
+        await arm(made.pilot)
+        await made.pilot.press("w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await made.pilot.press("y")
         await message(made, "2 written and read back")
@@ -310,7 +312,9 @@ async def test_the_panel_follows_a_drive_to_its_new_address() -> None:
         await find(made, parameter.code)
         await made.pilot.press("enter")
         await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
-        await made.pilot.press("7", "enter", "a", "w")
+        await made.pilot.press("7", "enter")
+        await arm(made.pilot)
+        await made.pilot.press("w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         assert "new settings only" in str(made.app.screen.query_one("#follows").render())
         await made.pilot.press("y")
@@ -362,7 +366,8 @@ async def test_behind_a_failure_the_rest_is_asked_about(key: str) -> None:
         await until(made.pilot, lambda: {"TFR", "ACC"} <= set(screen.editor.values.raws))
         screen.editor.staging.stage("TFR", "65")  # at standstill only, so it fails
         screen.editor.staging.stage("ACC", "4")
-        await made.pilot.press("a", "w")
+        await arm(made.pilot)
+        await made.pilot.press("w")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         await until(made.pilot, lambda: "Write 2 parameters?" in question(made))
         await made.pilot.press("y")

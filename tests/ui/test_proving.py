@@ -5,14 +5,15 @@ from __future__ import annotations
 from tui.screens.dialogs.confirm import Confirm
 
 from .test_command_flows import bench
-from .test_flows import shown, until
+from .test_flows import arm, shown, until
 
 
 async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
     async with bench("atv312", sets={"ttO": 10}) as made:
         await made.pilot.press("6", "P")
         await until(made.pilot, lambda: "Not armed" in shown(made.app, "said"))
-        await made.pilot.press("a", "P")
+        await arm(made.pilot)
+        await made.pilot.press("P")
         await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
         assert "It takes about 5 s" in str(made.app.screen.query("#follows").first().render())
         await made.pilot.press("escape")
@@ -28,6 +29,8 @@ async def test_p_asks_and_the_drive_is_left_alone_until_it_reacts() -> None:
 
 async def test_where_nothing_would_show_it_says_so_and_asks_nothing() -> None:
     async with bench("atv312", sets={"SLL": 0}) as made:
-        await made.pilot.press("6", "a", "P")
+        await made.pilot.press("6")
+        await arm(made.pilot)
+        await made.pilot.press("P")
         await until(made.pilot, lambda: "no fault follows" in shown(made.app, "said"))
         assert not isinstance(made.app.screen, Confirm)

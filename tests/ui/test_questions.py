@@ -29,7 +29,7 @@ from tui.widgets.motor_now import motor_now
 from . import fakes
 from .test_command_flows import Bench, bench
 from .test_command_flows import writes as writes
-from .test_flows import shown, until
+from .test_flows import arm, shown, until
 
 MOMENT = 0.3
 """Seconds before which Enter and y are no answers, by the rules of the panel's hands."""
@@ -294,7 +294,8 @@ async def write_parameters(made: Bench) -> None:
     await until(made.pilot, lambda: " raw " in shown(made.app, "detail"))
     await made.pilot.press("minus")
     await until(made.pilot, lambda: "1 staged" in shown(made.app, "status"))
-    await made.pilot.press("a", "w")
+    await arm(made.pilot)
+    await made.pilot.press("w")
 
 
 async def factory(made: Bench) -> None:
@@ -302,7 +303,8 @@ async def factory(made: Bench) -> None:
     await made.pilot.press("3")
     await until(made.pilot, lambda: isinstance(made.app.screen, ParametersScreen))
     await until(made.pilot, lambda: bool(shown(made.app, "table")))
-    await made.pilot.press("a", "F")
+    await arm(made.pilot)
+    await made.pilot.press("F")
 
 
 async def save(made: Bench) -> None:
@@ -324,7 +326,9 @@ async def control_source(made: Bench) -> None:
     await made.pilot.press("6")
     await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))
     await until(made.pilot, lambda: "reading" not in shown(made.app, "now"))
-    await made.pilot.press("down", "a", "enter")
+    await made.pilot.press("down")
+    await arm(made.pilot)
+    await made.pilot.press("enter")
 
 
 async def hand_back(made: Bench) -> None:
