@@ -20,7 +20,7 @@ from dataclasses import dataclass, field
 
 from tests.answering import read_answering
 from tests.bus.peer import tcp_request_length
-from tests.programs import wait_until
+from tests.programs import PATIENCE, wait_until
 from tui.simulator import DriveSpec, Simulation
 
 ROWS, COLUMNS = 24, 80
@@ -191,10 +191,28 @@ class PtyPanel:
             raise AssertionError(f"{late}:\n{self.text()}") from None
 
     def settle(self, seconds: float = 0.6) -> None:
-        """Let whatever was typed have its effect; nothing tells that nothing comes any more."""
+        """Let whatever was typed have its effect; nothing tells that nothing comes any more.
+
+        On a busy computer the panel may not even have read it yet.
+        """
+        end = time.monotonic() + PATIENCE
+        while self.unread() and self.look() and time.monotonic() < end:
+            pass
         end = time.monotonic() + seconds
         while time.monotonic() < end:
             self.look()
+
+    def unread(self) -> int:
+        """How many bytes of what was typed the panel has not taken yet; 0 once it has ended."""
+        try:
+            side = os.open(f"/proc/{self.pid}/fd/0", os.O_RDONLY | os.O_NOCTTY | os.O_NONBLOCK)
+        except OSError:
+            return 0
+        try:
+            told = fcntl.ioctl(side, termios.FIONREAD, bytes(4))
+        finally:
+            os.close(side)
+        return int.from_bytes(told, sys.byteorder)
 
     @property
     def armed(self) -> bool:
