@@ -18,6 +18,7 @@ from tui.bus.line import Line
 from tui.bus.shared_facts import SharedFacts
 from tui.drive.profile import library
 from tui.session.arming import ARMED_FOR
+from tui.session.clock import Clock
 from tui.session.drive import DriveSession
 
 from .fake_clock import FakeClock
@@ -95,6 +96,25 @@ def test_what_is_known_grows_old(session: DriveSession) -> None:
     # what the line has told before is as old as it is, however late it is asked for
     session.image.confirm("DEC", 40, clock.of_line(time.monotonic()))
     assert session.image.age("DEC") < 60
+
+
+def test_a_moment_has_one_time_of_day_unless_the_clock_is_set() -> None:
+    class Told(Clock):
+        now, ahead = 100.0, 5000.0
+
+        def monotonic(self) -> float:
+            return self.now
+
+        def wall(self) -> float:
+            return self.now + self.ahead
+
+    clock = Told()
+    assert clock.wall_of(99.0) == 5099.0
+    # the two are asked one after the other, and the time of day is steered
+    clock.now, clock.ahead = 101.0, 5000.001
+    assert clock.wall_of(99.0) == 5099.0
+    clock.ahead = 4000.0
+    assert clock.wall_of(99.0) == 4099.0
 
 
 async def test_a_sleeper_wakes_when_the_clock_is_moved_on() -> None:

@@ -6,12 +6,18 @@ import asyncio
 import time
 from datetime import datetime
 
+SET_BY = 0.1
+"""Seconds by which the time of day has to move against the other one to count as set anew."""
+
 
 class Clock:
     """Monotonic seconds for ages, the time of day for people; for any thread.
 
     The line keeps the real clock, as its wires and devices do.
     """
+
+    _apart = 0.0
+    """What the time of day is ahead of monotonic seconds."""
 
     def monotonic(self) -> float:
         """Seconds that only go forward."""
@@ -20,6 +26,16 @@ class Clock:
     def wall(self) -> float:
         """Seconds since 1970."""
         return time.time()
+
+    def wall_of(self, moment: float) -> float:
+        """When a monotonic moment was, in seconds since 1970.
+
+        The same for one moment, whenever it is asked for, unless the computer's time was set.
+        """
+        apart = self.wall() - self.monotonic()
+        if abs(apart - self._apart) > SET_BY:
+            self._apart = apart
+        return moment + self._apart
 
     def time_of_day(self) -> str:
         """The local time in 24 h."""

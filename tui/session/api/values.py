@@ -59,7 +59,6 @@ class Sample:
 
 def told_value(reading: Reading, clock: Clock) -> DriveValue:
     """A reading as a script has it."""
-    wall = clock.wall() - reading.age(clock.monotonic())
     return DriveValue(
         reading.parameter.code,
         reading.value.number if reading.value is not None else None,
@@ -67,6 +66,6 @@ def told_value(reading: Reading, clock: Clock) -> DriveValue:
         reading.unit,
         reading.raw,
         reading.quality is Quality.GOOD,
-        datetime.fromtimestamp(wall, UTC),
+        datetime.fromtimestamp(clock.wall_of(reading.time), UTC),
         reading.error,
     )

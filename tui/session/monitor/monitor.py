@@ -148,8 +148,8 @@ class Monitor:
         if (latest := self._latest) is None:
             return
         clock = self.session.clock
-        now, wall = clock.monotonic(), clock.wall()
-        snapshot = replace(latest, time=now, wall=wall, rate=0.0, error=text)
+        now = clock.monotonic()
+        snapshot = replace(latest, time=now, wall=clock.wall_of(now), rate=0.0, error=text)
         self._latest = snapshot
         self._hand_out(snapshot)
 
@@ -256,7 +256,7 @@ class Monitor:
         snapshot = Snapshot(
             cycle=cycle,
             time=now,
-            wall=self.session.clock.wall(),
+            wall=self.session.clock.wall_of(now),
             readings=aged,
             state=drive_state(self.profile, aged),
             rate=0.0 if error else 1.0 / span,
