@@ -200,8 +200,11 @@ async def _stop_all(
 
     Every address is first asked once, shortly, before any is asked with patience: a silent one
     takes seconds to rule out, and meanwhile motors turn. A silent address is a failure where a
-    drive is known to be there: named, simulated, or started from here.
+    drive is known to be there: named, simulated, or started from here. It has all patience, as
+    one has that says anything; others are asked once more, as a search does.
     """
+    from tui.bus.api import Priority
+    from tui.bus.errors import LineError
     from tui.session.command.stop import Stopper
 
     journal = told_journal()
@@ -212,17 +215,24 @@ async def _stop_all(
     expected = set(named) or {*opened.devices, *started}
     # motors that were started from here turn most likely
     left = sorted(devices, key=lambda device: device not in started)
+    likely = set(expected)
     worst = 0
     try:
         for patient in (False, True):
             asked, left = left, []
             for device in asked:
+                patience = Priority.BACKGROUND
+                if patient:
+                    patience = Priority.OPERATOR_READ if device in likely else Priority.PATIENT
                 try:
-                    found = await found_at(opened, device, profile_id, patient=patient)
+                    found = await found_at(opened, device, profile_id, patience)
                 except Failure as failure:
                     telling.failed(device, None, failure.message, failure.status)
                     worst = max(worst, failure.status)
                     continue
+                except LineError:
+                    likely.add(device)
+                    found = None
                 if found is None:
                     left.append(device)
                     continue

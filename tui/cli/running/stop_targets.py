@@ -14,6 +14,7 @@ from ..shared.errors import DRIVE_REFUSED, LINE_TROUBLE, Failure
 from ..shared.options import Target, unidentified
 
 if TYPE_CHECKING:
+    from tui.bus.api import Priority
     from tui.drive.profile.profile import Profile
     from tui.drive.profile.schema import OrderId
     from tui.session.command.first_stop import FirstStop
@@ -144,27 +145,29 @@ async def remembered(opened: OpenLine) -> dict[int, str]:
 
 
 async def found_at(
-    opened: OpenLine, device: int, profile_id: str | None, *, patient: bool
+    opened: OpenLine, device: int, profile_id: str | None, patience: Priority
 ) -> StoppableDrive | None:
-    """The drive at an address; None where nobody answers yet.
+    """The drive at an address; None where nobody answers.
 
-    Raises Failure where it cannot be stopped, and why.
+    What comes but is no answer is asked for anew with an operator's patience. Raises Failure where
+    the drive cannot be stopped, and why; where it is asked shortly, LineError for no answer.
     """
     from tui.bus.api import LineStatus, Priority
     from tui.bus.errors import LineError, NoAnswer
     from tui.session.connect.identify import identify_drive
 
-    priority = Priority.OPERATOR_READ if patient else Priority.BACKGROUND
-    if opened.line.state.status is LineStatus.LOST or device in opened.line.facts.hushed:
-        # nothing else goes past an owner that is frozen, or to a drive that is left alone
-        priority = Priority.STOP
+    # nothing else goes past an owner that is frozen, or to a drive that is left alone
+    past = opened.line.state.status is LineStatus.LOST or device in opened.line.facts.hushed
     try:
+        priority = Priority.STOP if past else patience
         identity = await identify_drive(opened.line, device, priority=priority)
     except NoAnswer:
         return None
     except LineError as error:
-        if not patient:
-            return None  # asked again, with patience
+        if patience is Priority.BACKGROUND:
+            raise
+        if patience is Priority.PATIENT:
+            return await found_at(opened, device, profile_id, Priority.OPERATOR_READ)
         raise Failure(f"Device {device}: NOT STOPPED: {error}", LINE_TROUBLE) from error
     if (found := await asyncio.to_thread(_session, opened, identity, profile_id)) is not None:
         if profile_id is not None and (wrong := _wrongly_named(identity, profile_id)):
