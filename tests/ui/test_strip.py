@@ -98,6 +98,16 @@ def test_without_a_drive_the_strip_tells_the_line() -> None:
     assert "load  74 %" in line
 
 
+def test_a_long_name_of_a_line_hides_nothing_that_is_told_of_it() -> None:
+    path = "/dev/serial/by-id/usb-FTDI_FT232R_USB_UART_A50285BI-if00-port0 19200 8E1"
+    view = StripView(line=f"{path} · only listened to", load=0.74, clock="14:02:11")
+    told = strip_line(view, 80).plain
+    assert told.startswith(" Drive Panel · …BI-if00-port0 19200 8E1 · only listened to ")
+    assert len(told) == 80
+    short = StripView(line="/dev/ttyUSB0 19200 8E1 · only listened to", clock="14:02:11")
+    assert " · /dev/ttyUSB0 19200 8E1 · only listened to " in strip_line(short, 80).plain
+
+
 @pytest.mark.parametrize("width", [60, 72, 79, 80, 120])
 @pytest.mark.parametrize("chosen", [place for place, _, _ in PLACES])
 def test_every_tab_has_its_key_and_fits(width: int, chosen: str) -> None:

@@ -9,6 +9,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
+from rich.cells import cell_len
 from rich.style import Style
 from rich.text import Text
 
@@ -39,6 +40,9 @@ RIGHT_WIDTH, NARROW_RIGHT = 24, 13
 NARROW = 72
 """Columns below which these are short."""
 NAME_WIDEST = 44
+BETWEEN = " · "
+NAME_LEAST = 12
+"""Cells that the end of a line's name keeps; where that is too many it is cut behind."""
 STRIP_STYLES: Mapping[str, Style] = {
     "running": RUNNING,
     "fault": FAULT_BLOCK,
@@ -94,8 +98,10 @@ def strip_line(view: StripView, width: int) -> Text:
     if view.drive is None:
         left = Text(no_wrap=True)
         left.append(" Drive Panel", STRONG)
-        left.append(f" · {plain(view.line)}" if view.line else "", FAINT)
-        left.truncate(max(0, width - right.cell_len - 1), overflow="ellipsis")
+        room = max(0, width - right.cell_len - 1)
+        told = _line_text(plain(view.line), room - left.cell_len - len(BETWEEN))
+        left.append(f"{BETWEEN}{told}" if told else "", FAINT)
+        left.truncate(room, overflow="ellipsis")
     else:
         left = _drive(view.drive, width)
         left.truncate(max(0, width - right.cell_len))
@@ -103,6 +109,17 @@ def strip_line(view: StripView, width: int) -> Text:
     left.append_text(right)
     left.truncate(width)
     return left
+
+
+def _line_text(line: str, room: int) -> str:
+    """The line in so many cells: its long name loses its beginning, what is told of it nothing."""
+    name, between, more = line.partition(BETWEEN)
+    left = room - cell_len(between + more)
+    if cell_len(name) <= left or left < NAME_LEAST:
+        return line
+    while cell_len(name) >= left:
+        name = name[1:]
+    return f"…{name}{between}{more}"
 
 
 def _drive(drive: DriveNow, width: int) -> Text:
