@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import signal
 from collections.abc import Iterator
+from contextlib import nullcontext
 from typing import Any
 
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE, drivepanel, served, wait_until
 from tests.sweeps import kept
+from tui.cli.shared.ending import to_its_end
+from tui.cli.shared.errors import DONE, DRIVE_REFUSED, Failure
+from tui.session.connect.open_line import OpenLine
 
 from .commands import ended, held, put, refused, run, tcp_line
 
@@ -182,6 +187,38 @@ def test_what_a_signal_ends_says_it_too(atv21: str, number: signal.Signals) -> N
     with served((*DRIVEPANEL, "watch", atv21, "FD01"), ready="FD01") as program:
         status, said = program.end(number)
     assert (status, "F803 runs" in said) == (SIGNALS[number], True)
+
+
+@pytest.mark.parametrize("failure", ["", "The drive refused it."])
+def test_a_signal_that_comes_while_it_is_said_takes_nothing_from_what_was_done(
+    monkeypatch: pytest.MonkeyPatch, failure: str
+) -> None:
+    """It ended with a traceback and status 1, the answer of the command lost."""
+    came: list[int] = []
+    tasks: list[asyncio.Future[int]] = []
+    monkeypatch.setattr("tui.cli.shared.signals.cancelled_by_signal", lambda _: nullcontext(came))
+
+    async def interrupted(_opened: object) -> None:
+        came.append(signal.SIGTERM)
+        asyncio.get_running_loop().call_soon(tasks[0].cancel)
+        await asyncio.sleep(PATIENCE)
+
+    async def work() -> int:
+        if failure:
+            raise Failure(failure, DRIVE_REFUSED)
+        return DONE
+
+    async def command() -> int:
+        tasks.append(asyncio.ensure_future(to_its_end([OpenLine.__new__(OpenLine)], work)))
+        return await tasks[0]
+
+    monkeypatch.setattr("tui.cli.shared.left_alone.say_farewells", interrupted)
+    if failure:
+        with pytest.raises(Failure, match=failure):
+            asyncio.run(command())
+    else:
+        assert asyncio.run(command()) == DONE
+    assert came
 
 
 def test_hold_in_json() -> None:

@@ -85,11 +85,19 @@ DEFECTS = (
     ),
     Defect(
         "farewell-not-said-after-an-error",
-        "tui/cli/shared/options.py",
-        "        finally:\n            await asyncio.gather(",
-        "        else:\n            await asyncio.gather(",
+        "tui/cli/shared/ending.py",
+        "        finally:\n            try:",
+        "        else:\n            try:",
         "A command that fails leaves a time-out running and says nothing of it.",
         (f"{LEFT}::test_it_is_told_where_the_command_failed",),
+    ),
+    Defect(
+        "signal-takes-what-was-done",
+        "tui/cli/shared/ending.py",
+        "                if not came:\n                    raise\n",
+        "                raise\n",
+        "A command that has written all ends with a traceback and status 1 by a late SIGTERM.",
+        (f"{LEFT}::test_a_signal_that_comes_while_it_is_said_takes_nothing_from_what_was_done",),
     ),
     Defect(
         "silent-address-of-a-stop-counts-as-stopped",

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import functools
-from collections.abc import Callable, Coroutine, Sequence
+from collections.abc import Callable, Coroutine
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import click
 
 from .completion import complete_profile
 from .devices import CommandFunction, Option, device_option, several_devices_option
+from .ending import to_its_end
 from .line_argument import mind_the_drive, mind_the_line, takes_line
 from .looking_after import guard_motors
 from .say import say
@@ -177,27 +178,6 @@ def on_line(
         raise NoAnswer(error.device, error.function, error.address, f"{error} {hint}") from error
     finally:
         opened.close()
-
-
-async def to_its_end(lines: Sequence[OpenLine], work: Callable[[], Coroutine[Any, Any, T]]) -> T:
-    """Do the work; whatever becomes of it, say what drives do that are asked no more.
-
-    Raises Exit with 128 and the number of a signal that ended it.
-    """
-    from .left_alone import say_farewells
-    from .signals import cancelled_by_signal
-
-    task = asyncio.current_task()
-    assert task is not None
-    with cancelled_by_signal(task) as came:
-        try:
-            return await work()
-        except asyncio.CancelledError:
-            if not came:
-                raise
-            raise click.exceptions.Exit(128 + came[0]) from None
-        finally:
-            await asyncio.gather(*(say_farewells(one) for one in lines))
 
 
 def usual_settings(profile_id: str | None) -> UsualSettings | None:
