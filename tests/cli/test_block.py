@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import re
+import signal
 from collections.abc import Iterator
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
 import pytest
+
+from tui.bus.errors import LineLost
+from tui.drive.profile.schema import Parameter
+from tui.session.settings.write import Writer
 
 from . import commands
 from .commands import tcp_line
@@ -119,6 +126,37 @@ def test_a_running_motor_keeps_its_assignment() -> None:
         said = refused(5, line, "set", "NMA3=LCR", "--arm", "-d", "2")
         assert "motor stopped only" in said
         assert "Nothing was written" in said
+
+
+def test_what_a_signal_cuts_short_is_told_by_slot(
+    line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nothing was told of the slots that were written by then."""
+    came = nullcontext([signal.SIGTERM])
+    monkeypatch.setattr("tui.cli.shared.signals.cancelled_by_signal", lambda _: came)
+    fail_write(monkeypatch, "NMA4", asyncio.CancelledError())
+    said = refused(143, line, "set", "NMA3=LCR", "NMA4=OTR", "NMA5=THD", "--arm", "-d", "2")
+    assert "Slots written and read back: NMA3. NMA4 may have been written too: look at it." in said
+
+
+def test_a_line_that_is_lost_meanwhile_is_no_refusal(
+    line: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fail_write(monkeypatch, "NMA4", LineLost("The owner ended."))
+    said = refused(3, line, "set", "NMA3=LCR", "NMA4=OTR", "--arm", "-d", "2")
+    assert "NMA4 was not taken: The owner ended. Written before: NMA3." in said
+
+
+def fail_write(monkeypatch: pytest.MonkeyPatch, code: str, error: BaseException) -> None:
+    """Let the writing of one parameter end in an error, before anything is sent."""
+    honest = Writer.write_parameter
+
+    async def failing(self: Writer, parameter: Parameter, raw: int, **how: Any) -> None:
+        if parameter.code == code:
+            raise error
+        await honest(self, parameter, raw, **how)
+
+    monkeypatch.setattr(Writer, "write_parameter", failing)
 
 
 def test_the_indirect_block_counts_after_a_reset() -> None:

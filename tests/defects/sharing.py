@@ -8,6 +8,8 @@ STOPS = "tests/bus/test_share_stops.py"
 GATEWAYS = "tests/bus/test_share_gateways.py"
 FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
+MAPPING = "tests/session/test_mapping.py"
+BLOCK = "tests/cli/test_block.py"
 
 DEFECTS = (
     Defect(
@@ -252,5 +254,37 @@ DEFECTS = (
         "return False",
         "After a standstill of the program an old value has the time of now.",
         (f"{STOPS}::test_an_answer_that_waited_for_a_stopped_program_is_asked_for_anew",),
+    ),
+    Defect(
+        "lost-slot-not-looked-at",
+        "tui/session/blocks/write.py",
+        "            await self._see_taken(step, error)",
+        "            raise",
+        "The owner of the line ends, and a block stays half written though the line goes on.",
+        (f"{MAPPING}::test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once",),
+    ),
+    Defect(
+        "slots-written-before-not-told",
+        "tui/session/blocks/write.py",
+        "            raise AssignmentRefused(self.so_far(str(lost), sent=step.slot)) from lost",
+        "            raise lost from None",
+        "A scanner is half written, and the person is told of one slot only.",
+        (f"{MAPPING}::test_what_was_written_before_the_line_was_lost_is_told",),
+    ),
+    Defect(
+        "slots-cut-short-not-told",
+        "tui/cli/commands/block.py",
+        "            complain(_cut_short(sent))",
+        "            pass",
+        "Ctrl-C leaves a scanner half written, without a word.",
+        (f"{BLOCK}::test_what_a_signal_cuts_short_is_told_by_slot",),
+    ),
+    Defect(
+        "lost-line-of-a-block-is-a-refusal",
+        "tui/cli/commands/block.py",
+        "isinstance(cause, LineError | NotTaken)",
+        "isinstance(cause, NotTaken)",
+        "A script takes a line that was lost for a refusal, and does not try again.",
+        (f"{BLOCK}::test_a_line_that_is_lost_meanwhile_is_no_refusal",),
     ),
 )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import pytest
@@ -13,7 +13,7 @@ import pytest
 from tests.blocks import block_of
 from tests.programs import rtu_tcp
 from tests.session.sets_bench import Bench, bench
-from tui.bus.errors import DeviceException, RequestRefused
+from tui.bus.errors import DeviceException, LineError, LineLost, NoAnswer, RequestRefused
 from tui.bus.line import Reply
 from tui.drive.blocks.assignment import Assignment, empty, factory
 from tui.drive.blocks.picking import pick
@@ -368,6 +368,61 @@ async def test_somebody_else_between_two_slots() -> None:
         with pytest.raises(AssignmentRefused, match="NMA4 was changed meanwhile"):
             await write(here, plan)
         assert here.drive.raw("NMA4") == 9001
+
+
+LOST = {"line": LineLost("The program that owned it ended."), "answer": NoAnswer(1, 6, 12703)}
+
+
+def lose_answer(here: Bench, slot: str, error: LineError, *, taken: bool) -> list[int]:
+    """From now on no write of that slot is answered; what was sent there."""
+    honest, lost, sent = here.session.line.write, here.profile[slot].address, list[int]()
+
+    async def silent(device: int, address: int, words: Iterable[int], **how: object) -> float:
+        if address != lost:
+            return await honest(device, address, words, **how)  # type: ignore[arg-type]
+        sent.extend(words)
+        if taken:
+            await honest(device, address, words, **how)  # type: ignore[arg-type]
+        raise error
+
+    here.session.line.write = silent  # type: ignore[assignment, method-assign]
+    return sent
+
+
+@pytest.mark.parametrize("error", LOST.values(), ids=LOST)
+@pytest.mark.parametrize("taken", [True, False])
+async def test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once(
+    error: LineError, taken: bool
+) -> None:
+    with bench("atv71") as here:
+        sent = lose_answer(here, "NMA3", error, taken=taken)
+        plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
+        if taken:
+            assert "Written and read back: NMA3, NMA4." in await write(here, plan)
+        else:
+            with pytest.raises(AssignmentRefused, match=r"NMA3 was not taken.*Nothing") as told:
+                await write(here, plan)
+            assert told.value.__cause__ is error
+        assert sent == [3204]
+
+
+async def test_what_was_written_before_the_line_was_lost_is_told() -> None:
+    with bench("atv71") as here:
+        lose_answer(here, "NMA4", LOST["line"], taken=True)
+        plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
+        honest = here.session.line.write
+
+        async def then_lost(*what: object, **how: object) -> float:
+            try:
+                return await honest(*what, **how)  # type: ignore[arg-type]
+            except LineLost:
+                here.lose_line()
+                raise
+
+        here.session.line.write = then_lost  # type: ignore[method-assign]
+        says = r"NMA4 was sent: .*ended.*Written before: NMA3"
+        with pytest.raises(AssignmentRefused, match=says):
+            await write(here, plan)
 
 
 async def test_a_read_only_line_writes_nothing() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,15 @@ import click
 
 from ..shared.block_output import show_blocks, show_neighbours
 from ..shared.block_plans import Wanted, plans_of
-from ..shared.errors import DIFFERENT, DONE, DRIVE_REFUSED, REFUSED_HERE, Failure, told
+from ..shared.errors import (
+    DIFFERENT,
+    DONE,
+    DRIVE_REFUSED,
+    REFUSED_HERE,
+    Failure,
+    status_of,
+    told,
+)
 from ..shared.options import (
     Target,
     connect_drive,
@@ -22,7 +31,7 @@ from ..shared.options import (
 )
 from ..shared.say import say
 from ..shared.sets import dry_run_option, write_down
-from .orders import arm_option, close_journal, need_arming, permit_of, told_journal
+from .orders import arm_option, close_journal, complain, need_arming, permit_of, told_journal
 
 if TYPE_CHECKING:
     from tui.drive.blocks.assignment import Assignment
@@ -164,7 +173,7 @@ def _save(session: DriveSession, line_text: str, views: list[BlockView], wanted:
 
 
 async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
-    from tui.bus.errors import DeviceException
+    from tui.bus.errors import LineError
     from tui.session.blocks.write import AssignmentRefused, write_assignment
     from tui.session.settings.write import NotTaken
 
@@ -177,23 +186,35 @@ async def _write(session: DriveSession, line_text: str, wanted: Wanted) -> int:
             head = drive_json(line_text, session)
             print_json({**head, "dry_run": True, "changes": changes})
         return DONE
-    journal = told_journal()
+    journal, sent = told_journal(), dict[str, bool]()
     try:
         for plan in plans:
             done = await write_assignment(
-                session, journal, plan, permit=permit_of(session), expected=held
-            )
+                session, journal, plan, permit=permit_of(session), expected=held,
+                sent=lambda change, taken: sent.update({change.slot: taken}),
+            )  # fmt: skip
             say(f"{plan.block.name}: {done.text}", err=wanted.as_json)
-    except AssignmentRefused as error:
-        by_drive = isinstance(error.__cause__, DeviceException | NotTaken)
-        if by_drive:
-            raise Failure(str(error), DRIVE_REFUSED) from error
+    except asyncio.CancelledError:
+        if sent:
+            complain(_cut_short(sent))
         raise
+    except AssignmentRefused as error:
+        cause = error.__cause__
+        status = status_of(cause) if isinstance(cause, LineError | NotTaken) else None
+        raise Failure(str(error), status or REFUSED_HERE) from error
     finally:
         close_journal(journal)
     if wanted.as_json:
         show_blocks(session, line_text, await _looked_at(session, verify=False), as_json=True)
     return DONE
+
+
+def _cut_short(sent: dict[str, bool]) -> str:
+    """What Ctrl-C or a signal has left behind; by slot whether the drive was seen to hold it."""
+    held = ", ".join(slot for slot, taken in sent.items() if taken) or "none"
+    open_yet = ", ".join(slot for slot, taken in sent.items() if not taken)
+    rest = f" {open_yet} may have been written too: look at it." if open_yet else ""
+    return f"Slots written and read back: {held}.{rest}"
 
 
 def _judged(

@@ -1,17 +1,18 @@
 """Writing an assignment into a drive, slot by slot, each read back.
 
 Everything is looked at anew before each write. What somebody else changed meanwhile is not
-overwritten.
+overwritten. A slot whose answer was lost is looked at: it is written once, whatever became of it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tui.bus.errors import DeviceException, RequestRefused
+from tui.bus.errors import DeviceException, LineError, RequestRefused
 from tui.drive.blocks.assignment import Assignment, MappingError, SlotChange, describe, steps
 from tui.drive.blocks.slot_rules import assignment_problems, refusing
+from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import Block
 from tui.drive.settings.writable import AT_REST
 
@@ -24,7 +25,14 @@ from ..work import Permit
 
 
 class AssignmentRefused(MappingError):
-    """An assignment or an exchange that is not written, or only in part; the text says which."""
+    """An assignment or an exchange that is not written, or only in part; the text says which.
+
+    Where the drive or the line kept it from being written, their error is its cause.
+    """
+
+
+Sent = Callable[[SlotChange, bool], None]
+"""Called with each slot before it is sent, and once more (True) when the drive holds it."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,19 +66,24 @@ async def write_assignment(
     *,
     permit: Permit,
     expected: Mapping[str, int] | None = None,
+    sent: Sent = lambda _change, _held: None,
 ) -> Written:
     """Make the drive hold an assignment, with the motor at rest.
 
     `expected` are the raw values by slot that the person saw. Raises AssignmentRefused where
-    something speaks against it or the drive does not do it, RequestRefused on a read-only line,
-    and the line's other errors.
+    something speaks against it, or drive or line do not do it, and RequestRefused on a read-only
+    line.
     """
     if session.line.read_only:
         raise RequestRefused("The line is read-only: nothing is written.")
     if wrong := refusing(assignment_problems(session.profile, plan)):
         raise AssignmentRefused(" ".join(problem.text for problem in wrong))
-    work = _Writing(session, Writer(session, journal, permit), RetryingReader(session), plan)
-    return await work.carry_out(expected)
+    writer, retrying = Writer(session, journal, permit), RetryingReader(session)
+    work = _Writing(session, writer, retrying, plan, sent)
+    try:
+        return await work.carry_out(expected)
+    except LineError as error:
+        raise AssignmentRefused(work.so_far(str(error))) from error
 
 
 def at_rest_only(block: Block, headline: str) -> str:
@@ -87,6 +100,7 @@ class _Writing:
     writer: Writer
     retrying: RetryingReader
     plan: Assignment
+    sent: Sent
     done: tuple[SlotChange, ...] = ()
 
     async def carry_out(self, expected: Mapping[str, int] | None) -> Written:
@@ -100,7 +114,9 @@ class _Writing:
             now = (await self._held())[step.slot]
             if now != step.old:
                 raise self._changed(step.slot, step.old, now)
+            self.sent(step, False)
             await self._write(step)
+            self.sent(step, True)
             self.done = (*self.done, step)
         held = await self._held()
         for slot, raw in self.plan.slots.items():
@@ -116,17 +132,17 @@ class _Writing:
         missing = [slot for slot in self.plan.block.slots if slot not in held]
         if missing:
             said = self.retrying.why_absent(missing[0])
-            raise AssignmentRefused(self._so_far(f"{missing[0]} cannot be read: {said}"))
+            raise AssignmentRefused(self.so_far(f"{missing[0]} cannot be read: {said}"))
         return held
 
     async def _may(self) -> None:
         """Raise unless the motor is surely at rest, and the task may still write."""
         permit = self.writer.permit
         if permit is not None and (why := permit.refusal()):
-            raise AssignmentRefused(self._so_far(why))
+            raise AssignmentRefused(self.so_far(why))
         if await self.retrying.ask_state() not in AT_REST:
             text = at_rest_only(self.plan.block, self.retrying.headline)
-            raise AssignmentRefused(self._so_far(text))
+            raise AssignmentRefused(self.so_far(text))
 
     async def _write(self, step: SlotChange) -> None:
         profile = self.session.profile
@@ -135,18 +151,35 @@ class _Writing:
             await self.writer.write_parameter(parameter, step.new, why=self.plan.block.name.lower())
         except DeviceException as error:
             text = device_refusal(profile, parameter, error, self.retrying.headline)
-            raise AssignmentRefused(self._so_far(text)) from error
-        except NotTaken as error:
-            raise AssignmentRefused(self._so_far(str(error))) from error
+            raise AssignmentRefused(self.so_far(text)) from error
+        except (NotTaken, OrderRefused, RequestRefused) as error:
+            raise AssignmentRefused(self.so_far(str(error))) from error
+        except LineError as error:
+            await self._see_taken(step, error)
+
+    async def _see_taken(self, step: SlotChange, lost: LineError) -> None:
+        """See what became of a write without an answer; raises AssignmentRefused where it is not
+        held."""
+        try:
+            now = (await self.retrying.ask_raws([step.slot])).get(step.slot)
+        except LineError:
+            now = None
+        if now is None:
+            raise AssignmentRefused(self.so_far(str(lost), sent=step.slot)) from lost
+        if now != step.new:
+            raise AssignmentRefused(self.so_far(f"{step.slot} was not taken: {lost}")) from lost
 
     def _changed(self, slot: str, old: int | None, now: int) -> AssignmentRefused:
         profile, block = self.session.profile, self.plan.block
         was, is_now = describe(profile, block, old), describe(profile, block, now)
         text = f"{slot} was changed meanwhile by somebody else: {was} is now {is_now}."
-        return AssignmentRefused(self._so_far(f"{text} Look at it, then write again."))
+        return AssignmentRefused(self.so_far(f"{text} Look at it, then write again."))
 
-    def _so_far(self, text: str) -> str:
+    def so_far(self, text: str, *, sent: str = "") -> str:
+        """A text with the slots that were written before; `sent` may have been written too."""
+        if sent:
+            text = f"{sent} was sent: {text}"
         if not self.done:
-            return f"{text} Nothing was written."
+            return f"{text} Nothing was written{' before it' if sent else ''}."
         codes = ", ".join(dict.fromkeys(change.slot for change in self.done))
         return f"{text} Written before: {codes}."
