@@ -55,7 +55,8 @@ class Outcomes:
             return False
         request = job.request
         longest = self._devices.time_out(request.device, request.function, job.priority)
-        return self._clock() - result.sent > longest + STILL
+        # a long reply at 1200 baud is on the wire for longer than that
+        return result.turnaround + self._clock() - result.end > longest + STILL
 
     def conclude(self, job: Job, result: ExchangeResult) -> bool:
         """Note what became of a request, and hand it back; True where it is to be sent again."""

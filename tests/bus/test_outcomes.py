@@ -1,0 +1,37 @@
+"""What becomes of a request once its exchange is over; no line, no time of its own."""
+
+from __future__ import annotations
+
+import pytest
+
+from tui.bus.limits import CAUTIOUS
+from tui.bus.model import Priority, Timing
+from tui.bus.requests import Read
+from tui.bus.result import ExchangeResult, ResultKind
+from tui.bus.schedule.outcomes import Outcomes
+from tui.bus.schedule.patience import Devices
+from tui.bus.schedule.queue import Job
+from tui.bus.shared_facts import SharedFacts
+from tui.bus.tally import Tally
+
+
+@pytest.mark.parametrize(
+    ("turnaround", "on_wire", "lay", "anew"),
+    [
+        (0.005, 1.2, 0.0, False),  # 61 words at 1200 baud
+        (0.005, 4.7, 0.0, False),  # and at 300
+        (1.2, 0.02, 0.0, True),
+        (0.005, 0.02, 1.2, True),
+    ],
+)
+def test_an_answer_is_asked_for_anew_where_it_waited_and_not_where_it_is_long(
+    turnaround: float, on_wire: float, lay: float, anew: bool
+) -> None:
+    """A backup at 1200 baud asked for its first long answer again and again, without an end."""
+    timing, end = Timing(), turnaround + on_wire
+    devices, tally = Devices(timing, mistakable=True), Tally()
+    outcomes = Outcomes(devices, tally, timing, lambda: end + lay, SharedFacts(), gateway=False)
+    job = Job(Read(1, 4201, 61), Priority.BACKGROUND, CAUTIOUS)
+    devices.answered(1, job.request.expectation(), 0.005, 0.0)
+    result = ExchangeResult(ResultKind.REPLY, sent=0.0, end=end, turnaround=turnaround)
+    assert outcomes.waited_for_us(job, result) is anew
