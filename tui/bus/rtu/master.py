@@ -16,6 +16,7 @@ from ..transport.base import Transport
 from ..transport.port_errors import PortErrors
 from .exchange import RtuExchange
 from .frames import pieces
+from .notes import noted
 
 BABBLE = 1.0
 """Seconds to wait for silence on a line that never falls silent, before sending all the same."""
@@ -174,7 +175,8 @@ class RtuMaster:
         tally.resyncs += result.resynchronised
         if result.kind is not ResultKind.REPLY or result.resynchronised:
             self._count_port_errors()
-        self._log(result, data, sending.device, end)
+        for piece, note in noted(result, data, sending.device):
+            self._around.trace.add(end, "in", piece, note)
         reply = (len(result.pdu) + 3) * self._character
         result.sent, result.end = self._sent, end
         result.turnaround = max(0.0, end - self._sent - reply)
@@ -245,24 +247,6 @@ class RtuMaster:
             if piece.whole:
                 self._around.tally.stale += 1
                 self._around.stray(piece, self._last)
-
-    def _log(self, result: ExchangeResult, request: bytes, device: int, time: float) -> None:
-        trace = self._around.trace
-        if not result.received:
-            return
-        if result.pdu and len(result.received) == len(result.pdu) + 3:
-            trace.add(time, "in", result.received)
-            return
-        for piece in pieces(result.received):
-            if piece.data == request and piece.pdu != result.pdu:
-                note = "echo or answer" if result.kind is ResultKind.UNSURE else "echo"
-            elif not piece.whole:
-                note = "damaged" if result.kind is ResultKind.DAMAGED else "noise"
-            elif piece.device != device:
-                note = f"of device {piece.device}"
-            else:
-                note = "" if piece.pdu == result.pdu else "not the reply"
-            trace.add(time, "in", piece.data, note)
 
     def _count_port_errors(self) -> None:
         """Note what the port has counted since the last look; asked only where an answer fails."""
