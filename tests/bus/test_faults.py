@@ -294,6 +294,23 @@ async def test_the_silence_that_ends_a_reply_counts_from_its_last_piece(
         assert line.counters.requests == 1
 
 
+async def test_a_reply_with_a_pause_in_it_is_waited_for_as_long_as_it_is_on_the_wire(
+    open_line: OpenLine,
+) -> None:
+    """A busy computer hands a reply over in parts; the drive was asked again while it talked."""
+
+    def in_halves(request: bytes, _: int) -> Sequence[Step]:
+        whole = reply(request)
+        return [whole[:20], 0.5, whole[20:]]
+
+    timing = Timing(first_timeout=30.0, min_timeout=30.0, retries=0)
+    with PtyPeer(in_halves) as peer:
+        line = open_line(SerialLink(peer.path, 300, "8N1"), timing)
+        # 125 characters take 4 s, and 3.5 of them 0.12 s
+        assert len((await line.read(1, 5, 60, priority=OPERATOR)).words) == 60
+        assert (line.counters.requests, line.counters.checksum) == (1, 0)
+
+
 @pytest.mark.parametrize("priority", [Priority.BACKGROUND, Priority.PATIENT])
 async def test_an_empty_address_that_was_searched_is_no_failure(
     priority: Priority, open_line: OpenLine

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from .defect import Defect
 
+FAULTS = "tests/bus/test_faults.py"
+
 DEFECTS = (
     Defect(
         "checksum-not-checked",
@@ -215,5 +217,13 @@ DEFECTS = (
         "still = False",
         "An answer that came while the program was frozen is shown as that of the next request.",
         ("tests/bus/test_hostile_peers.py",),
+    ),
+    Defect(
+        "pause-ends-a-reply",
+        "tui/bus/rtu/master.py",
+        "max(time, self._sent, self._over) + self._gap",
+        "max(time, self._sent) + self._gap",
+        "A backup on a busy computer ends with a damaged answer: the drive was asked as it talked.",
+        (f"{FAULTS}::test_a_reply_with_a_pause_in_it_is_waited_for_as_long_as_it_is_on_the_wire",),
     ),
 )

@@ -52,6 +52,14 @@ class RtuExchange:
         """Whether a reply is due at all."""
         return self._expectation is not None
 
+    @property
+    def longest(self) -> int:
+        """Most characters that the reply has on the wire, with the echo before it."""
+        expectation = self._expectation
+        length = expectation.length if expectation is not None else 0
+        echo = len(self.frame) if self.echo else 0
+        return echo + (MAX_FRAME if length is None else length + 3)
+
     def feed(self, data: bytes) -> ExchangeResult | None:
         """Take received bytes; the result once the reply is whole."""
         self.buffer += data

@@ -67,6 +67,10 @@ class RtuMaster:
         self._due = 0.0
         self._action: Callable[[], None] | None = None
         self._sent = 0.0
+        self._over = 0.0
+        """When the last character of the reply that has begun is on the wire, at the latest."""
+        self._ends = 0.0
+        """When that reply is given up, should nothing more come."""
         self._idle = bytearray()
         self._early: deque[bool] = deque(maxlen=REMEMBERED)
         """Of the last replies, whether each began before its request was over."""
@@ -91,14 +95,25 @@ class RtuMaster:
             else:
                 self._sort_idle()  # others talk on and on: no silence would ever come
             return
+        self._expect_end(self._exchange, len(data), time)
         result = self._exchange.feed(data)
         while result is not None and self._came_too_early(result, time):
             result = self._exchange.pass_over(result)
         if result is not None:
             settle(self._done, result)
         elif self._exchange.expected:
-            # the echo of a long request may come in lumps while it is still being sent
-            self._start_timer(max(time, self._sent) + self._gap - time, self._fell_silent)
+            self._start_timer(self._ends - time, self._fell_silent)
+
+    def _expect_end(self, exchange: RtuExchange, came: int, time: float) -> None:
+        """Wait for the rest of what has begun: by a gap, and as long as it is on the wire.
+
+        A computer with much to do hands its bytes over with pauses in between; to ask again then
+        is to talk while the drive does. An echo may come in lumps while it is still being sent.
+        """
+        if not exchange.buffer:
+            on_wire = exchange.longest * self._character
+            self._over = time - came * self._character + on_wire
+        self._ends = max(time, self._sent, self._over) + self._gap
 
     def _came_too_early(self, result: ExchangeResult, time: float) -> bool:
         """Whether a reply began before its request was over: then it is that of another one.
@@ -219,7 +234,7 @@ class RtuMaster:
         while True:
             now = clock()
             # a lump may follow what has come; where nothing has, the time is up by itself
-            lump = self._last + self._gap if exchange.buffer else deadline
+            lump = self._ends if exchange.buffer else deadline
             until = min(max(deadline, lump), latest)
             if now >= until:
                 return exchange.expired()
