@@ -295,4 +295,12 @@ DEFECTS = (
         "A script takes a line that was lost for a refusal, and does not try again.",
         (f"{BLOCK}::test_a_line_that_is_lost_meanwhile_is_no_refusal",),
     ),
+    Defect(
+        "no-patience-with-a-slow-line",
+        "tui/cli/commands/orders.py",
+        "within = patience(console.session.line, LEARNT_WITHIN)",
+        "within = LEARNT_WITHIN",
+        "status and run fail beside a panel at 1200 baud.",
+        ("tests/cli/test_patience.py",),
+    ),
 )

@@ -18,6 +18,7 @@ from ..shared.options import (
     Target,
     connect_drive,
 )
+from ..shared.patience import patience
 from ..shared.say import say
 from ..shared.typed import refuse_if_stopped
 
@@ -40,7 +41,7 @@ PERIOD = 0.25
 FIRST_TRIES = 3
 """Cycles that may fail before the drive counts as silent."""
 LEARNT_WITHIN = 3.0
-"""Seconds in which a drive's communication time-out is read."""
+"""Seconds in which a drive's communication time-out is read on a quick line."""
 
 arm_option = click.option(
     "--arm", is_flag=True, help="Arm the drive for this command; without it nothing is written."
@@ -201,7 +202,8 @@ async def watch_of(fleet: Fleet, console: DriveConsole) -> TimeoutWatch | None:
     raw = readings[rules.timeout].raw
     if raw is None or raw in (rules.off, 0):
         return None
-    end = asyncio.get_running_loop().time() + LEARNT_WITHIN
+    within = patience(console.session.line, LEARNT_WITHIN)
+    end = asyncio.get_running_loop().time() + within
     while (watch := fleet.line_watch.watch(console.device)) is None:
         if asyncio.get_running_loop().time() > end:
             raise Failure(f"{rules.timeout} is set and could not be learnt.", LINE_TROUBLE)

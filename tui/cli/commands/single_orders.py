@@ -21,6 +21,7 @@ from ..shared.options import (
     on_line,
     read_only_option,
 )
+from ..shared.patience import patience
 from .orders import (
     COMMAND_POLL_INTERVAL,
     arm_drive,
@@ -37,7 +38,7 @@ if TYPE_CHECKING:
     from tui.session.work import Outcome
 
 FAULT_GONE_WITHIN = 3.0
-"""Seconds that a drive may take to leave its fault after a reset."""
+"""Seconds that a drive may take to leave its fault after a reset, on a quick line."""
 
 
 def _ordered(
@@ -126,7 +127,7 @@ def reset(
 
 async def _out_of_fault(console: DriveConsole, outcome: Outcome) -> None:
     """Wait until the drive shows no fault any more; raises Failure where it stays in it."""
-    end = outcome.time + FAULT_GONE_WITHIN
+    end = outcome.time + patience(console.session.line, FAULT_GONE_WITHIN)
     while True:
         latest = latest_of(console)
         fresh = latest.time > outcome.time and not latest.error

@@ -9,6 +9,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from .patience import patience
 from .say import say
 
 if TYPE_CHECKING:
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from tui.session.timeout_told import Timeout, TimeoutWatch
 
 TOLD_WITHIN = 3.0
-"""Seconds in which a drive tells its time-out at the end of a command."""
+"""Seconds in which a drive tells its time-out at the end of a command, on a quick line."""
 
 log = logging.getLogger(__name__)
 
@@ -46,7 +47,8 @@ class LeftAlone:
         session.timeout = Timeout(known=False)
         with suppress(LineError, TimeoutError):
             reading = read_timeout(Reader(session), Priority.OPERATOR_READ)
-            session.timeout = await asyncio.wait_for(reading, TOLD_WITHIN)
+            within = patience(session.line, TOLD_WITHIN)
+            session.timeout = await asyncio.wait_for(reading, within)
 
     async def tell(self) -> None:
         """Say on standard error that its time-out runs, and what follows."""

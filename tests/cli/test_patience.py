@@ -1,0 +1,41 @@
+"""What a command waits for on a line of 1200 baud that a panel uses too."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import pytest
+
+from tui.bus.link import Link, SerialLink, TcpLink
+from tui.cli.commands.orders import watch_of
+from tui.cli.shared.patience import patience
+from tui.drive.profile import library
+from tui.session.timeout_told import TimeoutWatch
+
+
+def line_to(link: Link) -> Any:
+    return SimpleNamespace(link=link)
+
+
+def test_it_is_longer_on_a_slow_line() -> None:
+    waits = [patience(line_to(SerialLink("x", baud, "8E1")), 3.0) for baud in (19200, 9600, 1200)]
+    assert [round(one, 1) for one in waits] == [3.7, 4.4, 14.0]
+    assert patience(line_to(TcpLink("host")), 3.0) == 3.0
+
+
+async def test_a_time_out_that_is_learnt_late_fails_no_status(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Beside a panel at 1200 baud status ended with "TTO is set and could not be learnt"."""
+    monkeypatch.setattr("tui.cli.commands.orders.LEARNT_WITHIN", 0.0)
+    watch, looks = TimeoutWatch(10.0, None), iter([None] * 4)
+    profile = library.load("atv71")
+
+    async def read(_codes: list[str]) -> dict[str, Any]:
+        return {"TTO": SimpleNamespace(raw=100)}
+
+    session = SimpleNamespace(profile=profile, line=line_to(SerialLink("x", 1200, "8E1")))
+    console: Any = SimpleNamespace(session=session, device=1, read=read)
+    fleet: Any = SimpleNamespace(line_watch=SimpleNamespace(watch=lambda _: next(looks, watch)))
+    assert await watch_of(fleet, console) is watch
