@@ -2,20 +2,16 @@
 
 from __future__ import annotations
 
-from collections import deque
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from statistics import median
 
 from ..expectation import EXCEPTION, Expectation
-from ..limits import CAUTIOUS, Limits
+from ..limits import Limits
 from ..model import DeviceState, Priority, Timing
 from ..requests import Read, WriteMany
 from ..result import Piece
 from .backoff import pause
+from .device_record import Device, Outstanding, note_turnaround, usual
 
-TURNAROUNDS_KEPT = 16
-"""Turnarounds remembered for each function."""
 MARGIN = 4
 """The time-out is so many times the worst recent turnaround."""
 LATE_MARGIN = 2.0
@@ -29,52 +25,10 @@ SHORT_WAIT = 0.1
 """A wait between two like requests up to which a line that repeats replies is not soon trusted."""
 LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
 """Seconds without a repeated reply after which a short wait, and a longer one, is over."""
-COPIES = 6
-"""Replies of a device of which a copy may still come."""
 KNOWN = 4
 """Turnarounds that must be known before one can be called unusual."""
 UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 2.0, 0.002
 """Shares of the shortest recent turnaround and of their median, and seconds, that are usual."""
-
-
-@dataclass(frozen=True, slots=True)
-class Outstanding:
-    """A reply that may still come until `expires`; asked for at `sent`, it was due at `due`."""
-
-    expectation: Expectation
-    sent: float
-    due: float
-    expires: float
-
-
-@dataclass(slots=True)
-class Device:
-    """The record of one device."""
-
-    limits: Limits = CAUTIOUS
-    answers: bool | None = None
-    ever_answered: bool = False
-    failures: int = 0
-    silent_since: float | None = None
-    next_try: float | None = None
-    turnaround: float | None = None
-    recent: dict[int, deque[float]] = field(default_factory=dict)
-    outstanding: list[Outstanding] = field(default_factory=list)
-    lateness: float = 0.0
-    """The longest that a reply came after its time-out."""
-    settle: float = 0.0
-    """Quiet time after each reply of a device that repeats its replies later."""
-    repeated: float = 0.0
-    """When a reply last came twice."""
-    exchanges: deque[tuple[bytes, bytes]] = field(
-        default_factory=lambda: deque(maxlen=COPIES), repr=False
-    )
-    """The last requests that were answered, with their replies."""
-    heard: float | None = None
-    told_usual: float | None = None
-    """The usual turnaround as the program told that owns the line."""
-    last: Expectation | None = None
-    last_time: float = 0.0
 
 
 class Devices:
@@ -227,7 +181,7 @@ class Devices:
         record.heard = now
         record.failures = 0
         record.silent_since = record.next_try = None
-        _remember(record, expectation.function, turnaround)
+        note_turnaround(record, expectation.function, turnaround)
         record.last, record.last_time = expectation, now
         record.exchanges.append(exchanged)
         record.lateness *= FORGET
@@ -281,7 +235,7 @@ class Devices:
                 # should it come once more, it is known
                 record.last, record.last_time = late.expectation, now
                 # the next time-out allows for it
-                _remember(record, late.expectation.function, now - late.sent)
+                note_turnaround(record, late.expectation.function, now - late.sent)
                 return True
         if record.last is not None and record.last.fits(piece.pdu):
             # the reply before came twice: from now on wait as long before asking the same again
@@ -295,15 +249,3 @@ class Devices:
             record.outstanding.append(again)
             return True
         return False
-
-
-def usual(recent: Mapping[int, Sequence[float]]) -> float | None:
-    """The median of the recent turnarounds of reads, None before the first."""
-    reads = recent.get(Read.function)
-    return median(tuple(reads)) if reads else None
-
-
-def _remember(record: Device, function: int, turnaround: float) -> None:
-    recent = record.recent.setdefault(function, deque(maxlen=TURNAROUNDS_KEPT))
-    recent.append(turnaround)
-    record.turnaround = max(recent)

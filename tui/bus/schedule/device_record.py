@@ -1,0 +1,70 @@
+"""What a line has seen of one device, field by field; `Devices` says what follows from it."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from statistics import median
+
+from ..expectation import Expectation
+from ..limits import CAUTIOUS, Limits
+from ..requests import Read
+
+TURNAROUNDS_KEPT = 16
+"""Turnarounds remembered for each function."""
+COPIES = 6
+"""Replies of a device of which a copy may still come."""
+
+
+@dataclass(frozen=True, slots=True)
+class Outstanding:
+    """A reply that may still come until `expires`; asked for at `sent`, it was due at `due`."""
+
+    expectation: Expectation
+    sent: float
+    due: float
+    expires: float
+
+
+@dataclass(slots=True)
+class Device:
+    """The record of one device."""
+
+    limits: Limits = CAUTIOUS
+    answers: bool | None = None
+    ever_answered: bool = False
+    failures: int = 0
+    silent_since: float | None = None
+    next_try: float | None = None
+    turnaround: float | None = None
+    recent: dict[int, deque[float]] = field(default_factory=dict)
+    outstanding: list[Outstanding] = field(default_factory=list)
+    lateness: float = 0.0
+    """The longest that a reply came after its time-out."""
+    settle: float = 0.0
+    """Quiet time after each reply of a device that repeats its replies later."""
+    repeated: float = 0.0
+    """When a reply last came twice."""
+    exchanges: deque[tuple[bytes, bytes]] = field(
+        default_factory=lambda: deque(maxlen=COPIES), repr=False
+    )
+    """The last requests that were answered, with their replies."""
+    heard: float | None = None
+    told_usual: float | None = None
+    """The usual turnaround as the program told that owns the line."""
+    last: Expectation | None = None
+    last_time: float = 0.0
+
+
+def usual(recent: Mapping[int, Sequence[float]]) -> float | None:
+    """The median of the recent turnarounds of reads, None before the first."""
+    reads = recent.get(Read.function)
+    return median(tuple(reads)) if reads else None
+
+
+def note_turnaround(record: Device, function: int, turnaround: float) -> None:
+    """Note a turnaround; the time-out goes by the recent ones."""
+    recent = record.recent.setdefault(function, deque(maxlen=TURNAROUNDS_KEPT))
+    recent.append(turnaround)
+    record.turnaround = max(recent)
