@@ -10,7 +10,7 @@ from tui.bus.line import Timing
 from tui.bus.requests import Read, Request, WriteMany, WriteOne
 from tui.bus.result import Piece
 from tui.bus.schedule.backoff import pause
-from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, Devices
+from tui.bus.schedule.patience import LONG_MEMORY, SHORT_MEMORY, SHORT_WAIT, Devices
 from tui.bus.schedule.queue import Job, JobQueue
 from tui.bus.trace import Trace
 from tui.wire.frames import frame
@@ -224,9 +224,46 @@ def test_reply_that_came_twice_slows_the_same_request(
     assert devices.not_before(1, EXPECTED, Priority.POLL, 11.0) == pytest.approx(11 + 2 * after)
     end = 10.0 + memory
     devices.answered(1, EXPECTED, 0.01, end)
-    assert devices.not_before(1, EXPECTED, Priority.POLL, end) > end
-    devices.answered(1, EXPECTED, 0.01, end + 1)
-    assert devices.not_before(1, EXPECTED, Priority.POLL, end + 1) <= end + 1
+    assert devices.not_before(1, EXPECTED, Priority.POLL, end) == pytest.approx(end + 2 * after)
+    # a long wait becomes a short one; that is over at the end of the longer memory
+    end = 11.0 + memory
+    devices.answered(1, EXPECTED, 0.01, end)
+    left = 0.0 if memory is LONG_MEMORY else end + SHORT_WAIT
+    assert devices.not_before(1, EXPECTED, Priority.POLL, end) == pytest.approx(left)
+    end = 11.0 + LONG_MEMORY
+    devices.answered(1, EXPECTED, 0.01, end)
+    assert devices.not_before(1, EXPECTED, Priority.POLL, end) == 0.0
+
+
+def test_copies_that_go_on_are_waited_for_as_long_as_they_come(devices: Devices) -> None:
+    """Only the first one counted, and ten minutes later the next was taken for an answer."""
+    for now in range(10, 10 + 3 * int(LONG_MEMORY), 20):
+        devices.answered(1, EXPECTED, 0.01, now)
+        assert devices.stray(LATE, now + 0.04)
+        devices.answered(1, EXPECTED, 0.01, now + 10)
+        until = devices.not_before(1, EXPECTED, Priority.POLL, now + 10)
+        assert until == pytest.approx(now + 10.08)
+    assert devices.state(1).lateness == 0.0
+
+
+def test_who_takes_a_line_over_knows_that_it_repeats_the_replies_of_all(devices: Devices) -> None:
+    devices.answered(1, EXPECTED, 0.01, 10.0)
+    assert devices.stray(LATE, 10.004)
+    heir = Devices(TIMING, mistakable=True)
+    heir.copy(1, devices.state(1))
+    other = Read(2, 5, 1).expectation()
+    heir.answered(2, other, 0.01, 11.0)
+    waited = heir.not_before(2, other, Priority.POLL, 11.0) - 11.0
+    assert waited == pytest.approx(0.004 + TIMING.frame_gap)
+
+
+def test_a_copy_is_waited_for_by_a_gap_longer_than_the_one_before(devices: Devices) -> None:
+    """An adapter hands over in lumps: a copy was 4 ms behind its reply, the next one 16."""
+    devices.answered(1, EXPECTED, 0.01, 10.0)
+    assert devices.stray(LATE, 10.004)
+    devices.answered(1, EXPECTED, 0.01, 11.0)
+    waited = devices.not_before(1, EXPECTED, Priority.POLL, 11.0) - 11.0
+    assert waited == pytest.approx(0.004 + TIMING.frame_gap)
 
 
 def test_what_repeats_quickly_stands_in_the_line(devices: Devices) -> None:

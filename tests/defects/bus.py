@@ -5,6 +5,7 @@ from __future__ import annotations
 from .defect import Defect
 
 FAULTS = "tests/bus/test_faults.py"
+QUEUE = "tests/bus/test_queue.py"
 
 DEFECTS = (
     Defect(
@@ -225,5 +226,29 @@ DEFECTS = (
         "max(time, self._sent) + self._gap",
         "A backup on a busy computer ends with a damaged answer: the drive was asked as it talked.",
         (f"{FAULTS}::test_a_reply_with_a_pause_in_it_is_waited_for_as_long_as_it_is_on_the_wire",),
+    ),
+    Defect(
+        "copies-counted-once",
+        "tui/bus/schedule/patience.py",
+        "                    self._note_copy(record, now - late.sent, now)\n",
+        "                    pass\n",
+        "Ten minutes after the first copy of a reply the next one is taken for an answer.",
+        (f"{QUEUE}::test_copies_that_go_on_are_waited_for_as_long_as_they_come",),
+    ),
+    Defect(
+        "copies-waited-for-without-a-gap",
+        "tui/bus/schedule/patience.py",
+        "after = max(LATE_MARGIN * came, came + self._timing.frame_gap)",
+        "after = LATE_MARGIN * came",
+        "A copy that an adapter hands over in its next lump is taken for an answer.",
+        (f"{QUEUE}::test_a_copy_is_waited_for_by_a_gap_longer_than_the_one_before",),
+    ),
+    Defect(
+        "copies-unknown-to-the-heir",
+        "tui/bus/schedule/patience.py",
+        "if 0.0 < state.copies_within < SHORT_WAIT:",
+        "if False:",
+        "Each new owner of a line that repeats replies takes one of each drive for an answer.",
+        (f"{QUEUE}::test_who_takes_a_line_over_knows_that_it_repeats_the_replies_of_all",),
     ),
 )

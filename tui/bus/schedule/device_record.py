@@ -25,6 +25,8 @@ class Outstanding:
     sent: float
     due: float
     expires: float
+    copy: bool = False
+    """Whether it came once already, at `sent`, and may come again."""
 
 
 @dataclass(slots=True)

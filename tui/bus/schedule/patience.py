@@ -24,7 +24,7 @@ FORGET = 0.99
 SHORT_WAIT = 0.1
 """A wait between two like requests up to which a line that repeats replies is not soon trusted."""
 LONG_MEMORY, SHORT_MEMORY = 600.0, 30.0
-"""Seconds without a repeated reply after which a short wait, and a longer one, is over."""
+"""Seconds without a repeated reply after which a short wait is over, and a longer one is short."""
 KNOWN = 4
 """Turnarounds that must be known before one can be called unusual."""
 UNUSUAL_EARLY, UNUSUAL_LATE, JITTER = 0.5, 2.0, 0.002
@@ -81,6 +81,9 @@ class Devices:
         record.turnaround, record.told_usual = state.turnaround, state.usual_turnaround
         record.heard, record.repeated = state.heard, state.heard or 0.0
         record.lateness, record.settle = state.lateness, state.copies_within
+        if 0.0 < state.copies_within < SHORT_WAIT:
+            self._settle = max(self._settle, state.copies_within)
+            self._repeated = max(self._repeated, record.repeated)
 
     def last_reply_by(self, now: float) -> float:
         """When the last reply that is due may have come, of those who ever answered; else now."""
@@ -187,12 +190,14 @@ class Devices:
         record.lateness *= FORGET
         settle = self._settle_of(record, now)
         if settle and self._mistakable:
-            record.outstanding.append(Outstanding(expectation, now, now, now + settle))
+            record.outstanding.append(Outstanding(expectation, now, now, now + settle, copy=True))
 
     def _settle_of(self, record: Device, now: float) -> float:
         """How long nothing like it is asked after a reply, where replies came twice."""
-        memory = LONG_MEMORY if record.settle <= SHORT_WAIT else SHORT_MEMORY
-        if now - record.repeated > memory:
+        single = now - record.repeated
+        if single > SHORT_MEMORY:
+            record.settle = min(record.settle, SHORT_WAIT)
+        if single > LONG_MEMORY:
             record.settle = 0.0
         if now - self._repeated > LONG_MEMORY:
             self._settle = 0.0
@@ -227,25 +232,42 @@ class Devices:
         if record is None:
             return False
         for late in record.outstanding:
+            if late.copy and late.expires < now:
+                continue
             refused = piece.pdu[0] == late.expectation.function | EXCEPTION
             if refused or late.expectation.fits(piece.pdu):
                 record.outstanding.remove(late)
-                record.lateness = max(record.lateness, now - late.due)
-                record.answers = record.ever_answered = True
-                # should it come once more, it is known
-                record.last, record.last_time = late.expectation, now
-                # the next time-out allows for it
-                note_turnaround(record, late.expectation.function, now - late.sent)
+                if late.copy:
+                    self._note_copy(record, now - late.sent, now)
+                else:
+                    self._note_late(record, late, now)
                 return True
         if record.last is not None and record.last.fits(piece.pdu):
-            # the reply before came twice: from now on wait as long before asking the same again
-            after = min(LATE_MARGIN * (now - record.last_time), self._timing.late_reply)
-            record.settle = max(record.settle, after)
-            record.repeated = now
-            if after <= SHORT_WAIT:
-                # what repeats frames quickly stands in the line, not in one drive
-                self._settle, self._repeated = max(self._settle, after), now
-            again = Outstanding(record.last, record.last_time, now, now + record.settle)
+            self._note_copy(record, now - record.last_time, now)
+            again = Outstanding(record.last, record.last_time, now, now + record.settle, copy=True)
             record.outstanding.append(again)
             return True
         return False
+
+    @staticmethod
+    def _note_late(record: Device, late: Outstanding, now: float) -> None:
+        record.lateness = max(record.lateness, now - late.due)
+        record.answers = record.ever_answered = True
+        # should it come once more, it is known
+        record.last, record.last_time = late.expectation, now
+        # the next time-out allows for it
+        note_turnaround(record, late.expectation.function, now - late.sent)
+
+    def _note_copy(self, record: Device, came: float, now: float) -> None:
+        """A reply came once more, `came` seconds after it.
+
+        From now on as long is waited before the same is asked again, and by a gap longer: adapters
+        and busy computers hand one copy over later than the other.
+        """
+        after = max(LATE_MARGIN * came, came + self._timing.frame_gap)
+        after = min(after, self._timing.late_reply)
+        record.settle = max(record.settle, after)
+        record.repeated = now
+        if after <= SHORT_WAIT:
+            # what repeats frames quickly stands in the line, not in one drive
+            self._settle, self._repeated = max(self._settle, after), now
