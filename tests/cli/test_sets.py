@@ -12,11 +12,15 @@ import subprocess
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from tests.programs import DRIVEPANEL, PATIENCE
 from tests.sweeps import kept
+from tui.bus.errors import LineLost
+from tui.drive.settings.restore_plan import RestorePlan
+from tui.session.settings.restore import plan_for
 
 from .commands import held, invoked, motor, refused, run, tcp_line
 
@@ -96,6 +100,24 @@ def test_a_restore_killed_half_way_is_resumed(tmp_path: Path) -> None:
         assert "did not come to its end" in told
         run(0, "compare", file, line)
         assert "did not come" not in run(0, "restore", line, file, "--arm")
+
+
+def test_3_a_restore_that_cannot_look_again_says_why(
+    line: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It told "1 written, 0 not" and status 4, as if the drive had refused something."""
+    file, looks = tmp_path / "set.toml", [plan_for]
+    run(0, "backup", line, file, "-d", "2")
+    run(0, "write", line, "ACC=9", "--arm", "-d", "2")
+
+    async def once(*what: Any, **how: Any) -> RestorePlan:
+        if not looks:
+            raise LineLost("The gateway is gone.")
+        return await looks.pop()(*what, **how)
+
+    monkeypatch.setattr("tui.session.settings.restore.plan_for", once)
+    said = refused(3, "restore", line, file, "--arm", "-d", "2")
+    assert "Not all of it was seen again: The gateway is gone." in said
 
 
 def test_130_a_restore_ended_by_ctrl_c_tells_what_was_written(tmp_path: Path) -> None:

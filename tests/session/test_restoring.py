@@ -187,6 +187,7 @@ async def test_a_line_lost_between_two_passes_keeps_what_was_done() -> None:
             reading=reading,
         )
         assert done.stopped
+        assert done.unseen == done.stopped
         assert any(result.done for result in done.results)
         assert Mark.of(made.session).interrupted
         made.regain_line()

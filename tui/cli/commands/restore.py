@@ -9,7 +9,7 @@ import click
 
 from ..shared.devices import devices_option
 from ..shared.drives import each_drive
-from ..shared.errors import DONE, DRIVE_REFUSED, told
+from ..shared.errors import DONE, DRIVE_REFUSED, LINE_TROUBLE, told
 from ..shared.messages import Messages
 from ..shared.options import (
     Target,
@@ -225,6 +225,8 @@ async def _restore(
         say_afterwards(messages, done.after_reset, done.unsaved, saved=saved)
         written = sum(result.done for result in done.results)
         messages.tell(f"{written} written and read back, {len(done.left)} not.")
+        if done.unseen:
+            messages.complain(f"Not all of it was seen again: {done.unseen}")
         if not done.complete:
             messages.complain("The same command writes what is missing.")
     finally:
@@ -235,6 +237,8 @@ async def _restore(
         "saved": saved,
         "left": [edit.code for edit in done.left],
     }
+    if done.unseen:
+        return found, LINE_TROUBLE
     return found, DONE if done.complete else status_of_results(done.results) or DRIVE_REFUSED
 
 

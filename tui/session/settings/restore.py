@@ -48,6 +48,8 @@ class Restored:
     unsaved: tuple[str, ...]
     stopped: str
     """Why it ended early; empty where it came to its end."""
+    unseen: str = ""
+    """Why the drive could not be looked at again after writing; empty where it was."""
 
     @property
     def complete(self) -> bool:
@@ -86,7 +88,7 @@ async def restore_set(
     mark = Mark.of(session)
     if len(plan.edits):
         mark.begin(source, len(plan.edits))
-    stopped, left = "", plan.edits
+    stopped, unseen, left = "", "", plan.edits
     for number in range(PASSES):
         if not len(left):
             break
@@ -101,7 +103,7 @@ async def restore_set(
         except LineError as error:
             if not number and not results:
                 raise
-            stopped = str(error)
+            stopped = unseen = str(error)
             break
         left = plan.edits
     if not stopped and not len(left):
@@ -116,6 +118,7 @@ async def restore_set(
         after_reset=tuple(p.code for p in parameters if waits_for_reset(session.profile, p)),
         unsaved=tuple(p.code for p in parameters if p.storage == "ram-until-saved"),
         stopped=stopped,
+        unseen=unseen,
     )
 
 
