@@ -9,6 +9,7 @@ GATEWAYS = "tests/bus/test_share_gateways.py"
 FROZEN = "tests/bus/test_share_frozen.py"
 ENDS = "tests/bus/test_share_ends.py"
 MAPPING = "tests/session/test_mapping.py"
+APPLYING = "tests/session/test_applying.py"
 BLOCK = "tests/cli/test_block.py"
 
 DEFECTS = (
@@ -302,5 +303,21 @@ DEFECTS = (
         "within = LEARNT_WITHIN",
         "status and run fail beside a panel at 1200 baud.",
         ("tests/cli/test_patience.py",),
+    ),
+    Defect(
+        "owners-end-ends-a-restore",
+        "tui/session/settings/apply.py",
+        "except (*LOST_ANSWERS, LineLost) as error:",
+        "except LOST_ANSWERS as error:",
+        "The owner of the line ends, and a restore beside it stops half way.",
+        (f"{APPLYING}::test_a_line_that_goes_on_at_another_owner_is_gone_on_with",),
+    ),
+    Defect(
+        "restore-not-seen-again-not-told",
+        "tui/session/settings/restore.py",
+        "stopped = unseen = str(error)",
+        "stopped = str(error)",
+        "A restore whose line is lost at the end tells 0 not written, and status 4.",
+        ("tests/cli/test_sets.py::test_3_a_restore_that_cannot_look_again_says_why",),
     ),
 )

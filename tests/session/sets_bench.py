@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Any
 
 from tests.programs import wait_until
 from tui.bus.api import LineStatus
-from tui.bus.errors import DeviceException
+from tui.bus.errors import DeviceException, LineError
 from tui.bus.line import Line
 from tui.bus.link import Link, RtuTcpLink, SerialLink
 from tui.drive.profile import library
@@ -91,6 +91,21 @@ class Bench:
             return await honest(device, address, *what, **how)
 
         self.session.line.write = picky  # type: ignore[method-assign]
+
+    def lose_answer(self, code: str, error: LineError, *, taken: bool) -> list[int]:
+        """From now on no write of this parameter is answered; what was sent there."""
+        honest, lost, sent = self.session.line.write, self.profile[code].address, list[int]()
+
+        async def silent(device: int, address: int, words: Sequence[int], **how: Any) -> float:
+            if address != lost:
+                return await honest(device, address, words, **how)
+            sent.extend(words)
+            if taken:
+                await honest(device, address, words, **how)
+            raise error
+
+        self.session.line.write = silent  # type: ignore[assignment, method-assign]
+        return sent
 
     def writes(self) -> list[tuple[int, int]]:
         """Registers and words of all writes of one word so far."""

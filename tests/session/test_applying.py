@@ -8,8 +8,8 @@ import time
 import pytest
 
 from tests.session.sets_bench import Bench, bench
-from tui.bus.errors import DeviceException, NoAnswer, RequestRefused
-from tui.cli.shared.errors import REFUSED_HERE
+from tui.bus.errors import DeviceException, LineLost, NoAnswer, RequestRefused
+from tui.cli.shared.errors import LINE_TROUBLE, REFUSED_HERE
 from tui.cli.shared.messages import Messages
 from tui.cli.shared.sets import ResultTelling, status_of_results
 from tui.drive.settings.memory_orders import MemoryRefused
@@ -237,6 +237,24 @@ async def test_a_lost_line_ends_it_and_keeps_the_rest() -> None:
         assert applied.stopped
         assert {edit.code for edit in applied.left} == {r.edit.code for r in others}
         made.simulation.replug()
+
+
+@pytest.mark.parametrize("taken", [True, False])
+async def test_a_line_that_goes_on_at_another_owner_is_gone_on_with(taken: bool) -> None:
+    """The owner's end during a write ended a restore, though the line had a new owner at once."""
+    with bench("atv71") as made:
+        edits = await made.stage(ACC="5 s", DEC="6 s", AC2="7 s")
+        lost = LineLost("The program that owned the line ended during the request.")
+        sent = made.lose_answer("DEC", lost, taken=taken)
+        applied = await made.write(edits)
+        was = EditOutcome.DONE if taken else EditOutcome.NOT_SENT
+        assert outcomes(applied) == {
+            "ACC": EditOutcome.DONE, "DEC": was, "AC2": EditOutcome.DONE,
+        }  # fmt: skip
+        assert len(sent) == 1
+        if not taken:
+            assert text(applied, "DEC") == f"DEC was not written: {lost}"
+            assert status_of_results(applied.results) == LINE_TROUBLE
 
 
 @pytest.mark.parametrize("end", ["a stop", "disarmed"])

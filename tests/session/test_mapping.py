@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import json
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -373,29 +373,13 @@ async def test_somebody_else_between_two_slots() -> None:
 LOST = {"line": LineLost("The program that owned it ended."), "answer": NoAnswer(1, 6, 12703)}
 
 
-def lose_answer(here: Bench, slot: str, error: LineError, *, taken: bool) -> list[int]:
-    """From now on no write of that slot is answered; what was sent there."""
-    honest, lost, sent = here.session.line.write, here.profile[slot].address, list[int]()
-
-    async def silent(device: int, address: int, words: Iterable[int], **how: object) -> float:
-        if address != lost:
-            return await honest(device, address, words, **how)  # type: ignore[arg-type]
-        sent.extend(words)
-        if taken:
-            await honest(device, address, words, **how)  # type: ignore[arg-type]
-        raise error
-
-    here.session.line.write = silent  # type: ignore[assignment, method-assign]
-    return sent
-
-
 @pytest.mark.parametrize("error", LOST.values(), ids=LOST)
 @pytest.mark.parametrize("taken", [True, False])
 async def test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once(
     error: LineError, taken: bool
 ) -> None:
     with bench("atv71") as here:
-        sent = lose_answer(here, "NMA3", error, taken=taken)
+        sent = here.lose_answer("NMA3", error, taken=taken)
         plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
         if taken:
             assert "Written and read back: NMA3, NMA4." in await write(here, plan)
@@ -408,7 +392,7 @@ async def test_a_slot_whose_answer_was_lost_is_looked_at_and_sent_once(
 
 async def test_what_was_written_before_the_line_was_lost_is_told() -> None:
     with bench("atv71") as here:
-        lose_answer(here, "NMA4", LOST["line"], taken=True)
+        here.lose_answer("NMA4", LOST["line"], taken=True)
         plan = plan_of(here, "read", ["ETA", "RFRD", "LCR", "OTR"])
         honest = here.session.line.write
 

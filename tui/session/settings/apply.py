@@ -13,6 +13,7 @@ from tui.bus.errors import (
     ChecksumFault,
     DeviceException,
     LineError,
+    LineLost,
     NoAnswer,
     RequestRefused,
     WrongReply,
@@ -145,7 +146,7 @@ class _Work:
                 self.stopped, self.voided = str(error), True
                 return self.not_sent(edit, edit.old)
             return Result(edit, EditOutcome.REFUSED, str(error), edit.old)
-        except LOST_ANSWERS as error:
+        except (*LOST_ANSWERS, LineLost) as error:
             return await self._after_a_lost_answer(edit, error)
         except LineError as error:
             self.stopped = str(error)
@@ -228,7 +229,10 @@ class _Work:
         )
 
     async def _after_a_lost_answer(self, edit: Edit, error: LineError) -> Result:
-        """A write is sent once; what became of it is found by reading."""
+        """A write is sent once; what became of it is found by reading.
+
+        A line may go on at once: where the program ended that owned it, another one takes it over.
+        """
         try:
             held = (await self.retrying.ask_raws([edit.code])).get(edit.code)
         except LineError as later:
@@ -237,6 +241,9 @@ class _Work:
         if held == edit.new:
             text = f"{edit.code}: {edit.old_text} -> {edit.text} (its answer was lost)"
             return Result(edit, EditOutcome.DONE, text, held)
+        if isinstance(error, LineLost):
+            text = f"{edit.code} was not written: {error}"
+            return Result(edit, EditOutcome.NOT_SENT, text, held)
         silent = " This family refuses by silence." if not self._refuses_aloud else ""
         text = f"{edit.code} was not taken: {error}{silent} The drive is {self.retrying.headline}."
         return Result(edit, EditOutcome.NOT_TAKEN, text, held)
