@@ -9,6 +9,15 @@ class LineError(Exception):
     """Something about a line is wrong; the text says what happened and what to do next."""
 
 
+UNKNOWN_FATE = " Whether it was taken is not known; read the register back before trying again."
+"""Ends the text of an error after a write that may have been taken."""
+
+
+def without_fate(error: LineError) -> str:
+    """What an error says, once it was read what became of the write."""
+    return str(error).removesuffix(UNKNOWN_FATE)
+
+
 class LinkSyntaxError(LineError):
     """A typed link cannot be understood; the text shows the forms that can."""
 

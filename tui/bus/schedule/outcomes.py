@@ -4,7 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from ..errors import ChecksumFault, DeviceException, LineError, NoAnswer, WrongReply
+from ..errors import (
+    UNKNOWN_FATE,
+    ChecksumFault,
+    DeviceException,
+    LineError,
+    NoAnswer,
+    WrongReply,
+)
 from ..limits import STANDARD_EXCEPTIONS
 from ..master import MonotonicClock
 from ..model import Priority, Timing
@@ -18,7 +25,6 @@ from .shared_values import SharedValues
 
 GATEWAY_EXCEPTIONS = frozenset({10, 11})
 """Exceptions by which a gateway says that a device behind it did not answer."""
-UNKNOWN_FATE = " Whether it was taken is not known; read the register back before trying again."
 STILL = 1.0
 """Seconds past the time-out after which an answer cannot have come just now."""
 REPEATED_WHEN_SILENT = frozenset(range(Priority.POLL))

@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Callable
 from contextlib import suppress
 
-from ..errors import LineClosed, LineLost, RequestRefused
+from ..errors import UNKNOWN_FATE, LineClosed, LineLost, RequestRefused
 from ..model import Priority
 from ..requests import BROADCAST
 from ..schedule.inside import LineInside
@@ -17,7 +17,6 @@ from .messages import Answer, AnyMessage, Asking, Describe, Failed, Withdraw, re
 from .past_owner import PastOwner
 
 OWNER_ENDED = "The program that owned the line ended"
-FATE = " Whether it was taken is not known; read the register back before trying again."
 
 
 class RequestsAsked:
@@ -87,7 +86,7 @@ class RequestsAsked:
     def _failed(self, job: Job, message: Failed) -> None:
         if message.error == "LineClosed":
             # the owner's end is not this program's
-            self._give_up(job, sent=FATE in message.form.text)
+            self._give_up(job, sent=UNKNOWN_FATE in message.form.text)
         else:
             job.fail(error_of(message.error, message.form))
 
@@ -102,14 +101,14 @@ class RequestsAsked:
         for number, job in list(self._asked.items()):
             if job.asked < than and not job.answer.done():
                 self._withdraw(number)
-                job.fail(LineLost(why + (FATE if job.request.changes else "")))
+                job.fail(LineLost(why + (UNKNOWN_FATE if job.request.changes else "")))
 
     def give_up_all(self, *, closing: bool) -> None:
         """The owner is gone, or `closing`: this program leaves it."""
         asked, self._asked = self._asked, {}
         for job in asked.values():
             if closing and job.request.changes:
-                job.fail(LineClosed(f"The line was closed during the request.{FATE}"))
+                job.fail(LineClosed(f"The line was closed during the request.{UNKNOWN_FATE}"))
             else:
                 self._give_up(job, sent=True)
 
@@ -123,7 +122,7 @@ class RequestsAsked:
                 self._inside.dispatcher.put_back(job)
             return
         text = (
-            f"{OWNER_ENDED} during the request.{FATE}"
+            f"{OWNER_ENDED} during the request.{UNKNOWN_FATE}"
             if sent
             else f"{OWNER_ENDED}; this was not sent."
         )

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from tui.bus.errors import DeviceException, LineError, RequestRefused
+from tui.bus.errors import DeviceException, LineError, RequestRefused, without_fate
 from tui.drive.blocks.assignment import Assignment, MappingError, SlotChange, describe, steps
 from tui.drive.blocks.slot_rules import assignment_problems, refusing
 from tui.drive.orders import OrderRefused
@@ -167,7 +167,8 @@ class _Writing:
         if now is None:
             raise AssignmentRefused(self.so_far(str(lost), sent=step.slot)) from lost
         if now != step.new:
-            raise AssignmentRefused(self.so_far(f"{step.slot} was not taken: {lost}")) from lost
+            text = f"{step.slot} was not taken: {without_fate(lost)}"
+            raise AssignmentRefused(self.so_far(text)) from lost
 
     def _changed(self, slot: str, old: int | None, now: int) -> AssignmentRefused:
         profile, block = self.session.profile, self.plan.block
