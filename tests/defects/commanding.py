@@ -8,6 +8,8 @@ WRITING = "tests/session/test_writing.py"
 WORK = "tests/session/test_work.py"
 STOP = "tests/session/test_stop_words.py"
 PROVER = "tests/session/test_prover.py"
+LINE_WATCH = "tests/session/test_line_watch.py"
+TIMEOUT = "tests/session/test_timeout.py"
 
 DEFECTS = (
     Defect(
@@ -299,9 +301,25 @@ DEFECTS = (
     Defect(
         "time-out-of-one-port-alone",
         "tui/session/proof/prover.py",
-        "told = await timeouts_of_ports(self._reader, rules, Priority.STOP)",
-        "told = (await self._reader.read([rules.timeout], priority=Priority.STOP)).values()",
+        "told = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)",
+        "told = (await self._reader.read([rules.timeout])).values()",
         "A drive that watches its other port is said not to notice a dead line.",
         ("tests/cli/test_prove.py::test_the_time_out_of_each_port_counts",),
+    ),
+    Defect(
+        "unfed-until-its-time-out-is-learnt",
+        "tui/session/monitor/line_watch.py",
+        "        if kept.learned is not None and kept.watch is None and not kept.unknown:\n",
+        "        if kept.watch is None and not kept.unknown:\n",
+        "A drive trips while a word that it does not have is waited for.",
+        (f"{LINE_WATCH}::test_a_drive_is_fed_while_its_time_out_is_learnt",),
+    ),
+    Defect(
+        "silent-after-a-word-it-lacks",
+        "tui/session/monitor/timeout.py",
+        "            await look_for_drive(reader.session, error)\n",
+        "",
+        "A drive without a port's words counts as silent: polls and its feeding wait.",
+        (f"{TIMEOUT}::test_a_drive_is_asked_for_what_it_has_after_a_silence",),
     ),
 )

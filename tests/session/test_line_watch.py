@@ -48,9 +48,14 @@ class HeardLine(OneDrive):
         self.heard: float | None = None
         self.looked: list[tuple[int, Priority]] = []
         self.workers: list[LineWorker] = []
+        self.answers = asyncio.Event()
+        """Whether polls are answered by now."""
+        self.answers.set()
 
     async def before_read(self, device: int, registers: range, priority: Priority) -> None:
         self.looked.append((registers.start, priority))
+        if priority is Priority.POLL:
+            await self.answers.wait()
         self.heard = time.monotonic()
 
     def device_state(self, device: int) -> DeviceState:
@@ -137,3 +142,13 @@ async def test_a_drive_that_watches_nothing_is_neither_fed_nor_told_of(
     assert kept.watch.watch(1) is None
     assert kept.watch.warnings() == []
     assert kept.watch.left_alone() == {}
+
+
+async def test_a_drive_is_fed_while_its_time_out_is_learnt(keep: Callable[[int], Kept]) -> None:
+    """Polls wait for seconds behind the silence of a word that it does not have."""
+    kept = keep(20)
+    kept.line.answers.clear()
+    await until(lambda: (STATE, Priority.FEED) in kept.line.looked)
+    assert kept.watch.watch(1) is None
+    kept.line.answers.set()
+    await until(lambda: kept.watch.watch(1) is not None)

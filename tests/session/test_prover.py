@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from tui.bus.api import Priority
-from tui.bus.errors import RequestRefused
+from tui.bus.errors import NoAnswer, RequestRefused
 from tui.drive.orders import OrderRefused
 from tui.drive.profile import library
 from tui.session.clock import Clock
@@ -154,7 +154,9 @@ async def test_nobody_else_asks_the_drive_meanwhile_and_all_may_again_afterwards
                 await drive.read(1, STATUS)
             refused += 1
     assert refused
-    assert set(drive.asked_by) == {Priority.STOP}
+    # what is set is read before it is left alone, where everybody else asks, too
+    alone = drive.asked_by[drive.asked_by.index(Priority.STOP) :]
+    assert set(alone) == {Priority.STOP}
     await drive.read(1, STATUS)
 
 
@@ -250,3 +252,46 @@ def test_the_bracket_never_closes_on_the_wrong_side() -> None:
     bracket = Bracket().alive(1.9).reacted(1.8)
     assert bracket.not_after == 1.9
     assert not Bracket().alive(3.0).holds(1.0)
+
+
+class WithoutModule(OneDrive):
+    """A Powerdrive that is silent at some words, as the family is where it has none."""
+
+    def __init__(self, clock: OwnTime, *codes: str) -> None:
+        self.profile = library.load("powerdrive")
+        super().__init__({one.address: 0 for one in self.profile.parameters})
+        self.clock = clock
+        self.silent = {self.profile[code].address for code in codes}
+
+    async def before_read(self, device: int, registers: range, priority: Priority) -> None:
+        self.clock.now += EXCHANGE
+        if self.silent.intersection(registers):
+            raise NoAnswer(device, 3, registers.start)
+
+
+@pytest.mark.parametrize(
+    ("codes", "told"),
+    [
+        (("15.07",), "11.63 is Off: the drive does not notice .* 15.07 cannot be read: perhaps"),
+        (("15.07", "11.63"), "15.07 and 11.63 cannot be read: .* is not known; nothing was proved"),
+    ],
+)
+async def test_ports_that_the_drive_does_not_have_are_named(
+    codes: tuple[str, ...], told: str
+) -> None:
+    clock = OwnTime()
+    drive = WithoutModule(clock, *codes)
+    session = DriveSession(drive, 1, drive.profile, clock=clock)
+    session.arming.arm(seconds=math.inf)
+    with pytest.raises(NothingToProve, match=told):
+        await Prover(session, Journal(), session.work.permit()).prove()
+    assert not drive.facts.hushed
+
+
+async def test_a_drive_that_answers_nothing_is_told_as_such() -> None:
+    clock = OwnTime()
+    drive = WithoutModule(clock, "15.07", "6.42", "6.43")
+    session = DriveSession(drive, 1, drive.profile, clock=clock)
+    session.arming.arm(seconds=math.inf)
+    with pytest.raises(NoAnswer):
+        await Prover(session, Journal(), session.work.permit()).prove()

@@ -9,11 +9,14 @@ import pytest
 from tui.bus.api import Priority
 from tui.bus.errors import DeviceException, NoAnswer
 from tui.drive.profile import library
+from tui.session.clock import REAL_CLOCK, Clock
 from tui.session.drive import DriveSession
 from tui.session.monitor.timeout import has_begun, read_timeout
-from tui.session.read.reader import Reader
+from tui.session.read.presence import presence_read
+from tui.session.read.reader import ASK_AGAIN, Reader
 from tui.session.timeout_told import Timeout
 
+from .fake_clock import FakeClock
 from .fakes import OneDrive, parameter, profile_of
 
 TTO, SLL, CMD, PORT, STATE = 50, 51, 60, 70, 10
@@ -48,7 +51,7 @@ class Ports(OneDrive):
             raise DeviceException(device, 3, registers.start, code=2)
 
 
-def session_of(line: OneDrive, **rules: Any) -> DriveSession:
+def session_of(line: OneDrive, clock: Clock = REAL_CLOCK, **rules: Any) -> DriveSession:
     profile = profile_of(
         parameter("STATE", STATE),
         parameter("TTO", TTO, unit="s", scale="0.1"),
@@ -68,7 +71,7 @@ def session_of(line: OneDrive, **rules: Any) -> DriveSession:
             }
         ],
     )
-    return DriveSession(line, 1, profile)
+    return DriveSession(line, 1, profile, clock=clock)
 
 
 async def told(session: DriveSession) -> Timeout:
@@ -110,6 +113,47 @@ async def test_a_port_that_is_not_there_is_asked_for_once() -> None:
         assert found.watch is not None
         assert found.watch.code == "PORT"
     assert line.read_so_far.count(TTO) == 1
+
+
+async def test_a_word_that_met_silence_twice_is_asked_for_no_more() -> None:
+    """One lost reply is no missing word; and each silence keeps a drive from being asked."""
+    clock = FakeClock()
+    line = Ports({PORT: 20}, silent=TTO)
+    session = session_of(line, clock, other_timeouts=["PORT"])
+    for _ in range(5):
+        await read_timeout(Reader(session), Priority.POLL)
+        clock.advance(2 * ASK_AGAIN)
+    assert line.read_so_far.count(TTO) == 2
+    line.silent = 0
+    session = session_of(line, clock, other_timeouts=["PORT"])
+    line.registers[TTO] = 10
+    watch = (await read_timeout(Reader(session), Priority.POLL)).watch
+    assert watch is not None
+    assert watch.code == "TTO"
+
+
+async def test_a_drive_is_asked_for_what_it_has_after_a_silence() -> None:
+    """Else it counts as silent, and polls and its feeding wait."""
+    line = Ports({PORT: 20}, silent=TTO)
+    await read_timeout(Reader(session_of(line, other_timeouts=["PORT"])), Priority.POLL)
+    at = line.read_so_far.index(TTO)
+    assert line.read_so_far[at : at + 3] == [TTO, STATE, PORT]
+
+
+async def test_a_family_that_refuses_by_silence_may_tell_nothing() -> None:
+    profile = library.load("powerdrive")
+    line = Ports({one.address: 0 for one in profile.parameters}, silent=profile["15.07"].address)
+    session = DriveSession(line, 1, profile)
+    assert await told(session) == Timeout(known=True)  # of its other port
+    line.refused = profile["11.63"].address
+    assert await told(session) == Timeout(known=False)
+
+
+@pytest.mark.parametrize("family", ["powerdrive", "proxidrive", "varmeca"])
+def test_what_shows_that_a_drive_is_there_is_no_late_reply_to_a_single_word(family: str) -> None:
+    ask = presence_read(library.load(family))
+    assert ask is not None
+    assert ask.count == 2
 
 
 async def test_a_drive_that_answers_nothing_is_told() -> None:

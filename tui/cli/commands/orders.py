@@ -38,8 +38,9 @@ COMMAND_POLL_INTERVAL = 0.02
 """Seconds between two looks at what the line's thread has come to."""
 PERIOD = 0.25
 """Target cycle time of the monitor in seconds."""
-FIRST_TRIES = 3
-"""Cycles that may fail before the drive counts as silent."""
+FIRST_TRIES, FIRST_WITHIN = 3, 5.0
+"""Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word
+that it does not have may meet silence meanwhile, which is no answer of any kind."""
 LEARNT_WITHIN = 3.0
 """Seconds in which a drive's communication time-out is read on a quick line."""
 
@@ -110,12 +111,14 @@ async def watched(
 
 
 async def _first_look(console: DriveConsole) -> None:
+    loop = asyncio.get_running_loop()
+    end = loop.time() + FIRST_WITHIN
     while True:
         latest = console.latest
         tried = latest is not None and latest.cycle >= FIRST_TRIES
         if latest is not None and not latest.error and (latest.state.kind != "unknown" or tried):
             return  # what decides about its chart may come a cycle later
-        if latest is not None and tried:
+        if latest is not None and tried and loop.time() > end:
             raise Failure(latest.error, LINE_TROUBLE)
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
 

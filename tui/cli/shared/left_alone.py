@@ -37,6 +37,7 @@ class LeftAlone:
         from tui.bus.api import Priority
         from tui.bus.errors import LineError
         from tui.session.monitor.timeout import read_timeout
+        from tui.session.read.presence import meets_silence
         from tui.session.read.reader import Reader
         from tui.session.timeout_told import Timeout
 
@@ -46,7 +47,10 @@ class LeftAlone:
             return
         session.timeout = Timeout(known=False)
         with suppress(LineError, TimeoutError):
-            reading = read_timeout(Reader(session), Priority.OPERATOR_READ)
+            # without a repeat where a word that is not there meets silence: the drive waits, too
+            once = meets_silence(session.profile)
+            priority = Priority.POLL if once else Priority.OPERATOR_READ
+            reading = read_timeout(Reader(session), priority)
             within = patience(session.line, TOLD_WITHIN)
             session.timeout = await asyncio.wait_for(reading, within)
 

@@ -17,16 +17,16 @@ from tui.drive.channel import channel_codes
 from tui.drive.chart import watched_codes
 from tui.drive.orders import deciding_codes
 from tui.drive.profile.profile import Profile
-from tui.drive.profile.schema import Parameter, Quantity
+from tui.drive.profile.schema import Quantity
 
 from ..drive import DriveSession
 from ..drive_state import DriveState, drive_state
+from ..read.presence import presence_read
 from ..read.reader import Reader
 from ..reading import Reading
 from ..timeout_told import TimeoutWatch
 from .load import unread_limit
 from .monitor import Monitor
-from .rates import monitoring_codes
 from .timeout import TOLD_SHARE, TimeoutWarning, has_begun, read_timeout
 
 log = logging.getLogger(__name__)
@@ -188,6 +188,7 @@ class LineWatch:
             self._let_go(self._kept[device])
         self._kept = {**self._kept, device: kept}
         kept.workers = (
+            self._line.spawn(lambda: self._again(kept, self._learn), f"learner {device}"),
             self._line.spawn(lambda: self._again(kept, self._feed), f"feeder {device}"),
             self._line.spawn(lambda: self._again(kept, self._glance), f"line_watch {device}"),
         )
@@ -223,11 +224,9 @@ class LineWatch:
 
     async def _feed(self, kept: _Kept) -> float:
         """Ask a drive that watches the line, if nobody else does often enough."""
-        now = kept.session.clock.monotonic()
-        if kept.learned is None or now - kept.learned > LEARN_AGAIN:
-            await self._learn(kept)
-        if kept.watch is None and not kept.unknown:
-            return LEARN_AGAIN
+        if kept.learned is not None and kept.watch is None and not kept.unknown:
+            return UNKNOWN_TIMEOUT / ASKED_PER_TIMEOUT
+        # until it is learnt, too: words that the drive does not have may take seconds of silence
         timeout = kept.watch.timeout if kept.watch else UNKNOWN_TIMEOUT
         period = timeout / ASKED_PER_TIMEOUT
         silent = kept.session.clock.monotonic() - self._heard(kept)
@@ -235,10 +234,14 @@ class LineWatch:
             return period - silent
         # past its time-out it has acted: it need no longer go before the others
         priority = Priority.FEED if silent < timeout else Priority.POLL
-        word = _any_word(kept.session.profile)
-        await self._line.read(
-            kept.session.device, word.address, 1, priority=priority, function=word.function
-        )
+        if (ask := presence_read(kept.session.profile)) is not None:
+            await self._line.read(
+                kept.session.device,
+                ask.address,
+                ask.count,
+                priority=priority,
+                function=ask.function,
+            )
         return period
 
     async def _glance(self, kept: _Kept) -> float:
@@ -273,23 +276,18 @@ class LineWatch:
         """
         return max(GLANCE, GLANCE_EACH * len(self._kept))
 
-    async def _learn(self, kept: _Kept) -> None:
+    async def _learn(self, kept: _Kept) -> float:
         """Read the drive's time-out and its reaction."""
         deciding = deciding_codes(kept.session.profile)
         found = await read_timeout(kept.reader, Priority.POLL, deciding)
         kept.session.timeout = found
         kept.watch, kept.unknown = found.watch, not found.known
         kept.learned = kept.session.clock.monotonic()
+        return LEARN_AGAIN
 
 
 def _last_that_brought(look: Look | None) -> Look | None:
     return look.before if look is not None and look.error else look
-
-
-def _any_word(profile: Profile) -> Parameter:
-    """A word that every drive of the family has: one that tells its state, if there is one."""
-    codes = _state_codes(profile) or monitoring_codes(profile)
-    return profile[codes[0]]
 
 
 def _glance_codes(profile: Profile) -> list[str]:

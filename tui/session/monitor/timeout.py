@@ -11,6 +11,7 @@ from tui.drive.profile.profile import Profile
 from tui.drive.profile.schema import CommunicationFault
 
 from ..drive import DriveSession
+from ..read.presence import look_for_drive, meets_silence
 from ..read.reader import Reader
 from ..reading import Reading
 from ..timeout_told import Timeout, TimeoutWatch
@@ -79,20 +80,26 @@ async def read_timeout(reader: Reader, priority: Priority, besides: Sequence[str
 async def timeouts_of_ports(
     reader: Reader, rules: CommunicationFault, priority: Priority
 ) -> list[Reading]:
-    """The time-out of each port of a drive; a port that it does not have may meet silence."""
+    """The time-out of each port of a drive; a port that it does not have may meet silence.
+
+    Raises the line's errors, NoAnswer only where the drive does not tell its state either.
+    """
     found: list[Reading] = []
     silent: NoAnswer | None = None
-    absent: dict[str, Reading] = {}
+    image = reader.session.image
     for code in (rules.timeout, *rules.other_timeouts):
         try:
             found += (await reader.read([code], priority=priority)).values()
         except NoAnswer as error:
-            silent = error
-            now = reader.session.clock.monotonic()
-            absent[code] = Reading.bad(reader.profile[code], now, str(error), silent=True)
-    if silent is not None and not found:
+            if error.retry_in is not None:
+                raise
+            await look_for_drive(reader.session, error)
+            silent, now = error, reader.session.clock.monotonic()
+            # polls ask once more, later on: one lost reply is no missing word
+            again = code in image.refused
+            image.take({code: Reading.bad(reader.profile[code], now, str(error), silent=again)})
+    if silent is not None and not found and not meets_silence(reader.profile):
         raise silent
-    reader.session.image.take(absent)  # not asked for again by polls
     return found
 
 

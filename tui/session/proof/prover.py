@@ -5,7 +5,7 @@ To ask a drive feeds it, so one silence cannot be timed: each ends with one read
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 from tui.bus.api import Priority
@@ -48,6 +48,18 @@ def hidden_at_rest(reaction: Reaction | None) -> str:
     )
 
 
+def _nothing_runs(rules: CommunicationFault, told: Mapping[str, Reading]) -> str:
+    """Why there is nothing to prove, by what each port of the drive has told of its time-out."""
+    ports = (rules.timeout, *rules.other_timeouts)
+    silent = " and ".join(code for code in ports if code not in told)
+    missing = f"{silent} cannot be read: perhaps this drive has no such word"
+    if not told:
+        return f"{missing}. Whether it notices a dead line is not known; nothing was proved."
+    off = " and ".join(f"{code} is {one.text}" for code, one in told.items())
+    goes_on = "the drive does not notice a dead line, and a motor that runs goes on."
+    return f"{off}: {goes_on}" + (f" {missing}." if silent else "")
+
+
 @dataclass(slots=True)
 class Prover:
     """One proof of one drive; `tell` is told how far it is."""
@@ -74,9 +86,12 @@ class Prover:
             raise NothingToProve(f"{session.profile.name} has no communication time-out.")
         watch = (rules.timeout, *rules.other_timeouts, rules.reaction)
         before = {code: session.image.get(code) for code in watch if code}
+        # before it is left alone: a port that it does not have meets silence, and what is asked
+        # then waits for the late reply that may yet come
+        readings = await self._settings(rules)
+        await self._reader.read(self._state_codes())
         facts.hush(session.device, LEFT_ALONE_FOR_PROOF)
         try:
-            readings = await self._settings(rules)
             timeout = self._timeout(rules, readings)
             readings |= await self._read(self._codes(rules))
             reaction = self._reaction(rules, readings)
@@ -92,7 +107,7 @@ class Prover:
 
     async def _settings(self, rules: CommunicationFault) -> dict[str, Reading]:
         """The time-out of each port that the drive has."""
-        told = await timeouts_of_ports(self._reader, rules, Priority.STOP)
+        told = await timeouts_of_ports(self._reader, rules, Priority.OPERATOR_READ)
         return {one.parameter.code: one for one in told if one.raw is not None}
 
     @staticmethod
@@ -100,11 +115,7 @@ class Prover:
         """The shortest that is not off; raises NothingToProve where all are."""
         running = [s for one in told.values() if (s := timeout_seconds(one, rules.off)) is not None]
         if not running:
-            off = " and ".join(f"{code} is {one.text}" for code, one in told.items())
-            raise NothingToProve(
-                f"{off or rules.timeout + ' is not told'}: the drive does not notice a dead line,"
-                " and a motor that runs goes on."
-            )
+            raise NothingToProve(_nothing_runs(rules, told))
         return min(running)
 
     def _codes(self, rules: CommunicationFault) -> list[str]:
@@ -166,11 +177,10 @@ class Prover:
 
     async def _check_same(self, rules: CommunicationFault, began: dict[str, Reading]) -> None:
         """Raise OrderRefused where somebody set the drive otherwise while it was proved."""
-        now = await self._settings(rules)
-        if rules.reaction:
-            now |= await self._read([rules.reaction])
+        ports = (rules.timeout, *rules.other_timeouts, rules.reaction)
+        now = await self._read([code for code in ports if code and code in began])
         for code in now:
-            if code in began and now[code].raw != began[code].raw:
+            if now[code].raw != began[code].raw:
                 raise OrderRefused(
                     f"{code} is {now[code].text} {now[code].unit}".rstrip()
                     + " now, and was another when the proof began: nothing is proved."

@@ -18,6 +18,7 @@ from ..drive import DriveSession
 from ..reading import Origin, Reading
 from .decoding import Decoding, sources_of
 from .kept_plans import KeptPlans
+from .presence import look_for_drive, meets_silence
 from .slots import Slots
 
 SOURCE_AGE = 5.0
@@ -185,8 +186,7 @@ class Reader:
 
     def _by_trust(self, codes: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
         """Confirmed words apart from the others, where a wrong address meets silence."""
-        function = self.profile.function(3)
-        if function is None or function.past_limit != "silence":
+        if not meets_silence(self.profile):
             return codes, frozenset()
         sure = frozenset(c for c in codes if c in self._met or is_verified(self.profile[c]))
         return sure, codes - sure
@@ -199,17 +199,8 @@ class Reader:
             found = await self._exchange(request, priority)
             self._met.update(found)
             return found
-        except NoAnswer:
-            status = self.profile.quantity("status_word")
-            if status is None:
-                raise
-            await self.line.read(
-                self.device,
-                status.address,
-                1,
-                priority=Priority.OPERATOR_READ,
-                function=status.function,
-            )
+        except NoAnswer as silence:
+            await look_for_drive(self.session, silence)
             text = "no answer: perhaps this drive has no such word"
             now = self.session.clock.monotonic()
             parameters = (self.profile[place.code] for place in request.places)

@@ -1,0 +1,74 @@
+"""The read that each drive of a family answers: it tells that the drive is there, and feeds it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from tui.bus.api import Priority
+from tui.bus.errors import NoAnswer
+from tui.drive.chart import watched_codes
+from tui.drive.profile.profile import Profile, is_verified
+from tui.drive.profile.schema import Parameter
+from tui.drive.values import word_count
+
+from ..drive import DriveSession
+
+
+@dataclass(frozen=True, slots=True)
+class PresenceRead:
+    """What is asked for to see whether a drive is there."""
+
+    address: int
+    count: int
+    function: int
+
+
+def presence_read(profile: Profile) -> PresenceRead | None:
+    """The request that is answered by whichever drive of the family; None where none is known.
+
+    Where a word that a drive does not have meets silence, two neighbours of the monitoring set:
+    their reply is longer than one that may yet come to such a word, and taken for none.
+    """
+    pair = _neighbours(profile) if meets_silence(profile) else None
+    if pair is not None:
+        return PresenceRead(pair.address, 2, pair.function)
+    code = next(iter(watched_codes(profile)), profile.data.faults.parameter)
+    word = profile[code] if code else profile.quantity("status_word")
+    return None if word is None else PresenceRead(word.address, 1, word.function)
+
+
+async def look_for_drive(session: DriveSession, met: NoAnswer) -> None:
+    """Ask for what each drive of the family has, after a silence that was `met` elsewhere.
+
+    A drive that answers counts as silent no more, and is polled on. Raises the line's errors, and
+    what was met where nothing is known to ask for.
+    """
+    ask = presence_read(session.profile)
+    if ask is None:
+        raise met
+    await session.line.read(
+        session.device,
+        ask.address,
+        ask.count,
+        priority=Priority.OPERATOR_READ,
+        function=ask.function,
+    )
+
+
+def meets_silence(profile: Profile) -> bool:
+    """Whether a read of a word that a drive does not have is not answered at all."""
+    function = profile.function(3)
+    return function is not None and function.past_limit == "silence"
+
+
+def _neighbours(profile: Profile) -> Parameter | None:
+    """The first of two words of the monitoring set, side by side, that documents confirm."""
+    codes = [value.parameter for value in profile.data.monitoring.values]
+    words = {
+        one.address: one
+        for one in (profile[code] for code in codes)
+        if word_count(one) == 1 and is_verified(one)
+    }
+    pairs = ((one, words.get(one.address + 1)) for one in words.values())
+    found = (one for one, next_to in pairs if next_to and next_to.function == one.function)
+    return next(found, None)
