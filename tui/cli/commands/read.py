@@ -48,6 +48,7 @@ def read(
     A CODE is the drive's own (ACC, 1.05, F875), the manual's number (W9001, 16#FD00) or a wire
     address (9001), in any case.
     """
+    from tui.session.read.apart import read_apart
     from tui.session.read.reader import Reader
 
     from ..running.holding import hold_on
@@ -59,7 +60,7 @@ def read(
         session = await connect_drive(opened, drive)
         sessions.append(session)
         wanted = [session.profile.find(code).code for code in codes]
-        readings = await Reader(session).read(wanted)
+        readings = await read_apart(Reader(session), wanted)
         if not as_json:
             print_readings(readings)
         refused = [reading for reading in readings.values() if reading.raw is None]
