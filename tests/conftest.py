@@ -79,6 +79,7 @@ def own_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Pat
     """Home, configuration and state folders that belong to the test, and a log closed after it."""
     monkeypatch.setenv("DRIVEPANEL_CONFIG", str(tmp_path / "config"))
     monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "state"))
+    monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(tmp_path / "group"))
     monkeypatch.delenv("DRIVEPANEL_LINE", raising=False)
     monkeypatch.setenv("HOME", str(tmp_path / "home"))
     (tmp_path / "home").mkdir()

@@ -320,4 +320,12 @@ DEFECTS = (
         "A restore whose line is lost at the end tells 0 not written, and status 4.",
         ("tests/cli/test_sets.py::test_3_a_restore_that_cannot_look_again_says_why",),
     ),
+    Defect(
+        "motor-of-another-user-unguarded",
+        "tui/session/starts/folders.py",
+        "        for shared in self._shared():\n            try:",
+        "        for shared in ():\n            try:",
+        "A motor runs for good whose program is gone: a service of another user asks its drive on.",
+        ("tests/session/test_guardian.py::test_the_motor_of_another_user_of_the_group_is_stopped",),
+    ),
 )

@@ -157,6 +157,24 @@ async def test_the_motors_of_a_killed_program_are_stopped_at_once_and_no_others(
     assert bench.line.facts.stops.stamp(2) == 0
 
 
+async def test_the_motor_of_another_user_of_the_group_is_stopped(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A service owns the line as a user of its own, and asks the drive on."""
+    (tmp_path / "group").mkdir()
+    ours = bench.starts
+    monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "theirs"))
+    bench.starts = Starts(processes=MadeUp(), clock=bench.clock)
+    bench.started(1)
+    theirs, bench.starts = bench.starts, ours
+    await come(lambda: bench.turns(1))
+    bench.guardian()
+    bench.gone()
+    await come(lambda: bench.simulation.drive(1).motor.frequency == 0)
+    assert bench.line.facts.stops.stamp(1) >= 1
+    assert theirs.close(5.0)
+
+
 async def test_a_motor_that_is_meant_to_run_on_runs_on(bench: Bench) -> None:
     bench.started(1, left_running=True)
     bench.guardian()

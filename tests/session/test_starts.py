@@ -6,6 +6,7 @@ import errno
 import json
 import logging
 import os
+import stat
 import subprocess
 import sys
 import tempfile
@@ -584,3 +585,66 @@ def test_any_order_of_calls(steps: list[tuple[str, Drive, int]]) -> None:
             assert (found and found.name) == (None if wanted is None else str(wanted))
         assert starts.close(PATIENCE)
         assert len(files(starts)) == len(model.begun)
+
+
+def test_a_start_is_on_record_for_the_other_users_of_the_group(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A program of another user may own the line, and has to stop a motor that was left."""
+
+    def user(name: str) -> Starts:
+        monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / name))
+        return Starts(processes=MadeUp())
+
+    folder = tmp_path / "group"
+    monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(folder))
+    one, other = user("one"), user("other")
+    one.begin(start(line=LINE))
+    assert other.found(LINE, 2) is None  # there is no such folder: the line is not shared
+    folder.mkdir()
+    folder.chmod(0o2770)
+    one.begin(start(line=LINE))
+    record = other.found(LINE, 2)
+    assert record is not None
+    assert [record] == one.all_found(LINE)
+    (shared,) = (folder / "starts").glob("*.json")
+    modes = [stat.S_IMODE(path.stat().st_mode) for path in (shared, shared.parent)]
+    assert modes == [0o660, 0o2770]
+    other.end(LINE, 2)
+    one.note_stop(LINE, 2)
+    assert one.close(PATIENCE)
+    assert other.close(PATIENCE)
+    assert not list((folder / "starts").iterdir())
+    assert one.found(LINE, 2) is None
+
+
+def test_a_group_that_cannot_be_told_keeps_no_motor_from_its_start(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("DRIVEPANEL_STATE", str(tmp_path / "own"))
+    monkeypatch.setenv("DRIVEPANEL_SHARE_FOLDER", str(tmp_path))
+    (tmp_path / "starts").write_text("no folder")
+    starts = Starts(processes=MadeUp())
+    starts.begin(start())
+    assert starts.found(LINE, 2) is not None
+    assert starts.close(PATIENCE)
+
+
+def test_a_program_of_another_user_that_proc_does_not_show_lives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where /proc is mounted with hidepid, and in a service with ProtectProc."""
+    (tmp_path / "self").mkdir()
+
+    def not_ours(pid: int, number: int) -> None:
+        assert number == 0
+        raise PermissionError
+
+    monkeypatch.setattr(os, "kill", not_ours)
+    assert Processes(tmp_path).lives("", 4711, "100")
+
+    def nobody(pid: int, number: int) -> None:
+        raise ProcessLookupError
+
+    monkeypatch.setattr(os, "kill", nobody)
+    assert not Processes(tmp_path).lives("", 4711, "100")

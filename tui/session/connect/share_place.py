@@ -27,6 +27,11 @@ USUAL_GROUP_FOLDER = "/run/drivepanel"
 """Where users of a group meet, unless the environment names another; the administrator makes it."""
 
 
+def group_folder() -> Path:
+    """Where users of a group meet; it need not be there."""
+    return Path(os.environ.get(FOLDER_SETTING) or USUAL_GROUP_FOLDER)
+
+
 def share_place(text: str) -> SharePlace | None:
     """The meeting place of a line as it was typed; None on a system without local sockets.
 
@@ -41,7 +46,7 @@ def share_place(text: str) -> SharePlace | None:
     from tui.bus.share.place import SharePlace
 
     key = line_key(text)
-    folder = Path(os.environ.get(FOLDER_SETTING) or USUAL_GROUP_FOLDER)
+    folder = group_folder()
     if group := os.environ.get(SHARE_GROUP_SETTING):
         return SharePlace(key, folder, (folder,), group_number(group, folder))
     common = SharePlace(key, folder, (folder,), 0)

@@ -7,6 +7,7 @@ import hashlib
 import logging
 import os
 import re
+import stat
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -21,6 +22,8 @@ log = logging.getLogger(__name__)
 ENDING = ".json"
 LONGEST_RECORD = 100_000
 """Bytes of a file that may be a record."""
+SHARED_RECORD, SHARED_RECORDS = 0o660, 0o770
+"""Modes of a file and a folder that users of a group share; whose it is comes from above."""
 NOT_SYNCED = frozenset({errno.EINVAL, errno.ENOTSUP})
 """What file systems say that cannot flush a folder; the file itself was flushed."""
 
@@ -31,8 +34,10 @@ class StartFiles:
     So no program writes over, or takes away, what another has just put down.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, *, shared: bool = False) -> None:
         self.folder = folder
+        self._shared = shared
+        """Whether the group of the folder above may read, write and take away what lies here."""
 
     def write_record(self, record: StartRecord, wanted: Callable[[], bool]) -> None:
         """Put a record on the disk, flushed; not if it is no longer `wanted` at the last moment.
@@ -49,6 +54,8 @@ class StartFiles:
                 file.write(msgspec.json.format(msgspec.json.encode(record), indent=1))
                 file.flush()
                 os.fsync(file.fileno())
+                if self._shared:
+                    os.fchmod(file.fileno(), SHARED_RECORD)
             if not wanted():
                 return
             part.replace(path)
@@ -90,8 +97,20 @@ class StartFiles:
 
     def _make_folder(self) -> None:
         if not self.folder.is_dir():
-            make_folder(self.folder)
+            if self._shared:
+                _make_shared(self.folder)
+            else:
+                make_folder(self.folder)
             sync_folder(self.folder.parent)
+
+
+def _make_shared(folder: Path) -> None:
+    """Make a folder for the group of the one that it lies in, whose mark it takes over."""
+    folder.mkdir(mode=SHARED_RECORDS, exist_ok=True)
+    mode = stat.S_IMODE(folder.stat().st_mode)
+    if mode & SHARED_RECORDS != SHARED_RECORDS:
+        # by the umask; a hardened service has another one, and may set no mark of a group
+        folder.chmod(mode | SHARED_RECORDS)
 
 
 def _name(record: StartRecord) -> str:

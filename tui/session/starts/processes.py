@@ -42,7 +42,7 @@ class Processes:
         try:
             stat = (self._proc / str(pid) / "stat").read_bytes()
         except (FileNotFoundError, ProcessLookupError):
-            return None
+            return "" if _is_hidden(pid) else None
         except OSError:
             return ""
         fields = stat.rpartition(b")")[2].decode("ascii", errors="replace").split()
@@ -57,6 +57,17 @@ class Processes:
             return False
         now = self.started(pid)
         return now is not None and (not now or not started or now == started)
+
+
+def _is_hidden(pid: int) -> bool:
+    """Whether a program of another user runs that /proc does not show to this one (hidepid)."""
+    try:
+        os.kill(pid, 0)  # no signal: it asks whether there is such a program
+    except PermissionError:
+        return True
+    except (OSError, OverflowError):
+        return False
+    return False  # it is this user's, and ended meanwhile
 
 
 def _by_ps(pid: int) -> str | None:

@@ -20,9 +20,8 @@ from typing import TYPE_CHECKING, Literal
 from ..clock import REAL_CLOCK, Clock
 from ..connect.known_lines import remembered_text
 from ..connect.line_key import line_key
-from ..paths import state_folder
 from .errors import OVERTAKEN, StartNotRecorded, StartOvertaken
-from .files import StartFiles
+from .folders import start_records
 from .processes import Processes
 from .record import StartRecord
 
@@ -64,7 +63,7 @@ class Starts:
         clock: Clock = REAL_CLOCK,
     ) -> None:
         self._clock = clock
-        self._files = StartFiles((folder or state_folder()) / "starts")
+        self._files = start_records(folder)
         self._processes = processes or Processes()
         self._changed = threading.Condition()
         """Guards all below; never held over disk work."""
