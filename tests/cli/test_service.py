@@ -91,6 +91,15 @@ def test_the_unit_says_what_the_program_does() -> None:
     assert served["RuntimeDirectoryPreserve"] == "yes"
 
 
+def test_the_unit_lets_the_socket_be_handed_to_its_group() -> None:
+    """A call that systemd does not let through killed the program before it was ready."""
+    lines = (UNITS / "drivepanel.service").read_text("utf-8").splitlines()
+    filters = [one.partition("=")[2] for one in lines if one.startswith("SystemCallFilter=")]
+    # @chown is one of @privileged; what comes later counts
+    assert filters.index("@chown") > filters.index("~@privileged @resources")
+    assert "SystemCallErrorNumber=EPERM" in lines
+
+
 def test_systemd_finds_no_fault_in_the_unit(
     peer: Callable[[str, str], str], tmp_path: Path
 ) -> None:
