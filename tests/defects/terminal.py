@@ -55,4 +55,15 @@ DEFECTS = (
         "A fast link gets its pictures in small pieces, one answer after the other.",
         PACE,
     ),
+    Defect(
+        "panel-without-its-terminal",
+        "tui/terminal/driver.py",
+        "        os.kill(os.getpid(), signal.SIGHUP)\n",
+        "",
+        "A panel that lost its terminal keeps its motor running for good, with nobody before it.",
+        (
+            "tests/terminal/test_driver.py"
+            "::test_a_terminal_that_is_gone_ends_the_panel_as_the_system_does",
+        ),
+    ),
 )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import os
+import signal
 from threading import Event
 from typing import Any
 
@@ -149,3 +150,25 @@ def test_a_stop_that_falls_between_bytes_and_stamp_voids_them(
     (pressed,) = keys.tick(float("inf"))
     assert isinstance(pressed, Pressed)
     assert pressed.stroke.stamp != stops.stop_stamp()
+
+
+def test_a_terminal_that_is_gone_ends_the_panel_as_the_system_does(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """SIGHUP goes to who leads the session alone: under another program nobody ended the panel."""
+    master, slave = os.openpty()
+    driver: Any = type("Fake", (), {"fileno": slave, "exit_event": Event(), "_app": Stops()})()
+    driver.wanted = False
+    sent: list[tuple[int, int]] = []
+
+    def kill(pid: int, number: int) -> None:
+        sent.append((pid, number))
+        driver.exit_event.set()
+
+    monkeypatch.setattr("tui.terminal.driver.os.kill", kill)
+    try:
+        os.close(master)
+        module.read_keys(driver)
+    finally:
+        os.close(slave)
+    assert sent == [(os.getpid(), signal.SIGHUP)]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import selectors
+import signal
 import time
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any, Protocol, cast
@@ -100,8 +101,24 @@ def _reading(driver: type[Driver]) -> type[Driver]:
     return ReadingDriver
 
 
+class TerminalGone(Exception):
+    """The terminal that keys were read from is there no more."""
+
+
 def read_keys(driver: Any) -> None:
-    """Read the keys of a driver's terminal until its panel ends."""
+    """Read the keys of a driver's terminal until its panel ends.
+
+    Where the terminal goes away the panel is given SIGHUP: the system gives it to the program
+    that leads the terminal's session alone, and that may be another, which goes on.
+    """
+    try:
+        _read_keys(driver)
+    except TerminalGone:
+        os.kill(os.getpid(), signal.SIGHUP)
+        driver.exit_event.wait()
+
+
+def _read_keys(driver: Any) -> None:
     stops = cast("Stops", driver._app)
     keys = KeyReader(stops, mouse=driver.wanted, escape_delay=constants.ESCAPE_DELAY)
     reports = XTermParser()
@@ -128,10 +145,21 @@ def _look(driver: Any, selector: BaseSelector, keys: KeyReader) -> list[Terminal
     # Where this thread was kept waiting, the bytes were there before now. The stamp comes before
     # the bytes: where a stop of somebody else falls between, it voids them.
     now, stamp = min(time.monotonic(), asked + wait), cast("Stops", driver._app).stop_stamp()
-    data = os.read(driver.fileno, READ_SIZE)
-    if not data:
-        driver.exit_event.wait(END_POLL_INTERVAL)
-    return keys.read(data, now, stamp)
+    return keys.read(_typed(driver), now, stamp)
+
+
+def _typed(driver: Any) -> bytes:
+    """What was typed. Raises TerminalGone."""
+    try:
+        data = os.read(driver.fileno, READ_SIZE)
+    except OSError as error:
+        raise TerminalGone from error
+    if data:
+        return data
+    if not os.isatty(driver.fileno):
+        raise TerminalGone
+    driver.exit_event.wait(END_POLL_INTERVAL)
+    return data
 
 
 def _messages(read: TerminalInput, reports: XTermParser) -> Iterator[Message]:
