@@ -2,10 +2,18 @@
 
 from __future__ import annotations
 
+import errno
+
+import pytest
+
 from tests.adapters import Adapters, adapters
 from tui.bus.transport.port_names import lasting_name
+from tui.bus.transport.port_seen import PortSeen
+from tui.bus.transport.ports import port_error
 
 __all__ = ["adapters"]
+
+PORT_PATH = "/dev/ttyUSB0"
 
 
 def test_an_adapter_with_a_serial_number_keeps_its_name_in_any_socket(adapters: Adapters) -> None:
@@ -70,3 +78,28 @@ def test_a_machine_without_such_folders_names_no_adapter(adapters: Adapters) -> 
     nowhere = adapters.dev / "nowhere"
     assert lasting_name(port, nowhere, nowhere).path == port
     assert lasting_name(port, nowhere, adapters.system).path == port
+
+
+@pytest.mark.parametrize(
+    ("seen", "said"),
+    [
+        (
+            PortSeen(PORT_PATH, permitted=False, group="rs485", user="ann"),
+            "only the group rs485 may use it, and ann is not in it: sudo usermod -a -G rs485 ann",
+        ),
+        (
+            PortSeen(PORT_PATH, permitted=False, group="rs485", user="ann", in_group=True),
+            "ann is in its group rs485 since the next log-in only: log out and in again.",
+        ),
+        (
+            PortSeen(PORT_PATH, permitted=False, user="ann"),
+            "no group of users may. `drivepanel why /dev/ttyUSB0` tells what to do.",
+        ),
+    ],
+)
+def test_a_port_that_this_user_may_not_use_names_its_group(
+    seen: PortSeen, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("tui.bus.transport.port_seen.see_port", lambda _: seen)
+    error = port_error(PORT_PATH, 19200, "8E1", PermissionError(errno.EACCES, "denied"))
+    assert said in str(error)

@@ -230,7 +230,7 @@ def test_a_program_that_listens_on_the_same_port() -> None:
         (
             PortSeen(PORT, permitted=False, user="ann"),
             "ann may not use /dev/ttyUSB0, and no group of users may.",
-            "sudo usermod",
+            "sudo chmod g+rw /dev/ttyUSB0 lets its group use it",
         ),
     ],
 )

@@ -18,8 +18,6 @@ from ..errors import PortBusy, PortMissing, PortRefused
 BUSY = frozenset({errno.EBUSY, errno.EAGAIN, errno.EWOULDBLOCK})
 MISSING = frozenset({errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR})
 DENIED = frozenset({errno.EACCES, errno.EPERM})
-USUAL_GROUP = "dialout"
-"""The group that serial ports belong to on most systems."""
 PSEUDO_TERMINALS = range(136, 144)
 """Major device numbers of the slave sides of pseudo-terminals on Linux."""
 
@@ -191,12 +189,26 @@ def port_error(
     if os.name == "nt" and "PermissionError" in text:
         return PortBusy(path)
     if number in DENIED:
-        return PortRefused(
-            path,
-            "this user may not use it. Add the user to the group of the port (often "
-            f"{USUAL_GROUP}) "
-            "and log in again.",
-        )
+        return PortRefused(path, _who_may(path))
     if number is None or number == errno.EINVAL:
         return PortRefused(path, f"it does not take {baud} baud {format_}.")
     return PortRefused(path, f"{os.strerror(number)}.")
+
+
+def _who_may(path: str) -> str:
+    """Why this user may not use a port, and how that is changed."""
+    from .port_seen import see_port
+
+    seen = see_port(path)
+    user, group = seen.user, seen.group
+    if not group:
+        return (
+            f"{user} may not use it, and no group of users may. `drivepanel why {path}` tells what"
+            " to do."
+        )
+    if seen.in_group:
+        return f"{user} is in its group {group} since the next log-in only: log out and in again."
+    return (
+        f"only the group {group} may use it, and {user} is not in it: sudo usermod -a -G"
+        f" {group} {user}, then log in again."
+    )

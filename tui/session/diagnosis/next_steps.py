@@ -7,7 +7,6 @@ from collections.abc import Iterator
 
 from tui.bus.errors import PortMissing
 from tui.bus.link import SerialLink
-from tui.bus.transport.ports import USUAL_GROUP
 
 from .family import address_hint, as_factory, settings_hints, speed_hint, wiring_hints
 from .garbled import likely_baud, other_formats, same_speed
@@ -51,7 +50,13 @@ def get_permission(sight: Sight) -> Iterator[str]:
     if port is not None and port.in_group:
         yield f"Log out and in again: then {user} is in {group}."
         return
-    yield f"sudo usermod -a -G {group or USUAL_GROUP} {user or '$USER'}, then log in again."
+    if port is not None and not group:
+        yield (
+            f"sudo chmod g+rw {port.path} lets its group use it until it is plugged in anew; a rule"
+            " for udev gives it to a group for good (60-drivepanel.rules has one)."
+        )
+        return
+    yield f"sudo usermod -a -G {group or 'dialout'} {user or '$USER'}, then log in again."
 
 
 def free_port(sight: Sight) -> Iterator[str]:
