@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import socket
 import struct
 from contextlib import suppress
 
@@ -261,3 +262,33 @@ async def test_one_client_that_waits_holds_up_no_other() -> None:
     assert len(gone) == 2
     stuck.close()
     writer.close()
+
+
+async def test_answers_for_who_has_gone_are_dropped_without_a_word(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    """A client that was killed left as many complaints as requests in the log of a service."""
+    gone, asked, go_on = asyncio.Event(), asyncio.Event(), asyncio.Event()
+    count = 0
+
+    async def answer(request: TcpRequest) -> bytes:
+        nonlocal count
+        count += 1
+        if count == 20:
+            asked.set()
+        await go_on.wait()
+        return request.pdu
+
+    gateway = TcpGateway(answer, lambda _: gone.set())
+    _, writer = await asyncio.open_connection(*await gateway.listen("127.0.0.1", 0))
+    for number in range(20):
+        await _asked(writer, number, 1, struct.pack(">BHH", 6, 8501, 7))
+    await asyncio.wait_for(asked.wait(), 30)
+    its_socket = writer.get_extra_info("socket")
+    its_socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    writer.transport.abort()  # a reset, as of a program that was killed
+    await asyncio.sleep(0.2)
+    go_on.set()
+    await asyncio.wait_for(gone.wait(), 30)
+    await gateway.close()
+    assert not [one for one in caplog.records if one.name == "asyncio"]

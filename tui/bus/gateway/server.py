@@ -202,6 +202,8 @@ class TcpGateway:
         await self._send(talk, transaction, request.unit, reply)
 
     async def _send(self, talk: _Talk, transaction: int, unit: int, reply: bytes) -> None:
+        if talk.writer.is_closing():
+            return  # it has gone meanwhile: nobody takes it, and asyncio would complain of each
         try:
             talk.writer.write(HEADER.pack(transaction, 0, len(reply) + 1, unit) + reply)
             async with asyncio.timeout(IDLE_CLIENT_ENDS_AFTER):
