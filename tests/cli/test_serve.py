@@ -46,7 +46,9 @@ def test_a_port_that_is_taken_is_told() -> None:
         port: int = taken.getsockname()[1]
         place = f"127.0.0.1:{port}"
         told = refused(3, "serve", "sim:atv71", "--tcp", place)
-        assert f"Nothing can be served at {place}: " in told
+        assert f"Nothing can be served at {place}: Address already in use." in told
+        told = refused(3, "serve", "sim:atv71", "--metrics", place)
+        assert f"No metrics can be served at {place}: Address already in use." in told
 
 
 def test_a_place_without_a_host_is_loopback() -> None:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import tui
 
 from ..shared.errors import LINE_TROUBLE, Failure
-from ..shared.host_port import written_host_port
+from ..shared.host_port import why_not_served, written_host_port
 from .broker import Broker
 from .drives import PlantLine
 from .metrics import metrics_text
@@ -62,7 +62,7 @@ async def metrics_at(lines: Sequence[PlantLine], host: str, port: int) -> AsyncI
     try:
         host, port = await server.listen(host, port)
     except OSError as error:
-        place, why = written_host_port(host, port), error.strerror or str(error)
+        place, why = written_host_port(host, port), why_not_served(error)
         raise Failure(f"No metrics can be served at {place}: {why}.", LINE_TROUBLE) from error
     warn_of_strangers(host, port)
     try:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from ..commands.orders import close_journal, told_journal
 from ..plant.wish import PlantWish, is_loopback
 from ..shared.errors import LINE_TROUBLE, Failure
-from ..shared.host_port import written_host_port
+from ..shared.host_port import why_not_served, written_host_port
 from ..shared.left_alone import say_farewells
 from ..shared.line_argument import mind_the_drive
 from ..shared.options import Target
@@ -160,7 +160,7 @@ async def _gateway(gates: Sequence[GatewayLine], wish: GatewayWish) -> AsyncIter
             host, port = await server.listen(wish.host, wish.port)
         except OSError as error:
             place = written_host_port(wish.host, wish.port)
-            why = error.strerror or str(error)
+            why = why_not_served(error)
             raise Failure(f"Nothing can be served at {place}: {why}.", LINE_TROUBLE) from error
         _warn(wish, host, port)
         yield f"tcp:{written_host_port(host, port)}"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+
 import click
 
 
@@ -16,3 +18,10 @@ def host_port(text: str) -> tuple[str, int]:
 def written_host_port(host: str, port: int) -> str:
     """The same as it is written, an IPv6 address in brackets."""
     return f"[{host}]:{port}" if ":" in host else f"{host}:{port}"
+
+
+def why_not_served(error: OSError) -> str:
+    """Why a place cannot be listened at, in the system's own words; asyncio wraps some of them."""
+    if error.errno is not None and error.errno > 0:
+        return os.strerror(error.errno)
+    return error.strerror or str(error)
