@@ -67,7 +67,18 @@ class PanelScreen(Framed):
 
     def draw(self, width: int) -> None:
         """Put every line, here that of the keys; the screen is on top and has a size."""
-        self.put("keys", self._keys(width))
+        self.put("keys", self.keys_now(width))
+
+    def draw_stop_keys(self) -> None:
+        """The line of keys names them, and which keys mean something beside them."""
+        for found in self.query("#keys").results(Lines):  # none while the screen is made, or goes
+            width = found.size.width
+            if width and self.is_current:
+                found.show([_fitted(line, width) for line in self.keys_now(width)])
+
+    def keys_now(self, width: int) -> list[Text]:
+        """The line of keys as it is now."""
+        return self._keys(width)
 
     def _keys(self, width: int) -> list[Text]:
         """The line of keys."""

@@ -17,7 +17,8 @@ from textual.screen import Screen
 from textual.widget import Widget
 
 from tui.drive.plain import plain
-from tui.widgets.drawing import wrapped
+from tui.terminal.fields import takes_space
+from tui.widgets.drawing import key_line, wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, PLAIN, STRONG
 from tui.widgets.small import is_too_small, small_lines
@@ -33,6 +34,7 @@ from .keys.action import (
     PARAMETERS,
     SOURCES,
 )
+from .keys.table import stop_keys
 
 if TYPE_CHECKING:
     from .app_port import Panel
@@ -63,6 +65,8 @@ WARNS = frozenset({"fault", "failed", "error", "refused", "alarm", "told"})
 WHOLE_FOR = 15.0
 """Seconds for which a message that warns takes more lines than its own."""
 WHOLE_LINES = 3
+DIALOG_KEYS = "dialog-keys"
+"""The place of the stop keys of a dialog: over the line of keys of the screen below."""
 
 
 class Framed(Screen[Any]):
@@ -78,26 +82,41 @@ class Framed(Screen[Any]):
     Framed #tabs { dock: top; height: 1; margin-top: 1; background: $background; layer: frame; }
     Framed #said { dock: bottom; height: 1; margin-bottom: 1; layer: frame; }
     Framed #said { background: $background; }
+    Framed #dialog-keys { dock: bottom; height: 1; background: $surface; layer: frame; }
     Framed #small { dock: top; height: 100%; width: 100%; background: $background; layer: frame; }
     """
 
     def framed(self) -> Iterable[Widget]:
         """The parts of the frame as it is now: the first picture has them, too."""
         view, width = self.app.frame_now(), self.app.size.width
-        self._frame_parts = {place: Lines(id=place) for place in ("strip", "tabs", "said")}
-        for place, lines in self._parts(view, width).items():
-            part = self._frame_parts[place]
-            part.show(lines)
+        parts = self._parts(view, width)
+        self._frame_parts = {place: Lines(id=place) for place in parts}
+        for place, part in self._frame_parts.items():
+            part.show(parts[place])
             yield part
 
     def _parts(self, view: FrameView, width: int) -> dict[str, list[Text]]:
         here = (self.TITLE or "").lower() or view.place
         here = FRAMES if here == LISTENING else here  # a mode of it
-        return {
+        parts = {
             "strip": [strip_line(view.strip, width)],
             "tabs": [tabs_line(TABS, here, view.marks, width)],
             "said": said_lines(view.said, width),
         }
+        if self.is_modal:
+            stops = stop_keys(self.app.stops_whom, typing=takes_space(self.focused))
+            parts[DIALOG_KEYS] = [key_line(stops)]
+        return parts
+
+    def watch_focused(self) -> None:
+        """Whether Space is text now, or a stop, is told before the next key can come."""
+        if self.is_running:
+            self.call_later(self.draw_stop_keys)
+
+    def draw_stop_keys(self) -> None:
+        """Name the keys that stop now."""
+        if self.app.is_running and self.is_current:
+            self.draw_frame(self.app.frame_now())
 
     def on_screen_resume(self, event: ScreenResume) -> None:
         """What stood still below another screen is not shown for a moment."""

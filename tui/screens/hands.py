@@ -18,6 +18,7 @@ from tui.terminal.type_ahead import TypeAhead
 from tui.widgets.small import is_too_small
 
 from .app_port import Panel
+from .keys.table import STOPS_ALL, STOPS_NOBODY
 
 if TYPE_CHECKING:
     from tui.drive.profile.schema import OrderId
@@ -191,5 +192,5 @@ class Hands(Panel):
         """The words of the stop key in the line of keys."""
         chosen = self._open_drive()
         if self.hearing and not self.fleets:
-            return "no stop here"
-        return f"STOP {chosen.device}" if chosen is not None else "STOP ALL"
+            return STOPS_NOBODY
+        return f"STOP {chosen.device}" if chosen is not None else STOPS_ALL

@@ -31,6 +31,8 @@ class Lookout(Panel):
         self._drawn: object = None
         """What of the frame is shown at once, as it was drawn last."""
         self._drawn_at = 0.0
+        self._stops_whom = ""
+        """Whom the stop key meant at the last look."""
         self._journal_trouble = ""
 
     def look_around(self) -> None:
@@ -55,6 +57,9 @@ class Lookout(Panel):
         """Put the frame of the screen on top as it is now; on a slow link its figures seldom."""
         if not isinstance(self.screen, Framed):
             return
+        if self.stops_whom != self._stops_whom:
+            self._stops_whom = self.stops_whom
+            self.screen.draw_stop_keys()
         view, now = self._frame.view(), self.clock.monotonic()
         drawn = (self.screen, self.screen.size, view.at_once)
         if drawn != self._drawn:

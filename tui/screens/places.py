@@ -101,6 +101,7 @@ class Places(Panel):
         wanted = consoles[(consoles.index(self.chosen) + step) % len(consoles)]
         if place == CONNECTION:
             self.chosen = wanted
+            self._ask_screen("draw_stop_keys")
             return
         self.show_monitor(wanted)
         if place not in (MONITOR, MESSAGES):

@@ -64,7 +64,7 @@ class Confirm(KeyQuestion[bool]):
         says = self.query("#says")  # none where a stop has ended the question meanwhile
         if says and says.first().max_scroll_y:
             self._keys.append("   ").append_text(hint(("Up, Down", "scroll")))
-            self.query_one("#hint", Plain).update(self._keys)
+            self.tell_keys(self._keys)
 
     def action_yes(self) -> None:
         """Go on."""
@@ -76,4 +76,4 @@ class Confirm(KeyQuestion[bool]):
             self.answer(True)
             return
         told = Text("Enter is no answer here.   ", ALARM)
-        self.query_one("#hint", Plain).update(told.append_text(self._keys))
+        self.tell_keys(told.append_text(self._keys))

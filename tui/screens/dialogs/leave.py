@@ -15,9 +15,6 @@ from .question import KeyQuestion, hint
 if TYPE_CHECKING:
     from .now import MotorsNow
 
-DIALOG_SHARE, OTHER_ROWS, LEAST_ROWS = 0.8, 6, 3
-"""Of the screen's rows those of the dialog; its border, question, keys and margins; the least."""
-
 LeaveChoice = Literal["stop", "leave", "stay"]
 
 
@@ -40,8 +37,7 @@ class Leave(KeyQuestion[LeaveChoice]):
         with Vertical(id="dialog"):
             yield Plain("A motor runs by your command", id="question")
             yield from self.now_lines()
-            with VerticalScroll(id="says") as says:
-                says.styles.max_height = self._rows_left()
+            with VerticalScroll(id="says"):
                 yield Plain(self._follows, id="follows")
             yield Plain(
                 hint(
@@ -51,11 +47,6 @@ class Leave(KeyQuestion[LeaveChoice]):
                 ),
                 id="hint",
             )
-
-    def _rows_left(self) -> int:
-        """Rows for what happens, so that the keys below stay on the screen."""
-        motors = len(self._now().plain.splitlines()) if self._now is not None else 0
-        return max(LEAST_ROWS, int(self.app.size.height * DIALOG_SHARE) - OTHER_ROWS - motors)
 
     def action_choose(self, choice: LeaveChoice) -> None:
         """Give the choice back."""

@@ -102,7 +102,7 @@ class Palette(Question[FoundAction | None]):
             keys.append(
                 ("Enter", "does it" if found.here else f"goes to {found.screen.capitalize()}")
             )
-        self.query_one("#hint", Plain).update(hint(*keys, ("Esc", "does nothing")))
+        self.tell_keys(hint(*keys, ("Esc", "does nothing")))
 
     def on_input_submitted(self) -> None:
         """Take the one that is marked; where none is, nothing is chosen."""

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.events import ScreenResume
+from textual.events import Resize, ScreenResume
 from textual.screen import ModalScreen
 from textual.widget import Widget
 
@@ -32,6 +32,10 @@ T = TypeVar("T")
 
 DIALOG_STYLES = Path(__file__).with_name("dialogs.tcss")
 """Absolute, as Textual looks beside the class that inherits it, which may be of another room."""
+
+DIALOG_SHARE, BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 0.83, 2, 4, 2
+"""Of the screen's rows those of a dialog at most; of its border; columns of border and padding;
+rows that a list keeps."""
 
 NOW_EVERY = 0.5
 """Seconds between two looks at what the motor does."""
@@ -72,6 +76,7 @@ class Question(Framed, ModalScreen[T]):
 
     def on_mount(self) -> None:
         """From its first picture on it is asked."""
+        self.fit_list()
         self.call_after_refresh(self._stands)
         if self._now is not None:
             self.set_interval(NOW_EVERY, self._tell_now)
@@ -80,6 +85,35 @@ class Question(Framed, ModalScreen[T]):
         """A question that was voided below another screen ends now."""
         if self._voided:
             self.call_later(self.answer, self.NO)
+
+    def on_resize(self, event: Resize) -> None:
+        """More room, or less."""
+        self.fit_list()
+
+    def fit_list(self) -> None:
+        """Give a list, or what can be scrolled, the rows that the rest of the dialog leaves."""
+        for part in self.query("#choices, #says"):
+            if (box := part.parent) is None or not isinstance(box, Widget):
+                continue
+            wide = box.styles.width
+            most = int(wide.value) if wide is not None and wide.is_cells else self.size.width
+            width = min(most, self.size.width) - BESIDE_TEXT
+            others = sum(self._rows(one, width) for one in box.children if one is not part)
+            rows = int(self.size.height * DIALOG_SHARE) - BORDER_ROWS - others
+            part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)
+
+    def _rows(self, part: Widget, width: int) -> int:
+        """Rows of a part of the dialog, with what is above and below it."""
+        high = part.styles.height
+        fixed = int(high.value) if high is not None and high.is_cells else None
+        size = self.size
+        rows = fixed if fixed is not None else part.get_content_height(size, size, width)
+        return rows + part.styles.margin.height
+
+    def tell_keys(self, keys: Text) -> None:
+        """Tell the keys anew; they may take more rows than before."""
+        self.query_one("#hint", Plain).update(keys)
+        self.fit_list()
 
     def now_lines(self) -> Iterable[Plain]:
         """What the motors do, where the question is about drives."""

@@ -43,6 +43,8 @@ ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
 OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
 NEVER_DROPPED = ("stop_by_space", "help")
 """Actions that stand in the line of keys however narrow the terminal is."""
+STOPS_ALL, STOPS_NOBODY = "STOP ALL", "no stop here"
+"""What a line of keys says where the stop key means every drive, or none."""
 WRITE_SOURCE = "Write the chosen configuration; armed, motor at rest, asks."
 SAVE = "Save what is shown to a file: a backup, an assignment, the record of a trip."
 OPEN = "Open a file: compare with it and stage what it has otherwise, or propose its slots."
@@ -189,10 +191,19 @@ def keys_line(
 
     `stops` says whom the stop key stops; while a text is `typing`, that key is F12.
     """
-    spaced = "F12" if typing else "Space"
+    first = stop_keys(stops, typing=typing)[0]
     keys = [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
-    named = [(i, spaced, stops) if i == "stop_by_space" else (i, k, text) for i, k, text in keys]
+    named = [first if key[0] == first[0] else key for key in keys]
     return fitting(named, width, NEVER_DROPPED)
+
+
+def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
+    """The keys that stop now, as a line of keys names them: whom that key `stops`, then all.
+
+    While a text is `typing`, Space is text and the key is F12.
+    """
+    keys = [("stop_by_space", "F12" if typing else "Space", stops)]
+    return keys if stops in (STOPS_ALL, STOPS_NOBODY) else [*keys, ("stop_all", "F9", STOPS_ALL)]
 
 
 def elsewhere(screen: str, key: str, character: str | None = None) -> str:
@@ -221,9 +232,12 @@ __all__ = [
     "OPENING",
     "PARAMETERS",
     "SOURCES",
+    "STOPS_ALL",
+    "STOPS_NOBODY",
     "WIRING",
     "Action",
     "bindings",
     "keys_line",
     "of_screen",
+    "stop_keys",
 ]

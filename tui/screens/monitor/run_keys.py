@@ -74,6 +74,11 @@ class RunKeys(OrderKeys):
         self._line = None
         self.look()
 
+    @property
+    def line_is_open(self) -> bool:
+        """Whether keys are those of the line."""
+        return self._line is not None
+
     def run_line_lines(self, now: float, width: int) -> list[Text] | None:
         """The line and its keys; None while it is closed."""
         line = self._line

@@ -170,15 +170,21 @@ class MonitorScreen(InputKeys):
         parts = monitor_parts(view, room, self._words)
         if (run := self.run_line_lines(view.now, width)) is not None:
             parts["message"] = [*[Text("")] * (room.bottom - len(run)), *run]
-            parts["keys"] = [self.run_line_keys(view.now)]
-        else:
-            keys = keys_line(MONITOR, width, self.app.stops_whom)
-            parts["keys"] = [order_keys(view, keys)]
+        parts["keys"] = self._keys_of(view, width)
         self._run_rows = len(run or ())
         self._place(room)
         for place, lines in parts.items():
             self.put(place, lines)
         self.ask_unrecorded()
+
+    def keys_now(self, width: int) -> list[Text]:
+        """Those of the run line while that is open."""
+        return self._keys_of(self._view(), width)
+
+    def _keys_of(self, view: View, width: int) -> list[Text]:
+        if self.line_is_open:
+            return [self.run_line_keys(view.now)]
+        return [order_keys(view, keys_line(MONITOR, width, self.app.stops_whom))]
 
     def _view(self) -> View:
         if self._source is None:

@@ -1,0 +1,212 @@
+"""What stands at the bottom of a dialog is what the next key does, on every dialog there is."""
+
+from __future__ import annotations
+
+import asyncio
+import importlib
+import pkgutil
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+from textual.screen import ModalScreen
+from textual.widget import Widget
+from textual.widgets import Input
+
+import tui.screens
+from tui.app import DrivePanelApp
+from tui.drive.profile import library
+from tui.drive.settings.edits import Edits
+from tui.screens.blocks.pick_parameter import PickParameter
+from tui.screens.command.options import OptionsScreen
+from tui.screens.command.teaching import PickWord
+from tui.screens.dialogs.ask import Ask
+from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.leave import Leave
+from tui.screens.dialogs.now import MotorsNow
+from tui.screens.dialogs.palette import Palette
+from tui.screens.dialogs.pick_file import PickFile
+from tui.screens.dialogs.question import KeyQuestion, Question
+from tui.screens.dialogs.why import WhyScreen
+from tui.screens.frame import Framed
+from tui.screens.keys.help import HelpScreen
+from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
+from tui.screens.parameters.results import RestQuestion, Results
+from tui.screens.parameters.skipped import Skipped
+from tui.session.console import DriveConsole
+from tui.session.diagnosis.diagnosis import Diagnosis
+from tui.session.fleet import FoundDrive
+from tui.session.settings.applied import Applied
+
+from . import fakes
+from .test_flows import picture, until
+
+SIZES = pytest.mark.parametrize("size", [(80, 24), (120, 40)], ids=["80x24", "120x40"])
+Make = Callable[[DrivePanelApp, DriveConsole], ModalScreen[Any]]
+APPLIED = Applied((), Edits(()))
+
+
+async def _no_answer() -> Diagnosis:
+    """It is looked for as long as the test goes on."""
+    await asyncio.sleep(3600)
+    raise AssertionError
+
+
+def _parameter(console: DriveConsole, code: str) -> Any:
+    return console.session.profile[code]
+
+
+DIALOGS: dict[str, Make] = {
+    "Ask": lambda *_: Ask("Save to", lambda _: "wrong"),
+    "Ask for a number": lambda *_: Ask("Rated current", lambda _: "wrong", number=True),
+    "Confirm": lambda app, one: Confirm(
+        "Write?", "It is.", yes="writes", no="no", loses=True, now=MotorsNow(app, [one.session])
+    ),
+    "Leave": lambda *_: Leave("It runs."),
+    "Palette": lambda *_: Palette("monitor"),
+    "PickFile": lambda *_: PickFile("Open", [("factory", "factory setting")], []),
+    "WhyScreen": lambda *_: WhyScreen("Why no answer?", _no_answer),
+    "HelpScreen": lambda *_: HelpScreen("monitor"),
+    "OptionsScreen": lambda _, one: OptionsScreen(one.session.profile.data.charts[0].options, {}),
+    "PickWord": lambda app, one: PickWord(one, ["HSP"], MotorsNow(app, [one.session])),
+    "PickParameter": lambda _, one: PickParameter(
+        one.session.profile, one.session.profile.data.blocks[0], "NMA1"
+    ),
+    "EditNumber": lambda _, one: EditNumber(one.editor, _parameter(one, "HSP")),
+    "PickValue": lambda _, one: PickValue(one.editor, _parameter(one, "FR1")),
+    "EditBits": lambda _, one: EditBits(one.editor, _parameter(one, "CMD")),
+    "Results": lambda *_: Results(APPLIED),
+    "RestQuestion": lambda app, one: RestQuestion(APPLIED, MotorsNow(app, [one.session])),
+    "Skipped": lambda *_: Skipped(1, "backup.toml", []),
+}
+
+
+def dialogs_there_are() -> set[str]:
+    """Every dialog of the panel, by the name of its class."""
+    for module in pkgutil.walk_packages(tui.screens.__path__, "tui.screens."):
+        importlib.import_module(module.name)
+    found: list[type] = []
+    left: list[type] = [Framed]
+    while left:
+        one = left.pop()
+        left += one.__subclasses__()
+        found.append(one)
+    bases = (Question, KeyQuestion)
+    return {
+        one.__name__
+        for one in found
+        if issubclass(one, ModalScreen) and one not in bases and one.__module__.startswith("tui.")
+    }
+
+
+def test_every_dialog_is_looked_at_here() -> None:
+    assert dialogs_there_are() == {name.partition(" ")[0] for name in DIALOGS}
+
+
+def bottom(app: DrivePanelApp) -> str:
+    """The last line of the terminal."""
+    return picture(app).splitlines()[-1]
+
+
+async def on_monitor(app: DrivePanelApp, pilot: Any, monkeypatch: pytest.MonkeyPatch) -> Any:
+    """The panel on Monitor of drive 2; each stop is kept, and stops nothing."""
+    stopped: list[bool] = []
+    monkeypatch.setattr(app, "_stop", lambda *, everything: stopped.append(everything))
+    console = fakes.console_of(fakes.snapshot_of(library.load("atv71"), fakes.RUNNING))
+    app.opened = fakes.opened()
+    app.fleet = fakes.StillFleet(FoundDrive(fakes.ATV71, console))
+    app.chosen = console
+    await app.push_screen(MonitorScreen(console))
+    await until(pilot, lambda: bottom(app).startswith(" Space STOP 2 "))
+    return console, stopped
+
+
+@SIZES
+async def test_the_stop_key_at_the_bottom_is_the_one_that_stops(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app = fakes.app_of(kind=fakes.Easel)
+    async with app.run_test(size=size) as pilot:
+        console, stopped = await on_monitor(app, pilot, monkeypatch)
+        for name, make in DIALOGS.items():
+            below = app.screen
+            app.push_screen(make(app, console))
+            await until(pilot, lambda: app.screen is not below and app.focused is not None)  # noqa: B023
+            stops = app.take_stop_key("space")
+            said = " Space STOP 2  F9 STOP ALL" if stops else " F12 STOP 2  F9 STOP ALL"
+            await until(pilot, lambda: bottom(app).rstrip() == said)  # noqa: B023
+            assert stopped == [False] * stops, name
+            assert app.take_stop_key("f12")
+            assert app.take_stop_key("f9")
+            assert stopped[-2:] == [False, True], name
+            stopped.clear()
+            if (field := app.focused) is not None and isinstance(field, Input):
+                app.screen.set_focus(None)  # as a click beside the field
+                await until(pilot, lambda: bottom(app).startswith(" Space STOP 2 "))
+                assert app.take_stop_key("space")
+                stopped.clear()
+            app.pop_screen()
+            await until(pilot, lambda: app.screen is below)  # noqa: B023
+            await until(pilot, lambda: bottom(app).startswith(" Space STOP 2  "))
+
+
+async def test_nothing_but_its_own_keys_moves_a_dialog(monkeypatch: pytest.MonkeyPatch) -> None:
+    app = fakes.app_of(kind=fakes.Easel)
+    async with app.run_test(size=(80, 24)) as pilot:
+        console, stopped = await on_monitor(app, pilot, monkeypatch)
+        done: list[str] = []
+        for name, make in DIALOGS.items():
+            app.push_screen(make(app, console), lambda answer: done.append(repr(answer)))
+            await until(pilot, lambda: not isinstance(app.screen, MonitorScreen))
+            dialog = app.screen
+            await pilot.press("ctrl+c", "ctrl+q", "1", "3", "r", "x", "a", "left_square_bracket")
+            await pilot.press("tab", "f2", "ctrl+p", "ctrl+s", "ctrl+l")
+            if name != "HelpScreen":  # whose key closes it, too
+                await pilot.press("f1")
+            assert app.screen is dialog, name
+            assert "Esc" in picture(app), f"{name}\n{picture(app)}"
+            await pilot.press("escape")
+            await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+            assert done.pop() in ("None", "False", "'stay'"), name
+        assert stopped == []
+
+
+EVERY_SIZE = pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])
+LONG = "\n".join(f"line {number} of what follows" for number in range(60))
+
+
+@EVERY_SIZE
+async def test_the_keys_of_a_dialog_are_in_sight_whatever_is_above_them(
+    size: tuple[int, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app = fakes.app_of(kind=fakes.Easel)
+    async with app.run_test(size=size) as pilot:
+        console, _ = await on_monitor(app, pilot, monkeypatch)
+        now = MotorsNow(app, [console.session] * 5)
+        long: dict[str, Make] = {
+            "long Confirm": lambda *_: Confirm(
+                "Write?", LONG, yes="y", no="n", loses=True, now=now
+            ),
+            "long Leave": lambda *_: Leave(LONG, now),
+        }
+        for name, make in {**DIALOGS, **long}.items():
+            if name == "HelpScreen":
+                continue  # it scrolls as a whole, and tells its key at the top
+            await app.push_screen(make(app, console))
+            await pilot.pause()
+            if name == "long Confirm":
+                await pilot.press("enter")  # that Enter is no answer takes a line more
+                await pilot.pause()
+            dialog = app.screen
+            hint = dialog.query_one("#hint")
+            assert isinstance(hint.parent, Widget)
+            box = hint.parent.content_region
+            assert hint.size.height, name
+            assert box.contains_region(hint.region), name
+            assert box.bottom <= size[1] - 2, name  # below it are the message and the stop keys
+            for part in dialog.query("#choices, #says"):  # its end can be read, too
+                assert part.region.bottom <= hint.region.y, name
+                assert part.size.height, name
+            app.pop_screen()
+            await pilot.pause()
