@@ -11,12 +11,12 @@ from textual.events import Key, Resize
 from textual.widget import Widget
 from textual.widgets import Input
 
-from tui.terminal.fields import takes_space
+from tui.terminal.fields import takes_space, takes_text
 from tui.widgets.drawing import key_line
 from tui.widgets.lines import Lines
 
 from .frame import SELDOM, Framed
-from .keys.table import elsewhere, keys_line
+from .keys.table import elsewhere, keys_line, typing_line
 
 
 class PanelScreen(Framed):
@@ -82,8 +82,16 @@ class PanelScreen(Framed):
 
     def _keys(self, width: int) -> list[Text]:
         """The line of keys."""
-        whom, typing = self.app.stops_whom, takes_space(self.focused)
-        return [key_line(keys_line(self.name_of_screen, width, whom, typing=typing))]
+        whom, field = self.app.stops_whom, self.focused
+        if takes_text(field):
+            keys = typing_line(width, whom, self.typing_keys(), spaces=takes_space(field))
+        else:
+            keys = keys_line(self.name_of_screen, width, whom)
+        return [key_line(keys)]
+
+    def typing_keys(self) -> Sequence[tuple[str, str]]:
+        """What Enter, Esc and their like do in the field that is typed into."""
+        return ()
 
     @property
     def name_of_screen(self) -> str:

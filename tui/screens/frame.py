@@ -17,7 +17,7 @@ from textual.screen import Screen
 from textual.widget import Widget
 
 from tui.drive.plain import plain
-from tui.terminal.fields import takes_space
+from tui.terminal.fields import takes_space, takes_text
 from tui.widgets.drawing import key_line, wrapped
 from tui.widgets.lines import Lines
 from tui.widgets.palette import ALARM, ATTENTION, FAINT, FAULT, PLAIN, STRONG
@@ -98,15 +98,21 @@ class Framed(Screen[Any]):
     def _parts(self, view: FrameView, width: int) -> dict[str, list[Text]]:
         here = (self.TITLE or "").lower() or view.place
         here = FRAMES if here == LISTENING else here  # a mode of it
+        lead = not self.takes_letters
         parts = {
             "strip": [strip_line(view.strip, width)],
-            "tabs": [tabs_line(TABS, here, view.marks, width)],
-            "said": said_lines(view.said, width),
+            "tabs": [tabs_line(TABS, here, view.marks, width, lead=lead)],
+            "said": said_lines(view.said, width, lead=lead),
         }
         if self.is_modal:
             stops = stop_keys(self.app.stops_whom, typing=takes_space(self.focused))
             parts[DIALOG_KEYS] = [key_line(stops)]
         return parts
+
+    @property
+    def takes_letters(self) -> bool:
+        """Whether digits and letters are not those of the panel now: a dialog, or a text."""
+        return self.is_modal or takes_text(self.focused)
 
     def watch_focused(self) -> None:
         """Whether Space is text now, or a stop, is told before the next key can come."""
@@ -158,8 +164,11 @@ class Framed(Screen[Any]):
         self._small.show(small_lines(view.strip, self.app.stops_whom, *self.size))
 
 
-def said_lines(said: Said | None, width: int) -> list[Text]:
-    """The message; one that warns and is new has as many lines as it takes, up to three."""
+def said_lines(said: Said | None, width: int, *, lead: bool = True) -> list[Text]:
+    """The message; one that warns and is new has as many lines as it takes, up to three.
+
+    `lead` says whether the keys that show more lead there now.
+    """
     if said is None:
         return [Text("")]
     style = SAID_STYLES.get(said.kind, FAINT)
@@ -172,8 +181,8 @@ def said_lines(said: Said | None, width: int) -> list[Text]:
             line.append(part, style)
             lines.append(line)
         return lines
-    hint = "m messages" if width >= 60 else ""
-    if said.there and said.kind == "fault" and width >= 72:
+    hint = "m messages" if width >= 60 and lead else ""
+    if lead and said.there and said.kind == "fault" and width >= 72:
         hint = "[ ] there"
     return [said_line(said.when, said.text, style, hint, width)]
 

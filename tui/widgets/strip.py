@@ -202,15 +202,23 @@ class Tab(NamedTuple):
 
 
 def tabs_line(
-    tabs: Sequence[Tab], chosen: str, marks: Mapping[str, tuple[str, Style]], width: int
+    tabs: Sequence[Tab],
+    chosen: str,
+    marks: Mapping[str, tuple[str, Style]],
+    width: int,
+    *,
+    lead: bool = True,
 ) -> Text:
-    """The second line: where the keys lead, what is there, and where we are."""
+    """The second line: where the keys lead, what is there, and where we are.
+
+    Where the keys do not `lead` there now, as digits are typed, they are drawn dim.
+    """
     full = sum(len(tab.name) + tab.room + 3 for tab in tabs) + 1
     wide = full <= width
     text, block = Text(no_wrap=True), (0, 0)
     for tab in tabs:
         here, start = tab.place == chosen, text.cell_len
-        text.append(f" {tab.key}", STRONG if here else KEY)
+        text.append(f" {tab.key}", STRONG if here and lead else KEY if lead else FAINT)
         text.append(f" {tab.name if wide else tab.narrow}", STRONG if here else FAINT)
         mark, style = marks.get(tab.place, ("", PLAIN))
         text.append(f" {mark}" if mark and wide else mark, style)

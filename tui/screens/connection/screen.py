@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, ClassVar
 
 from textual.widgets import Input, OptionList
@@ -44,6 +45,13 @@ class ConnectionScreen(WhyMeant, OtherSettings):
             return
         if self.action_scan():
             self.lines.focus()
+
+    def typing_keys(self) -> Sequence[tuple[str, str]]:
+        """Enter in a field does what it does in the list; other addresses are searched."""
+        field = self.focused
+        asks = field is not None and field.id == "addresses" and self.app.fleet is not None
+        searches = asks or self.is_on_open_line()
+        return (("Enter", "search" if searches else "open"), ("Tab", "next"))
 
     @property
     def pointed(self) -> DriveConsole | None:

@@ -214,6 +214,12 @@ class FrameListScreen(PanelScreen):
         self.set_focus(field)
         self.call_after_refresh(self.look)
 
+    def typing_keys(self) -> Sequence[tuple[str, str]]:
+        """Those of the filter, or of what is looked for."""
+        if self._asking == "find":
+            return ("Enter", "older one"), ("Esc", "ends")
+        return ("Enter", "keeps it"), ("Esc", "all frames")
+
     def _end_asking(self) -> None:
         self._asking = ""
         self.set_focus(None)

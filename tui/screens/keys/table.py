@@ -5,6 +5,7 @@ Bindings, the line of keys, the help screen and the command palette are made fro
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 
 from textual.binding import Binding, BindingType
@@ -43,6 +44,12 @@ ABOVE_MONITOR = (PARAMETERS, BLOCKS, FAULTS, SOURCES, FRAMES)
 OF_A_DRIVE = (MONITOR, *ABOVE_MONITOR)
 NEVER_DROPPED = ("stop_by_space", "help")
 """Actions that stand in the line of keys however narrow the terminal is."""
+WHILE_TYPING: tuple[KeyLabel, ...] = (
+    ("command_palette", "^p", "all"),
+    ("help", "F1", "help"),
+    ("quit", "^q", "leave"),
+)
+"""Keys of the whole panel that are no letters."""
 STOPS_ALL, STOPS_NOBODY = "STOP ALL", "no stop here"
 """What a line of keys says where the stop key means every drive, or none."""
 WRITE_SOURCE = "Write the chosen configuration; armed, motor at rest, asks."
@@ -184,17 +191,27 @@ def of_screen(screen: str) -> list[Action]:
     return [action for action in ACTIONS if screen in action.screens]
 
 
-def keys_line(
-    screen: str, width: int, stops: str = "STOP", *, typing: bool = False
-) -> list[KeyLabel]:
+def keys_line(screen: str, width: int, stops: str = "STOP") -> list[KeyLabel]:
     """The line of keys of a screen, the stop first; where it is narrow, without the last ones.
 
-    `stops` says whom the stop key stops; while a text is `typing`, that key is F12.
+    `stops` says whom the stop key stops.
     """
-    first = stop_keys(stops, typing=typing)[0]
+    first = stop_keys(stops, typing=False)[0]
     keys = [(action.id, action.shown, action.label) for action in of_screen(screen) if action.label]
     named = [first if key[0] == first[0] else key for key in keys]
     return fitting(named, width, NEVER_DROPPED)
+
+
+def typing_line(
+    width: int, stops: str, own: Sequence[tuple[str, str]], *, spaces: bool
+) -> list[KeyLabel]:
+    """The line of keys while a text is typed: no letter means anything else then.
+
+    `own` are the keys of that field and what they do; with `spaces` a space is text too.
+    """
+    first = stop_keys(stops, typing=spaces)[0]
+    keys = [first, *((f"typing {key}", key, does) for key, does in own), *WHILE_TYPING]
+    return fitting(keys, width, NEVER_DROPPED)
 
 
 def stop_keys(stops: str, *, typing: bool) -> list[KeyLabel]:
@@ -240,4 +257,5 @@ __all__ = [
     "keys_line",
     "of_screen",
     "stop_keys",
+    "typing_line",
 ]

@@ -79,6 +79,11 @@ class RunKeys(OrderKeys):
         """Whether keys are those of the line."""
         return self._line is not None
 
+    @property
+    def takes_letters(self) -> bool:
+        """Whether the line takes them."""
+        return self.line_is_open or super().takes_letters
+
     def run_line_lines(self, now: float, width: int) -> list[Text] | None:
         """The line and its keys; None while it is closed."""
         line = self._line

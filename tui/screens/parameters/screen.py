@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import ClassVar
 
 from rich.text import Text
@@ -164,6 +165,10 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     def action_search(self) -> None:
         """Into the search, at once: what is typed next is searched for."""
         self.set_focus(self.query_one("#search", Input))
+
+    def typing_keys(self) -> Sequence[tuple[str, str]]:
+        """Those of the search."""
+        return ("Enter", "to the list"), ("Esc", "clears it")
 
     def on_input_changed(self) -> None:
         """Search as one types; the best match is chosen."""
