@@ -24,6 +24,31 @@ DEFECTS = (
         KEYS,
     ),
     Defect(
+        "typed-name-takes-the-stop-away",
+        "tui/session/fleet.py",
+        "        if before is not None and before.session.known_identity == identity:\n"
+        "            return\n",
+        "",
+        "A slip in the name of a profile, and no key stops the motor that runs.",
+        ("tests/ui/test_found.py",),
+    ),
+    Defect(
+        "running-motor-taken-for-another-family",
+        "tui/session/fleet.py",
+        "runs = any(one is before for one in self.line_watch.under_command())",
+        "runs = False",
+        "A motor that was started here goes on when the panel is left, and nobody is asked.",
+        ("tests/ui/test_found.py",),
+    ),
+    Defect(
+        "stop-that-reaches-nobody-is-silent",
+        "tui/screens/hands.py",
+        '            self.events.add("failed", told)\n            if strangers',
+        "            if False and strangers",
+        "F9 stops all but one drive, and says nothing of it.",
+        ("tests/ui/test_stop_keys.py",),
+    ),
+    Defect(
         "keys-of-a-long-question-out-of-sight",
         "tui/screens/dialogs/question.py",
         "part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)",

@@ -322,11 +322,20 @@ async def test_arming_that_a_command_asked_for_does_not_run_out() -> None:
 
 async def test_a_drive_that_is_found_again_keeps_what_is_known_of_it() -> None:
     """A rescan while a motor runs by a command from here must not disown it."""
-    async with bench("atv71") as here:
+    async with bench("atv71", run_hz=20.0) as here:
         here.session.note_command()
         again = here.fleet.take(DriveSession(here.line, 1, here.session.profile))
         assert again is here.console
         assert here.fleet.console(1) is here.console
+        await until(lambda: here.fleet.line_watch.under_command() == [here.session])
+        named = DriveSession(here.line, 1, library.load("atv312"))
+        assert here.fleet.take(named) is here.console, "leaving has to ask"
+        assert "It runs by a command from here" in here.fleet.events.events[-1].text
+
+
+async def test_a_drive_that_is_named_otherwise_is_another_one() -> None:
+    async with bench("atv71") as here:
+        await until(lambda: not here.fleet.line_watch.under_command())
         other = here.fleet.take(DriveSession(here.line, 1, library.load("atv312")))
         assert other is not here.console
         assert not here.console.monitor.running

@@ -9,6 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from textual.visual import VisualType
 
+from tui.drive.profile import library
 from tui.screens.connection.drive_list import DriveList
 from tui.screens.connection.found import about_drive, next_step
 from tui.screens.connection.state import QUIET
@@ -23,7 +24,10 @@ from tui.screens.connection.wall import (
     wall_line,
 )
 from tui.session.connect.identify import DriveIdentity
-from tui.session.fleet import FoundDrive
+from tui.session.console import DriveConsole
+from tui.session.drive import DriveSession
+from tui.session.fleet import Fleet, FoundDrive
+from tui.session.journal import Journal
 from tui.widgets.palette import ALARM
 
 from . import fakes
@@ -149,3 +153,34 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives(
         screen.show_drives()
         assert [option.id for option in drives.options][:3] == ["5", "26", "1"]
         assert drives.chosen == 26
+
+
+# A drive that was found stays stoppable
+
+
+def taken() -> tuple[Fleet, DriveConsole]:
+    """An Altivar 71 that is looked after on a line."""
+    fleet = Fleet(fakes.StillLine(), Journal())
+    session = DriveSession(fleet.line, 2, library.load("atv71"), fakes.ATV71)
+    return fleet, fleet.take(session)
+
+
+def test_a_drive_whose_typed_profile_is_none_keeps_its_stop() -> None:
+    fleet, console = taken()
+    fleet.note(fakes.ATV71)
+    assert fleet.consoles == [console]
+    fleet.note(replace(fakes.ATV71, reference="ATV99"))  # another one stands there now
+    assert fleet.consoles == []
+
+
+def test_a_motor_that_runs_from_here_is_not_taken_for_another_family() -> None:
+    fleet, console = taken()
+    other = DriveSession(fleet.line, 2, library.load("atv21"), fakes.ATV71)
+    console.session.note_command()
+    assert fleet.take(other) is console
+    assert fleet.line_watch.under_command() == [console.session]
+    event = fleet.events.newest
+    assert event is not None
+    assert "It runs by a command from here: it stays" in event.text
+    console.session.commanded_at = None
+    assert fleet.take(other).session is other

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
+from dataclasses import replace
 
 import pytest
 from textual.events import Key, Paste
@@ -11,8 +12,11 @@ from textual.widgets import Input
 
 from tui.screens.base import PanelScreen
 from tui.screens.dialogs.ask import Ask
+from tui.screens.hands import NOBODY_TO_STOP
+from tui.session.fleet import FoundDrive
 from tui.terminal.stroke import Stroke, attach
 
+from . import fakes
 from .fakes import app_of
 from .test_flows import until
 
@@ -145,3 +149,32 @@ async def test_a_first_f12_stops_before_it_is_noted(monkeypatch: pytest.MonkeyPa
         assert app.take_stop_key("f12")
         assert before not in stamps
         assert stamps
+
+
+async def test_a_stop_that_reaches_nobody_says_so() -> None:
+    app = fakes.app_of()
+    async with app.run_test(notifications=True) as pilot:
+        assert app.take_stop_key("f9")
+        await until(pilot, lambda: app.events.newest is not None)
+        assert [event.text for event in app.events.events] == [NOBODY_TO_STOP]
+
+
+async def test_a_stop_tells_of_a_device_that_nobody_knows_how_to_stop() -> None:
+    app = fakes.app_of()
+    async with app.run_test(notifications=True) as pilot:
+        app.opened = fakes.opened()
+        app.fleet = fakes.StillFleet(
+            FoundDrive(fakes.ATV71, fakes.console_of(None)),
+            FoundDrive(replace(fakes.ATV71, device=7)),
+        )
+        for _ in range(2):
+            assert app.take_stop_key("f9")
+            await until(pilot, lambda: app.stroke is None)
+            await pilot.pause()
+        told = [event for event in app.events.events if event.kind == "failed"]
+        assert {event.text.partition(",")[0] for event in told} == {"NOT STOPPED: device 7"}
+        assert len(app._notifications) == 1, "over everything it is said once"
+        app.chosen = app.fleet.consoles[0]
+        assert app.take_stop_key("space")  # one drive is meant, and reached
+        await pilot.pause()
+        assert [event for event in app.events.events if event.kind == "failed"] == told

@@ -30,6 +30,11 @@ if TYPE_CHECKING:
 NO_STOP_HERE = (
     "No stop goes out to a line that is only listened to: its master stops it. Esc ends listening."
 )
+NOBODY_TO_STOP = "Nothing was stopped: no drive is known here."
+UNREACHED = (
+    "NOT STOPPED: device {}, as it is not known which drive it is. Stop it at the machine, or type"
+    " its profile on Line, then s."
+)
 STOP, STOP_ALL, STOP_OUTSIDE_TEXT = "f12", "f9", "space"
 
 
@@ -40,6 +45,8 @@ class Hands(Panel):
         super().__init__()
         self._stops = 0
         self._trying_f12 = False
+        self._unreached: list[int] = []
+        """Devices of which it was said over everything that no stop reaches them."""
         self._typed = TypeAhead(self, Admission(self, self).admits)
 
     def take_stop_key(self, key: str, left_at: float | None = None) -> bool:
@@ -130,6 +137,21 @@ class Hands(Panel):
                 self._stop_sessions(fleet, fleet.sessions)
             elif chosen in fleet.consoles:
                 self._stop_sessions(fleet, [chosen.session])
+        if chosen is None and not self.hearing:
+            soon_in_loop(self, self._tell_unreached)
+
+    def _tell_unreached(self) -> None:
+        """A stop of all that reached nobody, or not everybody, says so; once over everything."""
+        strangers = [device for fleet in self.fleets for device in fleet.strangers]
+        if not strangers:
+            if not any(fleet.sessions for fleet in self.fleets):
+                self.tell(NOBODY_TO_STOP)
+        else:
+            told = UNREACHED.format(", ".join(map(str, strangers)))
+            self.events.add("failed", told)
+            if strangers != self._unreached:
+                self.cry(told)
+        self._unreached = strangers
 
     def _stop_sessions(
         self, fleet: Fleet, sessions: list[DriveSession], order: OrderId = "stop"

@@ -109,7 +109,13 @@ class Fleet:
         return found.console if found else None
 
     def note(self, identity: DriveIdentity) -> None:
-        """A drive answered; what it is taken for is not known yet. It is asked on."""
+        """A drive answered; what it is taken for is not known yet. It is asked on.
+
+        One that is known already stays as it is: without its session no key would stop it.
+        """
+        before = self.console(identity.device)
+        if before is not None and before.session.known_identity == identity:
+            return
         self._put(FoundDrive(identity))
         self._strangers.keep(identity.device)
 
@@ -119,10 +125,13 @@ class Fleet:
         """Look after a drive from now on.
 
         One that is known already stays as it is: what was commanded and staged is not forgotten.
+        So does one whose motor may run by a command from here, by whatever name it is called now.
         """
         before = self.console(session.device)
         if before is not None and _same(before.session, session):
             self._put(FoundDrive(identity or session.known_identity, before, guessed))
+            return before
+        if before is not None and self._runs_as_it_is(before.session, session):
             return before
         session.starts = self.starts
         session.work.on_tell = partial(self._note_outcome, session.device)
@@ -136,6 +145,18 @@ class Fleet:
         # reads files: in a thread that nobody waits for
         threading.Thread(target=self._recall, args=(console,), daemon=True).start()
         return console
+
+    def _runs_as_it_is(self, before: DriveSession, session: DriveSession) -> bool:
+        """Whether the same drive is taken for another family while its motor may run; tells it."""
+        runs = any(one is before for one in self.line_watch.under_command())
+        if not runs or before.known_identity != session.known_identity:
+            return False
+        names = before.profile.name, session.profile.name
+        told = (
+            f"It runs by a command from here: it stays {names[0]}. Stop it, then name {names[1]}."
+        )
+        self.events.add("refused", told, session.device)
+        return True
 
     def _recall(self, console: DriveConsole) -> None:
         """What earlier programs have left of a drive: a motor that runs, and what was taught."""
@@ -204,6 +225,11 @@ class Fleet:
     ) -> None:
         """Stop drives; may be called in any thread. Raises LineClosed."""
         self.stopper.stop(sessions, order, by)
+
+    @property
+    def strangers(self) -> list[int]:
+        """Devices that answered and that no stop reaches: nobody knows the word that stops them."""
+        return [device for device, one in self._found.items() if one.console is None]
 
     @property
     def stamp(self) -> Stamp:
