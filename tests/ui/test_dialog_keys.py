@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import importlib
 import pkgutil
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -170,6 +171,37 @@ async def test_nothing_but_its_own_keys_moves_a_dialog(monkeypatch: pytest.Monke
             await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
             assert done.pop() in ("None", "False", "'stay'"), name
         assert stopped == []
+
+
+LETTERS = re.compile(r"(?:^|  )([^ ]) ")
+"""A key of one letter in a line of keys."""
+
+
+@pytest.mark.parametrize(("screen", "key"), [("3", "/"), ("7", "O"), ("7", "j"), ("1", "c")])
+async def test_no_letter_is_promised_where_it_is_typed(
+    screen: str, key: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    app = fakes.app_of()
+    async with app.run_test(size=(80, 24)) as pilot:
+        await on_monitor(app, pilot, monkeypatch)
+        await until(pilot, lambda: app.connection.form._there or app.screen is not app.connection)
+        await pilot.press(screen)
+        await until(pilot, lambda: bool(LETTERS.findall(bottom(app))))
+        before = bottom(app)
+        await pilot.press(key)
+        await until(pilot, lambda: isinstance(app.focused, Input))
+        await until(pilot, lambda: bottom(app) != before)
+        assert not LETTERS.findall(bottom(app))
+        assert "F1 help" in bottom(app)
+        assert "m messages" not in picture(app)
+        typed, place = app.focused, app.screen
+        assert isinstance(typed, Input)
+        text = typed.value
+        await pilot.press("end", "m", "4")
+        assert (typed.value, app.screen) == (f"{text}m4", place)
+        await pilot.press("escape")
+        await until(pilot, lambda: not isinstance(app.focused, Input))
+        await until(pilot, lambda: bottom(app) == before)
 
 
 EVERY_SIZE = pytest.mark.parametrize("size", [(60, 16), (80, 24), (120, 40)])

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from textual import work
+from textual.widgets import Input
 
 from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
@@ -207,7 +208,7 @@ class Scanning(LineView):
             )
         known = self.app.opened.known if self.app.opened else None
         if known is not None:
-            told = (identity, identity.device, "" if guessed else profile.id)
+            told = (identity, identity.device, "" if guessed else console.session.profile.id)
             # reads files: in a thread that nobody waits for
             threading.Thread(target=known.note, args=told, daemon=True).start()
 
@@ -234,7 +235,10 @@ class Scanning(LineView):
         self.app.show_monitor(drive.console)
 
     def action_stop_scan(self) -> None:
-        """End the search."""
+        """Out of a field, with what was typed there; else end the search."""
+        if isinstance(self.focused, Input):
+            self.lines.focus()
+            return
         stopped = self.scanning
         self.end_search()
         if stopped:

@@ -51,7 +51,7 @@ class ConnectionScreen(WhyMeant, OtherSettings):
         field = self.focused
         asks = field is not None and field.id == "addresses" and self.app.fleet is not None
         searches = asks or self.is_on_open_line()
-        return (("Enter", "search" if searches else "open"), ("Tab", "next"))
+        return (("Enter", "search" if searches else "open"), ("Esc", "to the list"))
 
     @property
     def pointed(self) -> DriveConsole | None:

@@ -84,7 +84,7 @@ ACTIONS: tuple[Action, ...] = (
         ("scan", "s", "search", "Search for drives at the addresses given; those found stay."),
         ("addresses", "c", "range", "Change the addresses to search: 1-31, or 1,3,5-7."),
         ("type_line", "n", "line", "Type a line: serial, TCP, RTU over TCP, sim."),
-        ("stop_scan", "escape", "", "End the search for drives."),
+        ("stop_scan", "escape", "", "Out of a field, then end the search for drives."),
         ("scan_settings", "", "", SCAN_SETTINGS),
         ("refresh_lines", "", "", "Look for serial ports again."),
         ("disconnect", "", "", "Close the line; asks where a drive acts on that."),
