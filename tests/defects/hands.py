@@ -49,6 +49,14 @@ DEFECTS = (
         ("tests/ui/test_stop_keys.py",),
     ),
     Defect(
+        "counters-reset-unarmed",
+        "tui/screens/frames/counter_keys.py",
+        "Task(self._reset_drive, owner=self.console), stamp",
+        "Task(self._reset_drive, armed=False)",
+        "A drive is written to though its arming has ended while a question stood.",
+        ("tests/ui/test_frames_screen.py",),
+    ),
+    Defect(
         "keys-of-a-long-question-out-of-sight",
         "tui/screens/dialogs/question.py",
         "part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)",

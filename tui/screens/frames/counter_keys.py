@@ -5,8 +5,10 @@ from __future__ import annotations
 from rich.text import Text
 
 from tui.bus.errors import LineError
+from tui.drive.orders import OrderRefused
 from tui.drive.plain import plain
 from tui.session.console import DriveConsole
+from tui.session.work import Permit, Task
 
 from ..base import PanelScreen
 
@@ -85,9 +87,15 @@ class CounterKeys(PanelScreen):
         from ..dialogs.confirm import Confirm
         from ..dialogs.now import MotorsNow
 
+        stamp = self.session.work.stops
+
         def told(sure: bool | None) -> None:
-            if sure:
-                self.run_worker(self._reset_drive(), group="counters")
+            if not sure:
+                return
+            try:
+                self.session.work.put(Task(self._reset_drive, owner=self.console), stamp)
+            except OrderRefused as refused:  # it is not armed any more, or was stopped since
+                self.app.events.add("refused", f"Counters not reset: {refused}", device)
 
         asked = Confirm(
             f"Reset the counters of drive {device}?",
@@ -99,15 +107,12 @@ class CounterKeys(PanelScreen):
         )
         self.app.push_screen(asked, told)
 
-    async def _reset_drive(self) -> None:
-        device = self.session.device
+    async def _reset_drive(self, _: Permit) -> str:
         try:
             await self.console.counters.reset_drive(self.console.journal)
         except LineError as error:
-            self.app.events.add("refused", f"Counters not reset: {error}", device)
-        else:
-            self.app.events.add("done", "The drive's counters are reset.", device)
-        self.look()
+            raise OrderRefused(f"Counters not reset: {error}") from error
+        return "The drive's counters are reset."
 
     def _shown_or_told(self) -> bool:
         if not self.shows_counters:
