@@ -57,6 +57,14 @@ DEFECTS = (
         ("tests/ui/test_frames_screen.py",),
     ),
     Defect(
+        "typed-on-into-a-question",
+        "tui/screens/dialogs/question.py",
+        "return now - max(self._drawn, self._key_at) < QUIET",
+        "return now - self._drawn < self.SETTLED",
+        "Who types a word with a y in it writes what a question that has just come asks about.",
+        ("tests/ui/test_questions.py",),
+    ),
+    Defect(
         "keys-of-a-long-question-out-of-sight",
         "tui/screens/dialogs/question.py",
         "part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)",

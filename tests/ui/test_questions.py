@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any, cast
 
 import pytest
 from rich.text import Text
+from textual.keys import _character_to_key
 from textual.screen import ModalScreen
 
 from tests.sweeps import kept
@@ -21,6 +23,7 @@ from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorsNow
 from tui.screens.dialogs.question import Question, void_questions
 from tui.screens.keys.help import HelpScreen
+from tui.screens.parameters.results import RestQuestion
 from tui.screens.parameters.screen import ParametersScreen
 from tui.session.monitor.line_watch import Look
 from tui.session.monitor.snapshot import Snapshot
@@ -60,8 +63,12 @@ def slow_hands(monkeypatch: pytest.MonkeyPatch, quick_hands: None) -> None:
     monkeypatch.setattr(Question, "_is_early", IS_EARLY)
 
 
-def confirm(*, loses: bool = True, now: MotorsNow | None = None) -> Confirm:
-    return Confirm("Write?", "It is written.", yes="writes", no="no", loses=loses, now=now)
+def confirm(
+    *, loses: bool = True, now: MotorsNow | None = None, by_itself: bool = False
+) -> Confirm:
+    return Confirm(
+        "Write?", "It is written.", yes="writes", no="no", loses=loses, now=now, by_itself=by_itself
+    )
 
 
 class Asked:
@@ -136,6 +143,43 @@ async def test_no_is_no_on_three_keys(key: str, loses: bool) -> None:
         await asked.put(pilot)
         await pilot.press(key)
         await until(pilot, lambda: asked.answers == [False])
+
+
+@pytest.mark.usefixtures("slow_hands")
+async def test_what_is_typed_on_is_no_answer_to_a_question_that_comes_by_itself() -> None:
+    asked = Asked(confirm(by_itself=True))
+    async with asked.app.run_test(size=(80, 24)) as pilot:
+        await asked.put(pilot)
+        for key in "frequency,any\ry":
+            asked.clock.now += 0.9
+            await pilot.press(_character_to_key(key))
+        assert asked.answers == []
+        assert asked.app.events.newest is not None
+        assert "A question came meanwhile" in asked.app.events.newest.text
+        asked.clock.now += 1.01
+        await pilot.press("y")
+        await until(pilot, lambda: asked.answers == [True])
+    for key in ("escape", "n"):
+        asked = Asked(confirm(by_itself=True))
+        async with asked.app.run_test(size=(80, 24)) as pilot:
+            await asked.put(pilot)
+            asked.clock.now += 0.0 if key == "escape" else 1.01
+            await pilot.press(key)
+            await until(pilot, lambda: asked.answers == [False])  # noqa: B023
+
+
+@pytest.mark.parametrize(
+    ("place", "calls"),
+    [
+        ("tui/screens/line_check.py", 1),
+        ("tui/screens/command/command_keys.py", 1),
+        ("tui/screens/command/teaching.py", 1),
+        ("tui/screens/parameters/write_keys.py", 1),
+    ],
+)
+def test_questions_that_no_key_asks_for_come_by_themselves(place: str, calls: int) -> None:
+    assert Path(place).read_text().count("by_itself=True") == calls
+    assert RestQuestion.by_itself
 
 
 async def test_enter_is_no_yes_where_something_is_lost_and_that_is_said() -> None:

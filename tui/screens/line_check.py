@@ -37,7 +37,7 @@ class LineCheck(Panel):
         if not known.changed:
             self._asked_of = ()
         elif set(known.changed) - {*self._asked_of} and not self._is_busy():
-            self._ask(known)
+            self._ask(known, by_itself=True)
 
     def action_accept_line(self) -> None:
         """Ask again whether the line is meant as it is now."""
@@ -65,7 +65,7 @@ class LineCheck(Panel):
         if before not in (None, state.since):
             threading.Thread(target=known.look, name="line check", daemon=True).start()
 
-    def _ask(self, known: KnownLine) -> None:
+    def _ask(self, known: KnownLine, *, by_itself: bool = False) -> None:
         from .dialogs.confirm import Confirm
 
         self._asked_of = changed = known.changed
@@ -84,5 +84,6 @@ class LineCheck(Panel):
             yes="takes it as it is now",
             no="keeps it read-only",
             loses=True,
+            by_itself=by_itself,
         )
         self.push_screen(asked, told)

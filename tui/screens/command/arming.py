@@ -52,11 +52,13 @@ class ArmingKeys(PanelScreen):
         no: str,
         work: Callable[[int], object],
         refused: Callable[[], object] = lambda: None,
+        *,
+        by_itself: bool = False,
     ) -> None:
         """Ask with `y` before something is written or moved; refusals are told on this screen.
 
         `work` gets the drive's count of stops of the moment of asking: a stop since voids it.
-        `refused` is called for a no.
+        `refused` is called for a no. A question that no key has asked for comes `by_itself`.
         """
         from ..dialogs.confirm import Confirm
 
@@ -73,7 +75,7 @@ class ArmingKeys(PanelScreen):
             self.look()
 
         now = self.motor_now()
-        asked = Confirm(question, follows, yes=yes, no=no, loses=True, now=now)
+        asked = Confirm(question, follows, yes=yes, no=no, loses=True, now=now, by_itself=by_itself)
         self.app.push_screen(asked, told)
 
     def _armed(self) -> bool:

@@ -86,7 +86,8 @@ class OrderKeys(TeachKeys):
             starts.unrecorded = True
             self.commander.run(order, reference, stamp)
 
-        self._ask(f"Run {order} unrecorded?", str(outcome.error), "runs it", "does not run it", run)
+        question, why = f"Run {order} unrecorded?", str(outcome.error)
+        self._ask(question, why, "runs it", "does not run it", run, by_itself=True)
 
     def _refuse(self, text: str) -> None:
         self.commander.refuse(text)

@@ -77,10 +77,10 @@ class TeachKeys(ArmingKeys):
             if teacher.trouble:
                 self.app.notify(teacher.trouble, severity="warning")
             if teacher.proposal() == code and self.is_current:
-                self.ask_reference(code)
+                self.ask_reference(code, by_itself=True)
         self.look()
 
-    def ask_reference(self, code: str) -> None:
+    def ask_reference(self, code: str, *, by_itself: bool = False) -> None:
         """Ask whether a taught parameter shall take the reference from now on."""
         from tui.session.teaching.teacher import reference_asks
 
@@ -88,7 +88,8 @@ class TeachKeys(ArmingKeys):
             self.run_worker(self._settle(lambda: self.teacher.confirm_reference(code)))
 
         follows = reference_asks(self.session.family, code)
-        self._ask(f"Give the reference by {code}?", follows, "gives it so", "does not", confirm)
+        question = f"Give the reference by {code}?"
+        self._ask(question, follows, "gives it so", "does not", confirm, by_itself=by_itself)
 
     def ask_no_reference(self, code: str) -> None:
         """Ask whether a taught parameter shall take the reference no longer."""

@@ -22,7 +22,7 @@ class Confirm(KeyQuestion[bool]):
     """Says what follows; True for `y`, False for Esc, `q` and `n`.
 
     `yes` and `no` say what the keys do. Where it `loses` nothing, because nothing is written,
-    moved or deleted, Enter is yes too.
+    moved or deleted, Enter is yes too. One that comes `by_itself` waits until nobody types.
     """
 
     NO = False
@@ -40,8 +40,10 @@ class Confirm(KeyQuestion[bool]):
         no: str,
         loses: bool,
         now: MotorsNow | None = None,
+        by_itself: bool = False,
     ) -> None:
         super().__init__(now)
+        self.by_itself = by_itself
         self._question = question
         self._follows = follows
         self._loses = loses

@@ -6,6 +6,7 @@ typed before it was there was meant for something else.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, TypeVar
 from rich.text import Text
 from textual.app import ComposeResult
 from textual.binding import Binding
-from textual.events import Resize, ScreenResume
+from textual.events import Key, Resize, ScreenResume
 from textual.screen import ModalScreen
 from textual.widget import Widget
 
@@ -37,6 +38,10 @@ DIALOG_SHARE, BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 0.83, 2, 4, 2
 """Of the screen's rows those of a dialog at most; of its border; columns of border and padding;
 rows that a list keeps."""
 
+QUIET = 1.0
+"""Seconds without a key after which a question that comes by itself takes an answer."""
+TYPED_ON = "A question came meanwhile: after a second without a key it takes an answer."
+
 NOW_EVERY = 0.5
 """Seconds between two looks at what the motor does."""
 
@@ -51,18 +56,29 @@ class Question(Framed, ModalScreen[T]):
     """The answer that changes nothing."""
     GUARDED: ClassVar[str] = "enter"
     """Keys that are swallowed until the question has stood for that time."""
+    NO_KEYS: ClassVar[str] = ""
+    """Keys that are no, besides Esc."""
+    by_itself = False
+    """Whether it comes while somebody may be typing something else: what is typed on is no answer,
+    no is none either."""
     BINDINGS: ClassVar = [Binding("escape", "no", show=False)]
 
     def __init_subclass__(cls, **how: Any) -> None:
         """Guard the keys of each question: Textual lets a class replace those of its base."""
         guard = Binding(cls.GUARDED, "swallow", show=False, priority=True)
-        cls.BINDINGS = [guard, *vars(cls).get("BINDINGS", ())]
+        own = [guard, *vars(cls).get("BINDINGS", ())]
+        if cls.NO_KEYS:
+            own.insert(0, Binding(cls.NO_KEYS, "swallow_no", show=False, priority=True))
+            own.append(Binding(cls.NO_KEYS, "no", show=False))
+        cls.BINDINGS = own
         super().__init_subclass__(**how)
 
     def __init__(self, now: MotorsNow | None = None) -> None:
         super().__init__()
         self._now = now
         self._drawn: float | None = None
+        self._key_at = -math.inf
+        """When the last key came."""
         self._voided = self._answered = False
 
     def compose(self) -> ComposeResult:
@@ -140,10 +156,23 @@ class Question(Framed, ModalScreen[T]):
         """A key that comes too early is swallowed; later the binding does not count."""
         if action == "swallow":
             return self._is_early()
+        if action == "swallow_no":
+            return self.by_itself and self._is_early()
         return super().check_action(action, parameters)
 
+    def on_key(self, event: Key) -> None:
+        """Somebody types."""
+        self._key_at = self.app.clock.monotonic()
+
     def action_swallow(self) -> None:
-        """Nothing is done."""
+        """Nothing is done; who types on is told why."""
+        self._key_at = self.app.clock.monotonic()
+        if self.by_itself:
+            self.app.tell(TYPED_ON)
+
+    def action_swallow_no(self) -> None:
+        """As a yes that comes too early."""
+        self.action_swallow()
 
     def action_no(self) -> None:
         """Change nothing."""
@@ -153,7 +182,12 @@ class Question(Framed, ModalScreen[T]):
         self._drawn = self.app.clock.monotonic()
 
     def _is_early(self) -> bool:
-        return self._drawn is None or self.app.clock.monotonic() - self._drawn < self.SETTLED
+        if self._drawn is None:
+            return True
+        now = self.app.clock.monotonic()
+        if self.by_itself:
+            return now - max(self._drawn, self._key_at) < QUIET
+        return now - self._drawn < self.SETTLED
 
     def _tell_now(self) -> None:
         if self._now is not None and self.is_active:
@@ -166,7 +200,7 @@ class KeyQuestion(Question[T]):
     """A question that keys alone answer: no text is typed, so `q` and `n` are no too."""
 
     GUARDED = "enter,y"
-    BINDINGS: ClassVar = [Binding("q,n", "no", show=False)]
+    NO_KEYS = "q,n"
 
 
 def hint(*keys: tuple[str, str]) -> Text:

@@ -56,6 +56,7 @@ class RestQuestion(KeyQuestion[bool]):
     """Whether the edits behind one that failed are written all the same."""
 
     NO = False
+    by_itself = True
     BINDINGS: ClassVar = [Binding("y", "yes", show=False)]
 
     def __init__(self, applied: Applied, now: MotorsNow) -> None:

@@ -117,5 +117,6 @@ class WriteKeys(ParameterKeys):
             no="stays",
             loses=len(self.app.fleet.sessions if self.app.fleet else ()) > 1,
             now=self.motor_now(),
+            by_itself=True,
         )
         self.app.push_screen(asked, told)
