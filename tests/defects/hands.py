@@ -65,6 +65,14 @@ DEFECTS = (
         ("tests/ui/test_questions.py",),
     ),
     Defect(
+        "report-cuts-a-stop-key",
+        "tui/terminal/dialects.py",
+        "        self._late_until = self._late_before\n        if self._cut is not None:",
+        "        if False and self._cut is not None:",
+        "Behind tmux a link cuts F12 in two, a report comes in between, and nothing stops.",
+        ("tests/terminal/test_dialects.py",),
+    ),
+    Defect(
         "keys-of-a-long-question-out-of-sight",
         "tui/screens/dialogs/question.py",
         "part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)",

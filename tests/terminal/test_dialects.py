@@ -68,6 +68,22 @@ def test_a_function_key_in_several_reads_is_that_key_or_none(gap: float) -> None
             assert found == [*late, key] or (key not in STOPS and found == late), (key, reads)
 
 
+@pytest.mark.parametrize("gap", GAPS)
+@pytest.mark.parametrize("report", ["\x1b[12;40R", "\x1b[?2026;2$y", "\x1b[?62;22c"])
+def test_a_report_between_the_halves_of_a_key_is_no_part_of_it(report: str, gap: float) -> None:
+    """A multiplexer reports where the cursor is while the other half is still on its way to it."""
+    for sequence, key in FUNCTION_KEYS:
+        for first, rest in (each for each in cuts(sequence) if len(each) == 2):
+            tokenizer, found = Tokenizer(), list[Token]()
+            for number, read in enumerate((first, report, rest)):
+                found += tokenizer.tick(number * gap / 2)
+                found += tokenizer.feed(read, number * gap / 2)
+            found += tokenizer.tick(AFTERWARDS)
+            keys = [token.name for token in found if isinstance(token, KeyToken)]
+            keys = keys[1:] if first == "\x1b" and keys[:1] == ["escape"] else keys
+            assert keys in ([key], [] if key not in STOPS else [key]), (key, first, found)
+
+
 @pytest.mark.parametrize("dialect", SHIFTED_AND_MORE)
 @pytest.mark.parametrize("gap", GAPS)
 def test_other_keys_of_the_dialects_type_nothing_and_stop_nothing(dialect: str, gap: float) -> None:

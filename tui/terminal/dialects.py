@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 from .names import STOP_KEYS, Named, of_character, of_sequence, with_alt
 from .tokens import KeyToken, Paste, Report, Token
@@ -69,7 +69,11 @@ class Tokenizer:
         self._mark: object = None
         self._here: object = None
         self._alt = self._mute = False
-        self._late_until = float("-inf")
+        self._cut: tuple[Any, ...] | None = None
+        """A sequence in which another one began: where that is a report, the first goes on."""
+        self._late_until = self._late_before = float("-inf")
+        """Until when the rest of a sequence may come whose ESC was taken for the key Escape; and as
+        that was when the present sequence began, which may be a report that came between."""
         self._found: list[Token] = []
 
     def feed(self, text: str, now: float, mark: object = None) -> list[Token]:
@@ -111,7 +115,7 @@ class Tokenizer:
         """A key or a sequence begins with what is read now."""
         self._text, self._long = text, []
         self._began, self._mark = self._now, self._here
-        self._alt, self._mute = False, mute
+        self._alt, self._mute, self._cut = False, mute, None
 
     def _key(self, named: Named | None) -> None:
         """Give a key out; the sequence that it came in is over."""
@@ -128,7 +132,8 @@ class Tokenizer:
 
     def _ground(self, character: str) -> None:
         """Nothing has begun: a key, or the first character of a sequence."""
-        late, self._late_until = self._now <= self._late_until, float("-inf")
+        late, self._late_before = self._now <= self._late_until, self._late_until
+        self._late_until = float("-inf")
         if late and character in "[O":
             # the rest of a sequence whose ESC was taken for the key Escape
             self._begin(ESC, mute=True)
@@ -149,6 +154,7 @@ class Tokenizer:
             together = self._now == self._began and not self._alt
             if not together:
                 self._escape_key()
+            self._late_before = self._began + self._escape_delay + SEQUENCE_WITHIN
             self._begin(ESC)
             self._alt = together  # ESC twice at once is Alt with what follows
         elif character in "[O" or character in _REPLY_BEGINS:
@@ -164,8 +170,9 @@ class Tokenizer:
     def _broken(self, character: str) -> bool:
         """Whether a character ends a sequence of keys that it cannot belong to."""
         if character == ESC:
-            self._state = self._ground
+            cut = self._state, self._text, self._began, self._mark, self._alt, self._mute
             self._ground(character)
+            self._cut = cut
         elif character == " ":
             self._begin()
             self._key(SPACE_ALONE)
@@ -216,8 +223,19 @@ class Tokenizer:
             self._state = self._paste
         elif _REPORT.fullmatch(text) or (self._mouse and _MOUSE.fullmatch(text)):
             self._found.append(Report(text))
+            self._go_on()
         else:
-            self._key(of_sequence(text[: LONGEST_KEY + 1], kitty=self._mouse))
+            named = of_sequence(text[: LONGEST_KEY + 1], kitty=self._mouse)
+            self._key(named)
+            if named is None:
+                self._go_on()
+
+    def _go_on(self) -> None:
+        """What came was no key: the sequence that it came into, whole or late, goes on."""
+        self._late_until = self._late_before
+        if self._cut is not None:
+            (self._state, self._text, self._began, self._mark, self._alt, self._mute) = self._cut
+            self._cut = None
 
     def _opening(self, character: str) -> None:
         """After ESC ], ESC P or ESC _: a reply, or a key with Alt."""
