@@ -506,3 +506,17 @@ async def test_the_keys_of_leaving_stand_below_however_much_is_told(
         box = asked.question.query_one("#dialog").content_region
         assert box.contains_region(asked.question.query_one("#hint").region)
         assert asked.question.query_one("#says").max_scroll_y > 0
+
+
+async def test_enter_on_control_says_why_nothing_is_asked() -> None:
+    async with bench("atv71") as made:
+        await made.pilot.press("6")
+        await until(made.pilot, lambda: isinstance(made.app.screen, ControlSourceScreen))
+        await until(
+            made.pilot, lambda: "Nothing: the drive is set up so" in shown(made.app, "detail")
+        )
+        await made.pilot.press("enter")
+        await until(made.pilot, lambda: "Nothing to write" in shown(made.app, "said"))
+        await made.pilot.press("down", "enter")
+        await until(made.pilot, lambda: "Not armed" in shown(made.app, "said"))
+        assert writes(made.app) == []

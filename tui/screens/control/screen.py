@@ -156,7 +156,11 @@ class ControlSourceScreen(OrderKeys):
     def action_write_chosen(self) -> None:
         """Say what follows, and write it."""
         found = source_changes(self.session.profile, self._chosen, self._raws)
-        if self._armed_or_told() and found and self._raws:
+        if not self._raws:
+            self._refuse("How the drive is set up was not read yet.")
+        elif not found:
+            self._refuse("Nothing to write: the drive is set up so.")
+        elif self._armed_or_told():
             codes = ", ".join(change.parameter.code for change in found)
             follows = (
                 f"Writes {codes}, each read back. A run command that waits at the new source"
