@@ -73,6 +73,14 @@ DEFECTS = (
         ("tests/terminal/test_dialects.py",),
     ),
     Defect(
+        "long-name-ends-the-panel",
+        "tui/screens/dialogs/files.py",
+        "except OSError as error:",
+        "except FileExistsError as error:",
+        "A long text is pasted for the name of a file, and the panel ends, motors and all.",
+        ("tests/ui/test_dialog_keys.py",),
+    ),
+    Defect(
         "keys-of-a-long-question-out-of-sight",
         "tui/screens/dialogs/question.py",
         "part.styles.max_height = max(LEAST_ROWS, rows - part.styles.margin.height)",

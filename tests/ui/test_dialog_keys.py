@@ -16,13 +16,16 @@ from textual.widgets import Input
 
 import tui.screens
 from tui.app import DrivePanelApp
+from tui.bus.errors import LinkSyntaxError
 from tui.drive.profile import library
 from tui.drive.settings.edits import Edits
 from tui.screens.blocks.pick_parameter import PickParameter
 from tui.screens.command.options import OptionsScreen
-from tui.screens.command.teaching import PickWord
+from tui.screens.command.teaching import PickWord, fault_of_look
+from tui.screens.connection.choices import fault_of_line
 from tui.screens.dialogs.ask import Ask
 from tui.screens.dialogs.confirm import Confirm
+from tui.screens.dialogs.files import fault_of_new
 from tui.screens.dialogs.leave import Leave
 from tui.screens.dialogs.now import MotorsNow
 from tui.screens.dialogs.palette import Palette
@@ -30,11 +33,13 @@ from tui.screens.dialogs.pick_file import PickFile
 from tui.screens.dialogs.question import KeyQuestion, Question
 from tui.screens.dialogs.why import WhyScreen
 from tui.screens.frame import Framed
+from tui.screens.frames.choice import choice_of
 from tui.screens.keys.help import HelpScreen
-from tui.screens.monitor.screen import MonitorScreen
+from tui.screens.monitor.screen import MonitorScreen, fault_of_rating
 from tui.screens.parameters.edit_value import EditBits, EditNumber, PickValue
 from tui.screens.parameters.results import RestQuestion, Results
 from tui.screens.parameters.skipped import Skipped
+from tui.session.connect.addresses import parse_addresses
 from tui.session.console import DriveConsole
 from tui.session.diagnosis.diagnosis import Diagnosis
 from tui.session.fleet import FoundDrive
@@ -242,3 +247,58 @@ async def test_the_keys_of_a_dialog_are_in_sight_whatever_is_above_them(
                 assert part.size.height, name
             app.pop_screen()
             await pilot.pause()
+
+
+@pytest.mark.parametrize(
+    ("name", "why"),
+    [
+        ("", "needed"),
+        ("x" * 300, "No file can be made there"),
+        ("~nobody-of-that-name/x.toml", "no home folder of ~nobody"),
+        ("a\x00b", "control characters"),
+    ],
+)
+async def test_a_name_that_no_file_can_have_is_refused_where_it_is_typed(
+    name: str, why: str
+) -> None:
+    app = fakes.app_of(kind=fakes.Easel)
+    async with app.run_test(size=(80, 24)) as pilot:
+        app.push_screen(Ask("Save to", fault_of_new, text="x"))
+        await until(pilot, lambda: isinstance(app.focused, Input))
+        app.screen.query_one(Input).value = name
+        await pilot.press("enter")
+        await until(pilot, lambda: why in picture(app))
+        assert app._exception is None
+
+
+def faults_of(parse: Callable[[str], object]) -> Callable[[str], str]:
+    """What a parser says of a text."""
+
+    def check(text: str) -> str:
+        with pytest.raises(LinkSyntaxError) as refused:
+            parse(text)
+        return str(refused.value)
+
+    return check
+
+
+LONG_NUMBER = "9" * 5000
+"""More digits than Python's int() takes, as a paste may bring them."""
+CHECKS: dict[str, tuple[Callable[[str], object], tuple[str, ...]]] = {
+    "rating": (fault_of_rating, ("NaN", "sNaN", "-Infinity", LONG_NUMBER)),
+    "frames": (choice_of, (LONG_NUMBER, f"f{LONG_NUMBER}", "f", "2 f16")),
+    "line": (
+        fault_of_line,
+        (f"sim:atv71@{LONG_NUMBER}", f"tcp:h:{LONG_NUMBER}", f"serial:/dev/null,{LONG_NUMBER}"),
+    ),
+    "display": (fault_of_look, (LONG_NUMBER, f"{LONG_NUMBER}Hz", "NaNHz")),
+    "addresses": (faults_of(parse_addresses), (LONG_NUMBER, f"1-{LONG_NUMBER}", "1-")),
+}
+
+
+@pytest.mark.parametrize("name", CHECKS)
+def test_what_is_typed_or_pasted_is_refused_and_ends_nothing(name: str) -> None:
+    check, texts = CHECKS[name]
+    for text in texts:
+        told = check(text)
+        assert told or text == "f", text[:20]

@@ -113,7 +113,8 @@ def _serial(text: str, rest: str, usual: UsualSettings) -> SerialLink:
     if len(settings) > 2:
         raise LinkSyntaxError(f"{text}: too many settings. Write {FORMS}.")
     baud = settings[0] if settings else str(usual.baud)
-    if not (baud.isascii() and baud.isdecimal() and 50 <= int(baud) <= 4_000_000):
+    # by its length first: more digits can be pasted than int() takes
+    if not (re.fullmatch("[0-9]{1,9}", baud) and 50 <= int(baud) <= 4_000_000):
         raise LinkSyntaxError(f"{text}: {baud!r} is not a baud rate. Write one such as 19200.")
     format_ = settings[1].upper() if len(settings) > 1 else usual.format
     if not is_format(format_):
@@ -125,7 +126,7 @@ def _serial(text: str, rest: str, usual: UsualSettings) -> SerialLink:
 
 
 def _host_and_port(text: str, rest: str) -> tuple[str, int | None]:
-    match = re.fullmatch(r"(?:\[([^\[\]]+)\]|([^:\[\]\s]+))(?::(\d+))?", rest.strip(), re.ASCII)
+    match = re.fullmatch(r"(?:\[([^\[\]]+)\]|([^:\[\]\s]+))(?::(\d{1,9}))?", rest.strip(), re.ASCII)
     if match is None:
         raise LinkSyntaxError(
             f"{text}: no host, or a host that cannot be understood. Write {FORMS}; "

@@ -10,6 +10,8 @@ from .errors import SimulatorError
 
 DEFAULT_ADDRESS = 1
 LAST_ADDRESS = 247
+LONGEST_ADDRESS = 9
+"""Digits of an address that is looked at; int() takes not as many as can be pasted."""
 _FORMAT = re.compile(r"8[NEO][12]")
 
 
@@ -130,6 +132,7 @@ def parse_drives(text: str) -> list[DriveSpec]:
 
 
 def _address(part: str, text: str) -> int:
-    if text.strip().isdecimal() and 1 <= int(text) <= LAST_ADDRESS:
-        return int(text)
+    typed = text.strip()
+    if typed.isdecimal() and len(typed) <= LONGEST_ADDRESS and 1 <= int(typed) <= LAST_ADDRESS:
+        return int(typed)
     raise SimulatorError(f"{part.strip()!r}: the address after @ must be 1 to {LAST_ADDRESS}.")

@@ -9,9 +9,11 @@ def fault_of_new(name: str) -> str:
     """What is wrong with a name for a new file, or nothing."""
     if not name.strip():
         return "A name is needed."
-    return f"{name} is there already." if Path(name).expanduser().exists() else ""
-
-
-def fault_of_known(name: str) -> str:
-    """What is wrong with the name of a file to read, or nothing."""
-    return "" if Path(name.strip()).expanduser().is_file() else f"There is no file {name}."
+    if not name.isprintable():
+        return "A name has no control characters."
+    try:
+        return f"{name} is there already." if Path(name).expanduser().exists() else ""
+    except OSError as error:  # too long, or below a folder that may not be looked into
+        return f"No file can be made there: {error.strerror or error}."
+    except RuntimeError:
+        return f"There is no home folder of {name.partition('/')[0]}."

@@ -16,6 +16,8 @@ from tui.wire.heard.pairing import BROADCAST_DEVICE
 from .decoded import EXCEPTION_BIT, pdu_of
 
 ERRORS = frozenset({"error", "errors"})
+MOST_DIGITS = 9
+"""Of what is taken for a number; Python counts no number of thousands of them."""
 TellFrames = Callable[[Sequence[Frame]], Sequence[str]]
 """What frames say, a sentence each."""
 
@@ -41,17 +43,22 @@ def choice_of(text: str) -> FrameChoice:
     """What a person means: numbers are drives, `f16` and names of functions are functions."""
     devices, functions, words, errors = set[int](), set[int](), [], False
     for word in text.casefold().split():
-        if word.isascii() and word.isdigit():
+        if _is_number(word):
             devices.add(int(word))
         elif word in ERRORS:
             errors = True
-        elif word[0] == "f" and word[1:].isascii() and word[1:].isdigit():
+        elif word[0] == "f" and _is_number(word[1:]):
             functions.add(int(word[1:]))
         elif named := {code for code, name in FUNCTION_NAMES.items() if word in name.split()}:
             functions |= named
         else:
             words.append(word)
     return FrameChoice(frozenset(devices), frozenset(functions), errors, tuple(words))
+
+
+def _is_number(word: str) -> bool:
+    """Whether it is a number; more digits than any has are looked for as they stand."""
+    return word.isascii() and word.isdigit() and len(word) <= MOST_DIGITS
 
 
 def exchanges(frames: Sequence[Frame]) -> list[list[int]]:

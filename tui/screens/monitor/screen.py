@@ -243,4 +243,5 @@ def fault_of_rating(text: str) -> str:
         number = Decimal(text.strip().replace(",", "."))
     except InvalidOperation:
         return f"{text!r} is no number. Write it like 9.1."
-    return "" if 0 < number < 10000 else "A rated current is between 0 and 10 000 A."
+    fits = number.is_finite() and 0 < number < 10000
+    return "" if fits else "A rated current is between 0 and 10 000 A."
