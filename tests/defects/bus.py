@@ -94,8 +94,8 @@ DEFECTS = (
     Defect(
         "no-silence-before-a-frame",
         "tui/bus/rtu",
-        "until = max(self._last + self._silence - lead, self._hold)",
-        "until = self._hold",
+        "self._silence = silence(link)",
+        "self._silence = 0.0",
         "Strict drives hear two frames as one and do not answer.",
         ("tests/bus/test_faults.py::test_silence_is_kept",),
     ),
