@@ -1,6 +1,6 @@
 """Programs that share a line, stall and are killed: wrong values, writes repeated, what is left.
 
-    python -m benchmarks.share_soak [--minutes N] [--seed N]
+    python -m benchmarks.share_soak [--minutes N] [--seed N] [--late SHARE] [--twice SHARE]
 
 Some programs share the faulty line of `truth`: each reads registers that hold a value of their own,
 writes words that nobody else writes, reads them back, and now and then stops a drive, which voids
@@ -46,13 +46,14 @@ WRITTEN, STOPPED = 0.15, 0.01
 AGES = (0.0, 0.0, 0.2)
 """Greatest ages in s that the reads accept."""
 FAULTS = Faults(late=0.02, lost=0.01, duplicated=0.0, corrupted=0.02, noise=0.01)
-"""No reply comes twice: of the first copy on a line RTU gives no means to tell that it is one (see
-`truth`). Whoever takes the line over is told of those before."""
-TIMING = replace(FAST, late_reply=Timing().late_reply)
-"""Quick, but for replies that come late because the computer is busy with all these programs."""
+"""No reply comes twice unless asked for: of the first copy on a line RTU gives no means to tell
+that it is one (see `truth`). Whoever takes the line over is told of those before."""
+TIMING = replace(FAST, late_reply=Timing().late_reply, frame_gap=Timing().frame_gap)
+"""Quick, but for what comes late because the computer is busy with all these programs."""
 FROZEN = (0.1, 4.0)
 PAUSE = (0.5, 2.0)
 """Seconds from one blow to the next."""
+HIT = {"replies late": "late", "replies twice": "duplicated"}
 CODE = "from benchmarks.share_soak import program; program()"
 
 
@@ -229,10 +230,10 @@ def strike(guests: _Guests, chance: random.Random, done: Counter[str]) -> None:
     guests.begin()
 
 
-def soak(minutes: float, seed: int) -> dict[str, object]:
+def soak(minutes: float, seed: int, faults: Faults = FAULTS) -> dict[str, object]:
     """The soak; what it came to."""
     chance, done = random.Random(seed), Counter[str]()
-    faulty = FaultyLine(Setting(seed, FAULTS, turnaround=0.002))
+    faulty = FaultyLine(Setting(seed, faults, turnaround=0.002))
     with tempfile.TemporaryDirectory() as folder:
         guests = _Guests(faulty.path, folder)
         for _ in range(PROGRAMS):
@@ -248,6 +249,7 @@ def soak(minutes: float, seed: int) -> dict[str, object]:
     sums = sum((Counter(told) for told in guests.told.values()), Counter[str]())
     return {
         **{name: sums[name] for name in ("good", "wrong", "errors", "writes", "stops")},
+        **{name: on_line[kind] for name, kind in HIT.items() if kind in on_line},
         "written twice": on_line.pop("written again", 0),
         "sockets left": len(left),
         "ms that a reply was behind its time": on_line.pop("ms behind time", 0),
@@ -262,8 +264,11 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--minutes", type=float, default=30.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--late", type=float, default=FAULTS.late, help="share of late replies")
+    parser.add_argument("--twice", type=float, default=0.0, help="share that comes once more")
     options = parser.parse_args()
-    found = soak(options.minutes, options.seed)
+    faults = replace(FAULTS, late=options.late, duplicated=options.twice)
+    found = soak(options.minutes, options.seed, faults)
     table = Table(title=f"{options.minutes:g} minutes, {PROGRAMS} programs at a time")
     table.add_column("")
     table.add_column("count", justify="right")
