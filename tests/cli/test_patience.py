@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -11,6 +11,7 @@ from tui.bus.link import Link, SerialLink, TcpLink
 from tui.cli.commands.orders import watch_of
 from tui.cli.shared.patience import patience
 from tui.drive.profile import library
+from tui.session.fleet import Fleet
 from tui.session.timeout_told import TimeoutWatch
 
 
@@ -29,13 +30,10 @@ async def test_a_time_out_that_is_learnt_late_fails_no_status(
 ) -> None:
     """Beside a panel at 1200 baud status ended with "TTO is set and could not be learnt"."""
     monkeypatch.setattr("tui.cli.commands.orders.LEARNT_WITHIN", 0.0)
-    watch, looks = TimeoutWatch(10.0, None), iter([None] * 4)
-    profile = library.load("atv71")
-
-    async def read(_codes: list[str]) -> dict[str, Any]:
-        return {"TTO": SimpleNamespace(raw=100)}
-
-    session = SimpleNamespace(profile=profile, line=line_to(SerialLink("x", 1200, "8E1")))
-    console: Any = SimpleNamespace(session=session, device=1, read=read)
-    fleet: Any = SimpleNamespace(line_watch=SimpleNamespace(watch=lambda _: next(looks, watch)))
-    assert await watch_of(fleet, console) is watch
+    session = SimpleNamespace(
+        profile=library.load("atv71"), line=line_to(SerialLink("x", 1200, "8E1"))
+    )
+    watch, looks = TimeoutWatch(10.0, None), iter([[session]] * 4)
+    line_watch = SimpleNamespace(unread=lambda: next(looks, []), watch=lambda _: watch)
+    console: Any = SimpleNamespace(session=session, device=1)
+    assert await watch_of(cast("Fleet", SimpleNamespace(line_watch=line_watch)), console) is watch

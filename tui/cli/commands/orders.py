@@ -41,8 +41,9 @@ PERIOD = 0.25
 FIRST_TRIES, FIRST_WITHIN = 3, 5.0
 """Cycles that may fail, and seconds that may go by, before the drive counts as silent: a word
 that it does not have may meet silence meanwhile, which is no answer of any kind."""
-LEARNT_WITHIN = 3.0
-"""Seconds in which a drive's communication time-out is read on a quick line."""
+LEARNT_WITHIN = 10.0
+"""Seconds in which a drive's communication time-out is read on a quick line: words that it lacks
+meet silence, and a small computer is slow."""
 
 arm_option = click.option(
     "--arm", is_flag=True, help="Arm the drive for this command; without it nothing is written."
@@ -201,14 +202,10 @@ async def watch_of(fleet: Fleet, console: DriveConsole) -> TimeoutWatch | None:
     rules = console.session.profile.data.communication_fault
     if rules is None or not rules.timeout:
         return None
-    readings = await console.read([rules.timeout])
-    raw = readings[rules.timeout].raw
-    if raw is None or raw in (rules.off, 0):
-        return None
     within = patience(console.session.line, LEARNT_WITHIN)
     end = asyncio.get_running_loop().time() + within
-    while (watch := fleet.line_watch.watch(console.device)) is None:
+    while console.session in fleet.line_watch.unread():
         if asyncio.get_running_loop().time() > end:
-            raise Failure(f"{rules.timeout} is set and could not be learnt.", LINE_TROUBLE)
+            raise Failure(f"{rules.timeout} could not be learnt.", LINE_TROUBLE)
         await asyncio.sleep(COMMAND_POLL_INTERVAL)
-    return watch
+    return fleet.line_watch.watch(console.device)

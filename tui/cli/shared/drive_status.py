@@ -213,10 +213,17 @@ def status_table(status: Status) -> list[tuple[str, str]]:
         *status.channels.items(),
         *(("Besides", text) for text in status.switches),
         ("From here", status.refused or "commands can have an effect"),
-        ("Comm. time-out", watch_text(status.watch)),
+        ("Comm. time-out", _time_out_text(status)),
         *control_row(status.session),
         *shown_values(profile, status.readings).items(),
     ]
+
+
+def _time_out_text(status: Status) -> str:
+    told = status.session.timeout
+    if told is not None and not told.known:
+        return "not told by this drive: it may act when nobody asks it"
+    return watch_text(status.watch)
 
 
 def drive_in_a_line(status: Status) -> str:
