@@ -59,7 +59,7 @@ DEFECTS = (
     Defect(
         "typed-on-into-a-question",
         "tui/screens/dialogs/question.py",
-        "return now - max(self._drawn, self._key_at) < QUIET",
+        "return now - max(self._drawn, self._key_at) < NOT_TYPING",
         "return now - self._drawn < self.SETTLED",
         "Who types a word with a y in it writes what a question that has just come asks about.",
         ("tests/ui/test_questions.py",),

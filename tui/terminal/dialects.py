@@ -7,11 +7,11 @@ clock, given with each read; nothing here looks at a clock.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from typing import Any, Final
 
 from .names import STOP_KEYS, Named, of_character, of_sequence, with_alt
+from .sequences import EIGHT_BIT, MOUSE, REPLY_BEGINS, REPLY_ENDS, REPORT, RXVT
 from .tokens import KeyToken, Paste, Report, Token
 
 ESCAPE_DELAY: Final = 0.1
@@ -35,22 +35,6 @@ PASTE_ENDS: Final = "\x1b[201~"
 SPACE: Final = ("space", " ")
 SPACE_ALONE: Final = ("space", None)
 """Space behind an ESC that may have been Escape: a stop, and no text."""
-
-_REPORT = re.compile(
-    r"\x1b\[(\d+;\d+R"  # where the cursor stands
-    r"|\?\d+;\d\$y"  # whether it knows a mode
-    r"|48;[\d:]+;[\d:]+;[\d:]+;[\d:]+t)",  # its new size
-    re.ASCII,
-)
-_MOUSE = re.compile(r"\x1b\[(<\d+;-?\d+;-?\d+[Mm]|\d+;\d+;\d+M|M...)", re.ASCII | re.DOTALL)
-_RXVT = re.compile(r"\x1b\[([2-8]|1[1-9]|2[0-9]|3[0-4])", re.ASCII)
-"""A key with Shift ends with $, which elsewhere stands before the end."""
-_EIGHT_BIT = {"\x9b": "[", "\x8f": "O", "\x90": "P", "\x9d": "]"}
-_EIGHT_BIT |= {chr(0xDC00 + ord(code)): same for code, same in _EIGHT_BIT.items()}
-"""ESC and what follows in one character, or in one byte that is no UTF-8."""
-_REPLY_BEGINS = {"]": "0123456789", "P": "0123456789;>!$+=?|", "_": "G"}
-"""Replies of any length, and how they go on: Alt+] and Alt+P begin the same."""
-_REPLY_ENDS = "\x07\x9c\udc9c\x18\x1a"
 
 
 class Tokenizer:
@@ -141,7 +125,7 @@ class Tokenizer:
         elif character == ESC:
             self._begin(ESC)
             self._state = self._escape
-        elif (second := _EIGHT_BIT.get(character)) is not None:
+        elif (second := EIGHT_BIT.get(character)) is not None:
             self._begin(ESC)
             self._introduce(second)
         else:
@@ -157,7 +141,7 @@ class Tokenizer:
             self._late_before = self._began + self._escape_delay + SEQUENCE_WITHIN
             self._begin(ESC)
             self._alt = together  # ESC twice at once is Alt with what follows
-        elif character in "[O" or character in _REPLY_BEGINS:
+        elif character in "[O" or character in REPLY_BEGINS:
             self._introduce(character)
         else:
             self._key(SPACE_ALONE if character == " " else with_alt(character))
@@ -188,7 +172,7 @@ class Tokenizer:
             return
         if character == "[" and self._text == "\x1b[":
             self._state = self._linux
-        ends = character >= "\x40" or (character == "$" and _RXVT.fullmatch(self._text))
+        ends = character >= "\x40" or (character == "$" and RXVT.fullmatch(self._text))
         self._text += character
         if self._text == "\x1b[M" and self._mouse:
             self._state = self._mouse_place
@@ -221,7 +205,7 @@ class Tokenizer:
         text, self._state = self._text, self._ground
         if text == PASTE_BEGINS:
             self._state = self._paste
-        elif _REPORT.fullmatch(text) or (self._mouse and _MOUSE.fullmatch(text)):
+        elif REPORT.fullmatch(text) or (self._mouse and MOUSE.fullmatch(text)):
             self._found.append(Report(text))
             self._go_on()
         else:
@@ -240,7 +224,7 @@ class Tokenizer:
     def _opening(self, character: str) -> None:
         """After ESC ], ESC P or ESC _: a reply, or a key with Alt."""
         second = self._text[-1]
-        if character in _REPLY_BEGINS[second]:
+        if character in REPLY_BEGINS[second]:
             self._state = self._reply
         else:
             self._key(with_alt(second))
@@ -250,7 +234,7 @@ class Tokenizer:
         """In a reply; what it says is not looked at."""
         if character == ESC:
             self._state = self._reply_escape
-        elif character in _REPLY_ENDS:
+        elif character in REPLY_ENDS:
             self._state = self._ground
         else:
             self._long.append(character)

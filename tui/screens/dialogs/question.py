@@ -38,7 +38,7 @@ DIALOG_SHARE, BORDER_ROWS, BESIDE_TEXT, LEAST_ROWS = 0.83, 2, 4, 2
 """Of the screen's rows those of a dialog at most; of its border; columns of border and padding;
 rows that a list keeps."""
 
-QUIET = 1.0
+NOT_TYPING = 1.0
 """Seconds without a key after which a question that comes by itself takes an answer."""
 TYPED_ON = "A question came meanwhile: after a second without a key it takes an answer."
 
@@ -68,7 +68,7 @@ class Question(Framed, ModalScreen[T]):
         guard = Binding(cls.GUARDED, "swallow", show=False, priority=True)
         own = [guard, *vars(cls).get("BINDINGS", ())]
         if cls.NO_KEYS:
-            own.insert(0, Binding(cls.NO_KEYS, "swallow_no", show=False, priority=True))
+            own.insert(0, Binding(cls.NO_KEYS, "swallow(True)", show=False, priority=True))
             own.append(Binding(cls.NO_KEYS, "no", show=False))
         cls.BINDINGS = own
         super().__init_subclass__(**how)
@@ -92,7 +92,7 @@ class Question(Framed, ModalScreen[T]):
 
     def on_mount(self) -> None:
         """From its first picture on it is asked."""
-        self.fit_list()
+        self._fit_list()
         self.call_after_refresh(self._stands)
         if self._now is not None:
             self.set_interval(NOW_EVERY, self._tell_now)
@@ -104,9 +104,9 @@ class Question(Framed, ModalScreen[T]):
 
     def on_resize(self, event: Resize) -> None:
         """More room, or less."""
-        self.fit_list()
+        self._fit_list()
 
-    def fit_list(self) -> None:
+    def _fit_list(self) -> None:
         """Give a list, or what can be scrolled, the rows that the rest of the dialog leaves."""
         for part in self.query("#choices, #says"):
             if (box := part.parent) is None or not isinstance(box, Widget):
@@ -129,7 +129,7 @@ class Question(Framed, ModalScreen[T]):
     def tell_keys(self, keys: Text) -> None:
         """Tell the keys anew; they may take more rows than before."""
         self.query_one("#hint", Plain).update(keys)
-        self.fit_list()
+        self._fit_list()
 
     def now_lines(self) -> Iterable[Plain]:
         """What the motors do, where the question is about drives."""
@@ -155,24 +155,18 @@ class Question(Framed, ModalScreen[T]):
     def check_action(self, action: str, parameters: tuple[object, ...]) -> bool | None:
         """A key that comes too early is swallowed; later the binding does not count."""
         if action == "swallow":
-            return self._is_early()
-        if action == "swallow_no":
-            return self.by_itself and self._is_early()
+            return self._is_early() and (self.by_itself or not parameters)
         return super().check_action(action, parameters)
 
     def on_key(self, event: Key) -> None:
         """Somebody types."""
         self._key_at = self.app.clock.monotonic()
 
-    def action_swallow(self) -> None:
-        """Nothing is done; who types on is told why."""
+    def action_swallow(self, of_no: bool = False) -> None:
+        """Nothing is done; who types on is told why. A no waits only where nobody asked."""
         self._key_at = self.app.clock.monotonic()
         if self.by_itself:
             self.app.tell(TYPED_ON)
-
-    def action_swallow_no(self) -> None:
-        """As a yes that comes too early."""
-        self.action_swallow()
 
     def action_no(self) -> None:
         """Change nothing."""
@@ -186,7 +180,7 @@ class Question(Framed, ModalScreen[T]):
             return True
         now = self.app.clock.monotonic()
         if self.by_itself:
-            return now - max(self._drawn, self._key_at) < QUIET
+            return now - max(self._drawn, self._key_at) < NOT_TYPING
         return now - self._drawn < self.SETTLED
 
     def _tell_now(self) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from tui.bus.errors import LinkSyntaxError
 
 FIRST, LAST = 1, 247
-LONGEST = 9
+LONGEST_SPAN_END = 9
 """Digits of a number that is looked at."""
 
 
@@ -20,7 +20,7 @@ def parse_addresses(text: str) -> list[int]:
             raise LinkSyntaxError(f"{text!r} is no list of addresses. Write 1-10 or 1,2,31.")
         ends = (low, high) if dash else (low, low)
         # a long one is past the last in any case, and longer ones than int() takes can be pasted
-        first, last = (int(end) if len(end) <= LONGEST else LAST + 1 for end in ends)
+        first, last = (int(end) if len(end) <= LONGEST_SPAN_END else LAST + 1 for end in ends)
         if not FIRST <= first <= last <= LAST:
             raise LinkSyntaxError(f"Slave addresses go from {FIRST} to {LAST}; {part!r} does not.")
         found += range(first, last + 1)
