@@ -20,7 +20,7 @@ from tui.bus.program import Program
 from tui.drive.profile import library
 from tui.session.gateway.gateway import Gateway
 from tui.session.gateway.line import NONE_NAMED, GatewayLine
-from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
+from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, as_written, unit_map
 from tui.session.gateway.started import StartedMotors
 from tui.session.gateway.writes import ENDED_BEFORE_ANSWER
 from tui.session.journal import Journal
@@ -168,6 +168,13 @@ async def test_what_the_end_of_serve_cuts_short_is_not_kept_as_done(
     await asyncio.wait([task])
     (entry,) = made.journal.recent
     assert (entry.code, entry.answer) == ("ACC", ENDED_BEFORE_ANSWER)
+
+
+def test_codes_are_those_of_a_family_in_any_case() -> None:
+    assert as_written(allowed_codes("acc, ALL")) == {"ACC", "all"}
+    assert as_written(allowed_codes("f803")) == {"F803"}
+    with pytest.raises(RulesError, match="No family has a parameter NOPE, nor"):
+        as_written(allowed_codes("ACC,nor,NOPE"))
 
 
 async def test_all_is_no_command(bench: Make) -> None:

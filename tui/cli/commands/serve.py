@@ -178,12 +178,19 @@ def _wish(
     """The gateway that the options describe; None without --tcp."""
     if tcp is None:
         return None
-    from tui.session.gateway.rules import GatewayRules, RulesError, allowed_codes, unit_map
+    from tui.session.gateway.rules import (
+        GatewayRules,
+        RulesError,
+        allowed_codes,
+        as_written,
+        unit_map,
+    )
 
     host, port = host_port(tcp)
     try:
         units = unit_map(count, maps)
-        writes = frozenset[str]() if allow_writes is None else allowed_codes(allow_writes)
+        typed = frozenset[str]() if allow_writes is None else allowed_codes(allow_writes)
+        writes = as_written(typed)
     except RulesError as error:
         raise click.UsageError(str(error)) from error
     return GatewayWish(host, port, units, GatewayRules(fresh, writes, allow_commands))

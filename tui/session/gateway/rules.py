@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 
 from tui.drive.errors import DriveError
 from tui.drive.foreign_write import ALL
+from tui.drive.profile import library
 
 HIGHEST_DEVICE = 247
 _MAPPED = re.compile(r"(\d+)(?:-(\d+))?=(\d+)(?:@(\d+))?")
@@ -35,6 +38,25 @@ def allowed_codes(text: str) -> frozenset[str]:
     if not codes:
         raise RulesError(f"{text!r}: name codes, such as ACC,DEC, or all.")
     return frozenset(ALL if code.casefold() == ALL else code for code in codes)
+
+
+def as_written(codes: frozenset[str]) -> frozenset[str]:
+    """Codes as the families write them that have them, typed in any case.
+
+    Raises RulesError for one that no family has: nobody would notice that nothing is allowed by it.
+    """
+    if codes <= {ALL}:
+        return codes
+    known = defaultdict[str, set[str]](set)
+    for listing in library.listings():
+        with suppress(DriveError):  # a profile that cannot be read serves no drive either
+            for one in library.load(listing.id).parameters:
+                known[one.code.casefold()].add(one.code)
+    if strange := sorted(code for code in codes - {ALL} if code.casefold() not in known):
+        raise RulesError(
+            f"No family has a parameter {', '.join(strange)}. Name codes such as ACC,DEC, or all."
+        )
+    return frozenset(own for code in codes for own in known.get(code.casefold(), {code}))
 
 
 def unit_map(lines: int, texts: Sequence[str]) -> Mapping[int, tuple[int, int]]:
