@@ -19,6 +19,8 @@ pytestmark = pytest.mark.drawn
 PAGE = Path(__file__).resolve().parents[2] / "docs" / "tour.md"
 STEP = re.compile(r"^\| ([^|]+) \| ([^|]+) \|$", re.MULTILINE)
 SEEN = re.compile(r"`([^`]+)`")
+READ = re.compile(r"→ 0[1-5] 03 [0-9A-F]{2}")
+"""The bytes of a request of the demo."""
 NAMES = {".": "full_stop", "/": "slash", "?": "question_mark", "Esc": "escape"}
 QUOTES = 20
 """Texts of the screen that the page quotes, at least."""
@@ -73,5 +75,8 @@ async def test_the_tour(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None
                 await until(pilot, lambda text=text: plain(text) in on_screen(app))  # type: ignore[misc]
             if keys == ["space"]:
                 await until(pilot, lambda: "STANDBY 0.0" in on_screen(app))
+            elif keys == ["tab"]:
+                # of any drive: which of them are on the screen is chance
+                await until(pilot, lambda: READ.search(on_screen(app)) is not None)
             elif keys == ["up", "up"]:
                 await until(pilot, lambda: "→ 32.0 Hz" in on_screen(app))
