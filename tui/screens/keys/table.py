@@ -35,7 +35,7 @@ from .parameter_actions import PARAMETER_ACTIONS
 of_app = partial(Action, app=True)
 stops = partial(Action, app=True, first=True)
 STOP = "Stop the drive on its ramp, wherever a space is no text; without an open drive, all."
-STOP_ANYWHERE = "The same, also while text is typed, from any screen or dialog."
+STOP_ANYWHERE = "Stop the drive on its ramp, also while text is typed."
 STOP_ALL = "Stop every drive of the line on its ramp, from any screen."
 ARM = "Arm this drive for a minute, or for a minute more."
 PROVE = "Prove that the drive reacts to a silent line as it is set to; armed, asks."
