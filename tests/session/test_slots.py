@@ -166,6 +166,7 @@ async def test_slots_that_were_read_before_the_block_are_read_again(shared: Shar
 
 
 async def test_a_block_that_was_read_before_its_slots_is_read_again(shared: Shared) -> None:
+    await shared.another_reads(INPUTS)
     shared.change_slots()
     await shared.another_reads(library.load("atv71")["NMA1"].address)
     await shared.reader.learn_slots()
