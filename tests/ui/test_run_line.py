@@ -84,6 +84,8 @@ def test_the_last_reference_given_is_proposed_else_the_drives_own() -> None:
     held = {"LFR": Decimal("-30.0")}
     assert proposed(profile, "forward", "42.5Hz", held) == ("42.5", "Hz")
     assert proposed(profile, "forward", "", held) == ("30.0", "Hz")
+    assert proposed(profile, "forward", "", held | {"FRH": Decimal("50.0")}) == ("30.0", "Hz")
+    assert proposed(profile, "forward", "", {"FRH": Decimal("50.0")}) == ("50.0", "Hz")
     assert proposed(profile, "forward", "", {}) == ("0", "Hz")
     assert proposed(library.load("varmeca"), "forward", "", {}) == ("", "")
 

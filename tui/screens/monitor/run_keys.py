@@ -39,7 +39,7 @@ class RunKeys(OrderKeys):
             return
         profile, raws = self.session.profile, self.session.image.raws
         held = {}
-        for quantity, _ in GIVEN:
+        for quantity in (one for given, before_ramp, _ in GIVEN for one in (given, before_ramp)):
             parameter = profile.quantity(quantity)
             if parameter is None or parameter.code not in raws:
                 continue

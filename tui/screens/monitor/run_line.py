@@ -42,8 +42,12 @@ STEPS: Mapping[str, Decimal] = {
 DIGITS_MOST = 7
 AT_ZERO = "At 0 the motor would not turn: type a reference, then Enter."
 GROUND_OF_LINE = Style(bgcolor=SURFACE)
-GIVEN: tuple[tuple[Quantity, str], ...] = (("command_frequency", "Hz"), ("command_speed", "rpm"))
-"""Where a reference is given, and in which unit; the first that a family has."""
+GIVEN: tuple[tuple[Quantity, Quantity, str], ...] = (
+    ("command_frequency", "frequency_reference", "Hz"),
+    ("command_speed", "speed_reference", "rpm"),
+)
+"""Where a reference is given, where it stands before the ramp, and in which unit; the first that a
+family has."""
 RUN_HEADINGS: Mapping[Purpose, str] = {
     "forward": "RUN FORWARD",
     "reverse": "RUN REVERSE",
@@ -133,15 +137,18 @@ def proposed(
 ) -> tuple[str, str]:
     """Text and unit that a line begins with: the last reference given, else the drive's own.
 
-    `raws` are engineering values by code. Both empty where the drive takes none from here.
+    Where that was not read yet it is what the drive goes by now: 0 would stop the motor. `raws` are
+    engineering values by code. Both empty where the drive takes none from here.
     """
-    for quantity, unit in GIVEN:
+    for quantity, before_ramp, unit in GIVEN:
         parameter = profile.quantity(quantity)
         if parameter is None:
             continue
         if wanted.endswith(unit):
             return wanted.removesuffix(unit).strip(), unit
         held = raws.get(parameter.code)
+        if held is None and (now := profile.quantity(before_ramp)) is not None:
+            held = raws.get(now.code)
         return (f"{abs(held):f}" if held is not None else "0"), unit
     return "", ""
 
