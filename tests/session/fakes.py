@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import msgspec
 
@@ -33,19 +34,10 @@ class OneDrive(FakeLine):
         super().__init__({device: registers})
         self.device = device
 
-    async def read(
-        self,
-        device: int,
-        address: int,
-        count: int = 1,
-        *,
-        priority: Priority = Priority.POLL,
-        function: int = 3,
-        max_age: float = 0.0,
-        within: float | None = None,
-    ) -> Reply:
+    async def read(self, device: int, address: int, count: int = 1, **how: Any) -> Reply:
+        priority = how.get("priority", Priority.POLL)
         await self.before_read(device, range(address, address + count), priority)
-        return await super().read(device, address, count, priority=priority, function=function)
+        return await super().read(device, address, count, **how)
 
     async def before_read(self, device: int, registers: range, priority: Priority) -> None:
         """What a drive of a test does before it answers; what it raises is what comes."""
