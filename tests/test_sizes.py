@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Iterator
 
 import pytest
 
-from .sources import PACKAGE, modules, tree_of
+from .sources import PACKAGE, ROOT, modules, tree_of
 
 MOST_LINES = 310
 MOST_METHODS = 15
@@ -68,6 +69,19 @@ def test_every_exception_is_needed_and_has_its_reason() -> None:
     past = {name: size for name, size, most in of_project() if size > most}
     assert EXCEPTIONS.keys() <= past.keys(), "it has become small: take its exception out"
     assert all(reason for _, reason in EXCEPTIONS.values())
+
+
+def test_the_architecture_tells_what_is_past_its_size_and_how_far() -> None:
+    text = (ROOT / "docs" / "architecture.md").read_text("utf-8")
+    rows = re.findall(
+        r"^\| `([\w/]+)` \| (\d+) ", text.partition("\n## Sizes that")[2], re.MULTILINE
+    )
+    past = {
+        (name.partition(":")[2] or name.removesuffix(".py")): str(size)
+        for name, size, most in of_project()
+        if size > most
+    }
+    assert dict(rows) == past
 
 
 @pytest.mark.parametrize(
