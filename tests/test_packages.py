@@ -42,8 +42,9 @@ def metadata(folder: Path, address: str = "") -> Message:
     """What a package of the project tells, with this address in its configuration."""
     root = folder / "root"
     root.mkdir()
-    for name in ("README.md", "LICENSE", "hatch_build.py"):
-        shutil.copy(ROOT / name, root)
+    (root / "tui").mkdir()
+    for name in ("README.md", "LICENSE", "hatch_build.py", "tui/__init__.py"):
+        shutil.copy(ROOT / name, root / name)
     settings = (ROOT / "pyproject.toml").read_text("utf-8")
     assert settings.count('\naddress = ""\n') == 1
     settings = settings.replace('\naddress = ""\n', f'\naddress = "{address}"\n')
