@@ -17,6 +17,7 @@ from tui.bus.link import SerialLink
 from tui.bus.listening_line import ListeningLine
 from tui.bus.program import Program
 from tui.bus.share.place import SharePlace
+from tui.bus.transport.port_seen import see_port
 from tui.bus.transport.serial_listening import open_listening
 
 ME = Program("1", "listen", os.getpid())
@@ -149,3 +150,16 @@ def test_silence_and_characters_are_those_of_the_line(
     line = ListeningLine(SerialLink(talk.path, 9600, "8N1"), None, ME)
     assert line.character == pytest.approx(10 / 9600)
     assert line.silence == pytest.approx(35 / 9600)
+
+
+def test_what_is_no_port_is_said_to_be_none_and_not_to_be_in_use(tmp_path: Path) -> None:
+    """Every program has /dev/null open: `listen` named all of them."""
+    notes = tmp_path / "notes"
+    with notes.open("w"):
+        for path in ("/dev/null", str(tmp_path), str(notes)):
+            seen = see_port(path)
+            assert not seen.holder
+            assert not seen.others
+            line = ListeningLine(SerialLink(path, 19200, "8E1"), None, ME)
+            with pytest.raises(PortRefused, match="it is no serial port"):
+                line.__enter__()

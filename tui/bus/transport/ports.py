@@ -20,6 +20,8 @@ MISSING = frozenset({errno.ENOENT, errno.ENODEV, errno.ENXIO, errno.ENOTDIR})
 DENIED = frozenset({errno.EACCES, errno.EPERM})
 PSEUDO_TERMINALS = range(136, 144)
 """Major device numbers of the slave sides of pseudo-terminals on Linux."""
+MEMORY = 1
+"""Major device number on Linux of /dev/null and its like, which every program has open."""
 
 
 class PortInfo(NamedTuple):
@@ -58,11 +60,24 @@ def is_pseudo_terminal(path: str) -> bool:
     return re.fullmatch(r"/dev/(ttys\d+|pts/\d+|tty[p-w]\w)", os.path.realpath(path)) is not None
 
 
+def _is_no_port(path: str) -> bool:
+    """Whether there is something that is surely no serial port: a file, a folder, /dev/null."""
+    try:
+        found = os.stat(path)
+    except (OSError, ValueError):
+        return False
+    if not stat.S_ISCHR(found.st_mode):
+        return True
+    return sys.platform.startswith("linux") and os.major(found.st_rdev) == MEMORY
+
+
 def holder(path: str) -> str | None:
     """Name and process id of the program that holds a port, None where the system does not tell.
 
     Linux only: the owner of the lock on the port, else another process that has it open.
     """
+    if _is_no_port(path):
+        return None
     try:
         found = os.stat(path)
         pids = _lock_owners(found) or _openers(os.path.realpath(path))
@@ -119,6 +134,8 @@ def _name(pid: int) -> str:
 
 def other_openers(path: str) -> str:
     """Programs that have the port open beside this one, empty when none is seen."""
+    if _is_no_port(path):
+        return ""
     pids = [pid for pid in _openers(os.path.realpath(path)) if pid != os.getpid()]
     return ", ".join(f"{_name(pid)} (pid {pid})" for pid in pids)
 
@@ -190,6 +207,8 @@ def port_error(
         return PortBusy(path)
     if number in DENIED:
         return PortRefused(path, _who_may(path))
+    if _is_no_port(path):
+        return PortRefused(path, "it is no serial port. `drivepanel ports` lists those.")
     if number is None or number == errno.EINVAL:
         return PortRefused(path, f"it does not take {baud} baud {format_}.")
     return PortRefused(path, f"{os.strerror(number)}.")
