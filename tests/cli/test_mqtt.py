@@ -152,7 +152,7 @@ class FakeClient:
 
     async def __aenter__(self) -> FakeClient:
         if len(self.made) <= self.refuses:
-            raise aiomqtt.MqttError("Connection refused")
+            raise aiomqtt.MqttError("[Errno 111] Connection refused")
         return self
 
     async def __aexit__(
@@ -211,6 +211,8 @@ async def test_everything_is_retained_anew_after_a_lost_connection(
     said = capsys.readouterr().err
     assert said.count("It is tried on.") == 2
     assert said.count("is there again.") == 2
+    assert ": Connection refused. It is tried on." in said
+    assert "Errno" not in said
 
 
 async def test_an_error_that_nobody_foresaw_ends_no_publishing(

@@ -9,6 +9,7 @@ from __future__ import annotations
 import asyncio
 import hashlib
 import logging
+import re
 import socket
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -71,7 +72,7 @@ class MqttPublisher:
             except Exception as error:
                 if not _is_mqtt(error):
                     log.exception("publishing failed")
-                self._lost(str(error))
+                self._lost(why_lost(error))
             # one that is lost at once may be that of two programs with one topic: no haste
             lasted = loop.time() - begun > TRY_AGAIN_LONGEST
             delay = TRY_AGAIN_FIRST if lasted else min(2 * delay, TRY_AGAIN_LONGEST)
@@ -181,6 +182,11 @@ def client_id(root: str) -> str:
     """
     text = f"{socket.gethostname()} {root}"
     return f"drivepanel-{hashlib.sha256(text.encode()).hexdigest()[:10]}"
+
+
+def why_lost(error: Exception) -> str:
+    """What a person is told of a lost connection: the system's words without their number."""
+    return re.sub(r"^\[(Errno|SSL)[^]]*\] ", "", str(error))
 
 
 def _is_mqtt(error: Exception) -> bool:
