@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from tui.bus.gateway import server
 from tui.bus.gateway.awake import Awake
 from tui.bus.gateway.pdu import (
     IdentifyAsked,
@@ -23,7 +24,7 @@ from tui.bus.gateway.pdu import (
     words_pdu,
     written_pdu,
 )
-from tui.bus.gateway.server import HEADER, MOST_AT_ONCE, TcpGateway, TcpRequest
+from tui.bus.gateway.server import HEADER, MOST_AT_ONCE, TcpGateway, TcpRequest, peer_text
 
 
 def test_what_each_function_asks() -> None:
@@ -262,6 +263,43 @@ async def test_one_client_that_waits_holds_up_no_other() -> None:
     assert len(gone) == 2
     stuck.close()
     writer.close()
+
+
+async def test_who_has_long_asked_nothing_makes_room_for_a_further_client(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Programs that forgot 64 connections kept the one out that came to stop a motor."""
+    monkeypatch.setattr(server, "MOST_CLIENTS", 3)
+    gone: list[str] = []
+
+    async def answer(request: TcpRequest) -> bytes:
+        if request.unit == 1:
+            await asyncio.Event().wait()
+        return request.pdu
+
+    gateway = TcpGateway(answer, lambda client: gone.append(client.peer))
+    place = await gateway.listen("127.0.0.1", 0)
+    clients = [await asyncio.open_connection(*place) for _ in range(3)]
+    for number, (reader, writer) in enumerate(clients, 1):
+        # the first waits for its answer: it is not idle, however long ago it asked
+        await _asked(writer, number, number, bytes([3, 0, 0, 0, 1]))
+        if number > 1:
+            await _answer(reader)
+    early, early_writer = await asyncio.open_connection(*place)
+    assert await early.read() == b"", "all three asked lately: nobody makes room"
+
+    monkeypatch.setattr(server, "KEEPS_ITS_PLACE", 0.0)
+    for number in (4, 5):
+        reader, writer = await asyncio.open_connection(*place)
+        clients.append((reader, writer))
+        await _asked(writer, number, number, bytes([6, 0x21, 0x35, 0, 7]))
+        assert await _answer(reader) == (number, number, bytes([6, 0x21, 0x35, 0, 7]))
+    names = [peer_text(writer.get_extra_info("sockname")) for _, writer in clients]
+    assert gone == names[1:3], "in the order of their last requests, and not the one that waits"
+    await gateway.close()
+    assert sorted(gone) == sorted(names)
+    for writer in (early_writer, *(writer for _, writer in clients)):
+        writer.close()
 
 
 async def test_answers_for_who_has_gone_are_dropped_without_a_word(

@@ -9,6 +9,22 @@ WORDS = "tests/drive/test_foreign_write.py"
 
 DEFECTS = (
     Defect(
+        "idle-clients-keep-a-stop-out",
+        "tui/bus/gateway/server.py",
+        "        task.cancel()\n        return True\n",
+        "        return False\n",
+        "Connections that a program forgot keep the one out that comes to stop a motor.",
+        ("tests/bus/test_gateway.py",),
+    ),
+    Defect(
+        "a-waiting-client-makes-room",
+        "tui/bus/gateway/server.py",
+        "return 0.0 if self._under_way else asyncio",
+        "return asyncio",
+        "A client whose stop is still on its way is thrown out with it.",
+        ("tests/bus/test_gateway.py",),
+    ),
+    Defect(
         "foreign-commands-unasked",
         "tui/session/gateway/writes.py",
         "if self._commands and not self._rules.commands:",

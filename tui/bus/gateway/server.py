@@ -24,7 +24,9 @@ log = logging.getLogger(__name__)
 HEADER = struct.Struct(">HHHB")
 LONGEST_PDU = 253
 MOST_CLIENTS = 64
-"""Connections at a time; one more is closed at once."""
+"""Connections at a time; one more takes the place of the one that has asked nothing for longest."""
+KEEPS_ITS_PLACE = 10.0
+"""Seconds since its last request for which a connection makes room for no other."""
 MOST_AT_ONCE = 128
 """Requests of one connection that may be under way; a further read is told to come again."""
 IDLE_CLIENT_ENDS_AFTER = 600.0
@@ -103,7 +105,7 @@ class TcpGateway:
         self._answer = answer
         self._gone = gone
         self._server: asyncio.Server | None = None
-        self._tasks: set[asyncio.Task[None]] = set()
+        self._talks: dict[asyncio.Task[None], _Talk] = {}
         self._count = 0
         self._awake = awake or Awake()
 
@@ -127,7 +129,7 @@ class TcpGateway:
         self._awake.close()
         if self._server is not None:
             self._server.close()
-        tasks = tuple(self._tasks)
+        tasks = tuple(self._talks)
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
@@ -135,30 +137,41 @@ class TcpGateway:
     async def _serve(self, reader: _Incoming, writer: asyncio.StreamWriter) -> None:
         task = asyncio.current_task()
         assert task is not None
-        if len(self._tasks) >= MOST_CLIENTS:
+        if not self._has_room():
             log.warning("a further Modbus TCP client was turned away: %d are here", MOST_CLIENTS)
             writer.close()
             return
-        self._tasks.add(task)
         self._count += 1
         client = TcpClient(self._count, peer_text(writer.get_extra_info("peername")))
+        talk = self._talks[task] = _Talk(client, writer)
         try:
-            await self._converse(client, reader, writer)
+            await self._converse(talk, reader)
         except (OSError, EOFError, TimeoutError) as error:
             log.info("Modbus TCP client %s has gone: %s", client.peer, error or "idle")
         except asyncio.CancelledError:
             # closing the gateway is no error of this connection
             return
         finally:
-            self._tasks.discard(task)
+            self._talks.pop(task, None)
             self._gone(client)
             with suppress(OSError, RuntimeError):
                 writer.close()
 
-    async def _converse(
-        self, client: TcpClient, reader: _Incoming, writer: asyncio.StreamWriter
-    ) -> None:
-        talk = _Talk(client, writer)
+    def _has_room(self) -> bool:
+        """Whether one more client may stay; who has long asked nothing goes for it."""
+        here = {task: talk for task, talk in self._talks.items() if not talk.makes_room}
+        if len(here) < MOST_CLIENTS:
+            return True
+        task = max(here, key=lambda one: here[one].idle)
+        if here[task].idle < KEEPS_ITS_PLACE:
+            return False
+        log.warning("Modbus TCP client %s was idle and makes room", here[task].client.peer)
+        here[task].makes_room = True
+        task.cancel()
+        return True
+
+    async def _converse(self, talk: _Talk, reader: _Incoming) -> None:
+        client = talk.client
         try:
             while True:
                 head = await reader.take(HEADER.size)
@@ -167,6 +180,7 @@ class TcpGateway:
                     log.warning("what %s sends is no Modbus TCP; it is let go", client.peer)
                     return
                 pdu = await reader.take(length - 1)
+                talk.asked = asyncio.get_running_loop().time()
                 await talk.room_for_writes()
                 request = TcpRequest(client, unit, pdu, reader.stale, talk.turn())
                 await self._begin(talk, transaction, request)
@@ -228,6 +242,10 @@ class _Talk:
         self.client = client
         self.writer = writer
         self.reads = asyncio.Lock()
+        self.asked = asyncio.get_running_loop().time()
+        """When a request came last, on the loop's clock."""
+        self.makes_room = False
+        """Whether it is about to end for another one."""
         self._under_way: set[asyncio.Task[None]] = set()
         self._writes: set[asyncio.Task[None]] = set()
 
@@ -235,6 +253,11 @@ class _Talk:
     def full(self) -> bool:
         """Whether no further read is taken."""
         return len(self._under_way) >= MOST_AT_ONCE
+
+    @property
+    def idle(self) -> float:
+        """Seconds since its last request; 0 while one is under way."""
+        return 0.0 if self._under_way else asyncio.get_running_loop().time() - self.asked
 
     def turn(self) -> Callable[[], Awaitable[None]]:
         """The turn of a write that comes now."""
