@@ -78,7 +78,11 @@ def _state(line: Line, monitors: Mapping[int, Monitor]) -> dict[str, object]:
         "cpu": used.ru_utime + used.ru_stime,
         "cycles": {address: one.cycle if one else 0 for address, one in latest.items()},
         "failing": [address for address, one in latest.items() if one is None or one.error],
-        "counters": asdict(line.counters),
+        "counters": {
+            name: count
+            for name, count in asdict(line.counters).items()
+            if name != "devices"  # the line's own alone
+        },
     }
 
 

@@ -95,7 +95,7 @@ TASKS = (
     ),
     Task(
         "put the motor current into a scanner slot",
-        [("4", "Scanner"), ("Enter", "stands for"), *typed("LCR"), ("Enter!", "proposed"), ARM,
+        [("4", "Scanner"), ("Enter", "is mapped to"), *typed("LCR"), ("Enter!", "proposed"), ARM,
          ("w", "Write 1"), ("y!", "Written and read back")],
         [("4", "Scanner"), ("Enter", "stands for"), *typed("LCR"), ("Enter", "proposed"),
          ("w", "Write 1"), ("y", "Written and read back")],
