@@ -65,6 +65,23 @@ async def test_what_was_changed_with_what_was_before() -> None:
     assert "| SP2 | 10.0 Hz | 7.0 Hz | ok | setting |" in text
 
 
+@pytest.mark.parametrize(
+    ("family", "code", "raw", "told"),
+    [
+        ("atv21", "F803", 0, "Off"),
+        ("atv21", "F803", 3, "3 s"),
+        ("powerdrive", "15.07", 0, "Off"),
+        ("powerdrive", "15.07", 30, "3.0 s"),
+    ],
+)
+async def test_a_watch_that_is_off_is_told_so(family: str, code: str, raw: int, told: str) -> None:
+    with bench(family, sets={code: raw}) as made:
+        upload = Upload(made.session)
+        await upload.run()
+        text = report_text(made.profile, upload.parameter_set(), [])
+    assert f"- Time-out ({code}): {told}" in text.splitlines()
+
+
 async def test_what_the_drive_stored_with_a_fault() -> None:
     with bench("atv71", run_hz=35.0) as made:
         await asyncio.to_thread(wait_until, lambda: made.drive.motor.frequency > 20, "it turns")

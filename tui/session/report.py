@@ -152,8 +152,10 @@ class _Report:
         if watch is None:
             return [*lines, "What this family does then is in no document at hand."]
         raw = self.values.raws.get(watch.timeout)
-        off = ", the watch is off" if raw is not None and raw == watch.off else ""
-        lines.append(f"- Time-out ({watch.timeout}): {self.text(watch.timeout)}{off}")
+        told = self.text(watch.timeout)
+        if raw is not None and raw == watch.off and told.casefold() != "off":
+            told += ", the watch is off"
+        lines.append(f"- Time-out ({watch.timeout}): {told}")
         if watch.reaction:
             held = self.values.raws.get(watch.reaction)
             known = next((r for r in watch.reactions if r.raw == held), None)
