@@ -124,6 +124,17 @@ def test_nobody_waits_for_a_disk_that_hangs(journal: Journal, disk: Disk) -> Non
     assert kept(journal) == list(range(21))
 
 
+def test_an_entry_that_comes_once_the_thread_has_ended_is_kept_too(
+    journal: Journal, disk: Disk, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(module, "IDLE_ENDS_AFTER", 0.01)
+    for number in range(3):
+        journal.add(entry(number))
+        assert journal.flush(PATIENCE)
+        wait_until(lambda: not threads(disk), "the thread ends, as nothing comes")
+    assert kept(journal) == [0, 1, 2]
+
+
 def test_a_disk_that_hangs_is_told(
     journal: Journal, disk: Disk, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:

@@ -12,16 +12,22 @@ from typing import Protocol
 import pytest
 import pytest_asyncio
 
+from tests.blocks import block_of
 from tests.programs import rtu_tcp
 from tui.bus.api import ModbusLine, Priority
+from tui.bus.fake import FakeLine
 from tui.drive.profile import library
+from tui.session.connect.limits import limits_of
 from tui.session.connect.open_line import OpenLine, open_line
 from tui.session.drive import DriveSession
 from tui.session.monitor.monitor import Monitor
 from tui.session.monitor.snapshot import Snapshot
 from tui.session.read.reader import Reader
-from tui.session.reading import Quality
+from tui.session.read.slots import Slots
+from tui.session.reading import Quality, Reading
 from tui.simulator import DriveSpec, LineTiming, Simulation
+
+from .fake_clock import FakeClock
 
 INPUTS = next(b.address for b in library.load("atv71").data.blocks if b.direction == "read")
 """Where the words of the scanner's inputs begin."""
@@ -273,3 +279,29 @@ async def test_a_pending_choice_is_never_proved(start: Start) -> None:
     await asyncio.sleep(3.0)
     assert not {"F876", "F877"} & monitor.reader.in_force.keys()
     monitor.stop()
+
+
+async def test_what_a_comparison_has_proved_counts_before_the_slots_are_read_again() -> None:
+    profile = library.load("atv21")
+    block = block_of(profile, "read")
+    raws = {choice.parameter: choice.raw for choice in block.choices}
+    chosen = dict(zip(block.slots, ("FE03", "FE05", "FD01", "FE90", "FD00"), strict=True))
+    held = {code: 1000 + 37 * raw for code, raw in raws.items()}
+    held |= {slot: raws[code] for slot, code in chosen.items()}
+    brings = dict(enumerate((held[code] for code in chosen.values()), start=block.address))
+    clock, line = FakeClock(), FakeLine({1: brings})
+    line.describe(1, limits_of(profile))
+    slots = Slots(line, 1, profile, clock)
+
+    async def ask(codes: Iterable[str]) -> dict[str, Reading]:
+        return {
+            code: Reading(profile[code], held[code], None, Quality.GOOD, clock.monotonic())
+            for code in codes
+        }
+
+    slots.heard()
+    await slots.learn(ask)
+    assert not slots.in_force()
+    for _ in range(60):
+        await slots.compare(ask)
+    assert slots.in_force() == {slot: raws[code] for slot, code in chosen.items()}

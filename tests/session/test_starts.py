@@ -265,6 +265,27 @@ def test_whoever_takes_a_motor_over_says_what_its_own_loss_means(
     assert mine.left_running is meant
 
 
+def test_of_two_motors_that_were_left_one_is_taken_over_and_the_other_still_offered(
+    starts: Starts,
+) -> None:
+    keeper = StartKeeper("panel", starts)
+    line = FakeLine({})
+    left: list[Any] = [
+        SimpleNamespace(line_text=LINE, line=line, device=device, identity=None, commanded=False)
+        for device in (2, 3)
+    ]
+    for session in left:
+        starts.begin(start(device=session.device))
+        keeper.look(session)
+    keeper.take_over(left[0])
+    assert keeper.offered(left[0], runs=True) == ""
+    assert keeper.offered(left[1], runs=True)
+    with pytest.raises(NothingToTakeOver):
+        keeper.take_over(left[0])
+    keeper.take_over(left[1])
+    assert starts.found(LINE, 2) is starts.found(LINE, 3) is None
+
+
 def test_a_line_that_was_closed_and_opened_again_has_the_motor_that_was_started_here(
     starts: Starts, tmp_path: Path
 ) -> None:

@@ -61,6 +61,7 @@ async def test_what_somebody_changed_at_rest_is_read_anew(start: Start, journal:
     simulation, line = start(DriveSpec("atv71", 1, sets={"CHCF": 1, "TCC": 0}))
     drive = simulation.drive(1)
     session = DriveSession(line, 1, ATV71)
+    assert not session.told_by_line
     await Reader(session).read(["CHCF", "DOTD", "ETA"])
     drive.set("CHCF", 3)
     session.image._trusted_from = -math.inf
@@ -69,6 +70,7 @@ async def test_what_somebody_changed_at_rest_is_read_anew(start: Start, journal:
     stopper.stop([session])
     assert (await ended(stopper, 1)).phase is Phase.STOPPED
     assert writes(line) == [(8501, 0x0000)]
+    assert session.told_by_line, "a drive that watches from its first write on watches now"
 
 
 async def test_while_the_motor_runs_what_needs_it_at_rest_is_not_read_again(

@@ -53,6 +53,16 @@ def test_a_fault_says_when_and_where_it_is_told_what_to_do() -> None:
     assert "5 says what to do" in text
 
 
+def test_who_commands_and_who_gives_the_reference_are_not_mixed_up() -> None:
+    view = view_of(ATV71, fakes.RUNNING)
+    assert view.snapshot is not None
+    state = replace(view.snapshot.state, channel="terminals", reference="keypad")
+    told = replace(view, snapshot=replace(view.snapshot, state=state))
+    text = [line.plain.split() for line in state_lines(told, 22)]
+    assert ["Command", "terminals"] in text
+    assert ["Reference", "keypad"] in text
+
+
 def test_the_block_has_five_lines_whatever_happens() -> None:
     for raws in (fakes.RUNNING, fakes.FAULT, NO_SUPPLY):
         for age in (0.1, 20.0):
