@@ -123,12 +123,13 @@ def plan_reads(
         if parameter.access == "w":
             raise DriveError(f"{parameter.code} of {profile.name} can only be written.")
     best: ReadPlan | None = None
-    options = [list(_stretches(profile, block, slots or {})) for block in profile.data.blocks]
+    options = [
+        [stretch for stretch in _stretches(profile, block, slots or {}) if stretch.brings(wanted)]
+        for block in profile.data.blocks
+    ]
     for choice in product(*([None, *stretches] for stretches in options)):
         used = [stretch for stretch in choice if stretch is not None]
         covered = {place.code for stretch in used for place in stretch.request.places}
-        if any(not covered & set(wanted) for _ in used):
-            continue
         rest = [p for code, p in wanted.items() if code not in covered]
         requests = [
             *_runs(profile, rest, timing, unreadable),
@@ -157,6 +158,10 @@ class _Stretch:
     request: ReadRequest
     slots: Mapping[str, int]
     checked: bool
+
+    def brings(self, wanted: Mapping[str, Parameter]) -> bool:
+        """Whether any of its words is wanted."""
+        return any(place.code in wanted for place in self.request.places)
 
 
 def _stretches(profile: Profile, block: Block, slots: Mapping[str, int]) -> Iterator[_Stretch]:
