@@ -67,6 +67,9 @@ async def test_line_works_with_and_without_echo(
         assert (await line.read(1, 9, 4)).words == (9, 10, 11, 12)
         assert line.counters.timeouts == line.counters.wrong == line.counters.checksum == 0
         assert any(frame.note == "echo" for frame in line.trace) is echo
+        # what was asked only to tell an echo from an answer is counted as well
+        answered = line.counters.requests - (first == "broadcast")
+        assert line.counters.replies == answered
 
 
 async def test_echo_is_no_reply_to_a_read(open_line: OpenLine) -> None:

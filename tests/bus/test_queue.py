@@ -282,6 +282,7 @@ def test_a_copy_of_the_reply_before_is_known_by_its_time(devices: Devices) -> No
     assert devices.is_repeat(1, other, reply, 0.03)
     assert devices.is_repeat(1, other, reply, 0.001)
     assert not devices.is_repeat(1, other, reply, 0.01), "as long as ever"
+    assert not devices.is_repeat(1, other, reply, 0.0215), "a little more than twice as long"
     assert not devices.is_repeat(1, asked, reply, 0.03), "the same register"
     assert not devices.is_repeat(1, other, bytes([3, 2, 0, 8]), 0.03), "another value"
 
