@@ -19,7 +19,6 @@ class FakePanel:
 
     given: dict[str, Any]
     ends_with = 0
-    begun_journal = None
 
     def __init__(self, **given: Any) -> None:
         type(self).given = given

@@ -238,7 +238,6 @@ async def test_a_read_only_line_resets_no_drive(tmp_path: Path) -> None:
 async def test_a_drive_without_counters_has_ours_alone() -> None:
     with simulated("atv312") as (simulation, line):
         watch = CounterWatch(DriveSession(line, 2, library.load("atv312")))
-        assert not watch.has_own
         assert await watch.echo(5) == 5
         await watch.look()
         assert watch.now().agree

@@ -176,11 +176,6 @@ def _stops(chart: Chart) -> list[Order]:
     return [order for order in chart.orders if order.id in GENTLE_FIRST]
 
 
-def _own_places(family: StopFacts) -> set[int]:
-    found = {_place(family, chart, one) for chart in family.charts for one in _stops(chart)}
-    return {address for address in found if address is not None}
-
-
 def _place(family: StopFacts, chart: Chart, order: Order) -> int | None:
     return family.places.get(order.parameter or chart.command)
 

@@ -13,7 +13,7 @@ from decimal import Decimal
 from .profile.profile import Profile
 from .profile.schema import Parameter
 from .teaching import TaughtScale
-from .values import Value, decode, raw_range
+from .values import Value, decode
 
 
 def shown(
@@ -64,20 +64,6 @@ def typed_text(
         return shown(profile, parameter, raw, raws, absent).text
     number = number_of(profile, parameter, raw, raws, absent)
     return str(raw) if number is None else f"{number:f}"
-
-
-def limits_text(
-    profile: Profile,
-    parameter: Parameter,
-    raws: Mapping[str, int],
-    absent: Collection[str] = (),
-) -> str:
-    """From the lowest to the highest value that the profile allows, in the parameter's unit."""
-    low, high = raw_range(parameter)
-    scale = profile.scale(parameter, raws, absent)
-    if scale is None:
-        return f"raw {low}..{high}"
-    return f"{low * scale:f}..{high * scale:f} {profile.unit(parameter, raws)}".rstrip()
 
 
 def depends_on(parameter: Parameter) -> tuple[str, ...]:

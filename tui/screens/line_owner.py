@@ -53,11 +53,6 @@ class LineOwner(Panel):
         return self._journal
 
     @property
-    def begun_journal(self) -> Journal | None:
-        """The record, where there was something to put into it."""
-        return self._journal
-
-    @property
     def journal_trouble(self) -> str:
         """Why what is written is not on record; empty while it is."""
         return self._journal.trouble if self._journal is not None else ""

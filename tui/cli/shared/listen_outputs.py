@@ -15,8 +15,6 @@ if TYPE_CHECKING:
     from tui.session.listening.tally import ReadTally, WriteTally
     from tui.session.listening.words import HeardValue, WordSpan
 
-TIME_WIDTH = 13
-"""Characters of a time of day and its gap."""
 FURTHER = 24
 """Where the rest of a line goes on that does not fit."""
 

@@ -5,8 +5,13 @@ from __future__ import annotations
 from rich.style import Style
 
 from tui.session.work import Outcome, OutcomeKind
-from tui.widgets.outcome import OUTCOME_STYLES
+from tui.widgets.palette import ALARM, ATTENTION, STRONG
 
+OUTCOME_STYLES = {
+    OutcomeKind.WORKING: ATTENTION,
+    OutcomeKind.DONE: STRONG,
+    OutcomeKind.REFUSED: ALARM,
+}
 NEWS_FOR = {OutcomeKind.WORKING: 60.0, OutcomeKind.DONE: 15.0, OutcomeKind.REFUSED: 60.0}
 """Seconds for which it is shown what the last work has come to."""
 

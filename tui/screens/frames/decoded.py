@@ -12,7 +12,7 @@ from tui.drive.shown import shown
 from tui.drive.values import from_words, word_count
 from tui.session.listening.words import FUNCTION_NAMES
 
-READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE, IDENTIFY_DRIVE = 3, 4, 6, 16, 23, 43
+READ, READ_INPUT, WRITE_ONE, WRITE_MANY, READ_WRITE = 3, 4, 6, 16, 23
 EXCEPTION_BIT = 0x80
 MBAP_BYTES = 7
 """Bytes before the function code on Modbus TCP."""

@@ -69,11 +69,6 @@ class RunKeys(OrderKeys):
             return  # the line shows what is known; Enter reads anew
         self.look()
 
-    def close_line(self) -> None:
-        """Take nothing of what was typed."""
-        self._line = None
-        self.look()
-
     @property
     def line_is_open(self) -> bool:
         """Whether keys are those of the line."""

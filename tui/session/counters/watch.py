@@ -104,11 +104,6 @@ class CounterWatch:
         return self._has(DAMAGED) and self._has(FRAMES)
 
     @property
-    def has_own(self) -> bool:
-        """Whether the drive counts anything that it tells."""
-        return self.has_diagnostics or bool(self.session.profile.data.port_counters)
-
-    @property
     def can_reset_drive(self) -> bool:
         """Whether the drive's own counters can be reset from here."""
         return self._has(RESET) and not self.session.line.read_only
