@@ -9,7 +9,7 @@ import pytest
 from tui.drive.control_taking import control_taking
 from tui.drive.orders import choose, locked_by
 from tui.drive.profile import library
-from tui.drive.profile.profile import Profile
+from tui.drive.profile.profile import Profile, is_verified
 from tui.drive.settings.factory import not_factory
 from tui.drive.settings.writable import is_setting, write_refusal
 from tui.drive.shown import shown, typed_text
@@ -38,6 +38,8 @@ def test_what_a_family_knows_is_not_taught(id: str) -> None:
     told = [p for p in family.parameters if p.unit or p.values or p.bits or p.scale != "1"]
     assert told
     assert not {p.code for p in told} & {*teachable_codes(family)}
+    written = [p for p in family.parameters if p.access != "r" and is_verified(p)]
+    assert not {p.code for p in written} & {*teachable_codes(family)}, "no measurements"
 
 
 def test_a_taught_value_is_told_with_its_sign_and_mark(family: Profile) -> None:
