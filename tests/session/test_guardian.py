@@ -16,6 +16,7 @@ from tests.bus.peer import eventually
 from tui.bus.line import Line
 from tui.bus.link import RtuTcpLink, label
 from tui.bus.program import Program
+from tui.bus.share.lease import SILENT_CLIENT
 from tui.drive.profile import library
 from tui.session.connect.identify import DriveIdentity
 from tui.session.drive import DriveSession
@@ -274,12 +275,16 @@ async def test_the_motor_of_a_frozen_program_is_stopped_after_the_drives_own_tim
     bench: Bench,
 ) -> None:
     await frozen(bench)
+    let_go = bench.clock.monotonic() - ENDS_WITHIN - 0.1
     await come(lambda: bench.says("is not on the line any more: its motor is stopped in "))
     assert bench.says("unless it comes back.")
     bench.clock.advance(3.0)
     await asyncio.sleep(0.2)
     assert bench.line.facts.stops.stamp(1) == 0
-    bench.clock.advance(10.0)
+    bench.clock.advance(max(0.0, let_go + 10.1 - SILENT_CLIENT - bench.clock.monotonic()))
+    await come(lambda: bench.line.facts.stops.stamp(1) > 0)
+    # it had been silent for some of that time before it was let go
+    assert bench.clock.monotonic() - let_go < 10.0
     drive = bench.simulation.drive(1)
     await come(lambda: drive.motor.frequency == 0)
     assert drive.fault is None

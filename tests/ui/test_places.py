@@ -17,7 +17,7 @@ from tui.drive.values import type_range
 from tui.screens.frames.frame_view import frame_line
 from tui.screens.keys.table import CONNECTION, EVERYWHERE, MONITOR, keys_line, of_screen
 from tui.screens.monitor.arrange import OUTSIDE, Arrangement, arrange
-from tui.screens.monitor.assembly import monitor_parts, watched_words
+from tui.screens.monitor.assembly import codes_beside, monitor_parts, watched_words
 from tui.screens.monitor.commands import order_keys
 from tui.screens.monitor.motor import motor_lines, other_values, value_cells
 from tui.screens.monitor.readouts import readout_lines
@@ -130,6 +130,16 @@ def test_numbers_end_and_units_begin_at_one_place(profile_id: str, data: st.Data
                 part = line.plain[2 + column * cells : 2 + (column + 1) * cells]
                 end = value_cells(cells, any(v.high for v in other_values(profile))) - 4
                 assert not part.strip() or (part[end - 1] != " " and part[end] == " "), part
+
+
+def test_what_monitor_shows_beside_its_values_is_read() -> None:
+    """Who commands and who gives the reference would stand as dashes."""
+    for profile in map(library.load, PROFILES):
+        channels = [profile.quantity("command_channel"), profile.quantity("reference_channel")]
+        wanted = {one.code for one in channels if one is not None}
+        wanted |= {word.code for word in watched_words(profile)}
+        wanted |= {one.high for one in profile.data.monitoring.values if profile.get(one.high)}
+        assert wanted == set(codes_beside(profile))
 
 
 def test_large_digits_stand_at_one_place_whatever_their_value() -> None:

@@ -36,7 +36,6 @@ class Dispatcher:
         self.facts = facts or SharedFacts()
         """What the programs that share the line must know of each other."""
         self._devices = devices
-        self._timing = timing
         self._clock = clock
         self._queue = JobQueue(timing.queue_length)
         self._wake = asyncio.Event()
