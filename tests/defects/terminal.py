@@ -8,6 +8,14 @@ PACE = ("tests/terminal/test_pacing.py",)
 
 DEFECTS = (
     Defect(
+        "reports-keep-a-sequence-waiting",
+        "tui/terminal/dialects.py",
+        "*cut, self._last = self._cut",
+        "*cut, _ = self._cut",
+        "After Esc and [ no digit, and not the next letter either, is a key: k does not stop.",
+        ("tests/terminal/test_dialects.py::test_reports_keep_no_sequence_waiting",),
+    ),
+    Defect(
         "frames-not-waited-for",
         "tui/terminal/pacing.py",
         "        if on_its_way and sum(on_its_way) > ahead and",

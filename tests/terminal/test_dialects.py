@@ -84,6 +84,24 @@ def test_a_report_between_the_halves_of_a_key_is_no_part_of_it(report: str, gap:
             assert keys in ([key], [] if key not in STOPS else [key]), (key, first, found)
 
 
+@pytest.mark.parametrize("report", ["\x1b[12;40R", "\x1b[?2026;2$y", "\x1b[?62;22c"])
+@pytest.mark.parametrize("began", ["\x1b[", "\x1bO", "\x1b[2"])
+@pytest.mark.parametrize("late", [True, False])
+def test_reports_keep_no_sequence_waiting(report: str, began: str, late: bool) -> None:
+    """Esc and `[` typed one after the other: the panel asks the terminal twice a second."""
+    tokenizer, found, now = Tokenizer(), list[Token](), 0.0
+    pieces = [began[0], began[1:]] if late else [began]
+    for piece in pieces:
+        found += [*tokenizer.tick(now), *tokenizer.feed(piece, now)]
+        now += 0.5
+    for _ in range(4):
+        found += [*tokenizer.tick(now), *tokenizer.feed(report, now)]
+        now += 0.5
+    found += [*tokenizer.tick(now), *tokenizer.feed("2", now)]
+    keys = [token.name for token in found if isinstance(token, KeyToken)]
+    assert keys == [*(["escape"] if late else []), "2"]
+
+
 @pytest.mark.parametrize("dialect", SHIFTED_AND_MORE)
 @pytest.mark.parametrize("gap", GAPS)
 def test_other_keys_of_the_dialects_type_nothing_and_stop_nothing(dialect: str, gap: float) -> None:

@@ -49,7 +49,7 @@ class Tokenizer:
         self._state: Callable[[str], None] = self._ground
         self._text = ""
         self._long: list[str] = []
-        self._began = self._last = self._now = 0.0
+        self._began = self._last = self._before = self._now = 0.0
         self._mark: object = None
         self._here: object = None
         self._alt = self._mute = False
@@ -66,8 +66,8 @@ class Tokenizer:
         self._now, self._here = now, mark
         if not self._stops_inside(text):
             for character in text:
+                self._before, self._last = self._last, now
                 self._state(character)
-            self._last = now
         return self._given()
 
     def tick(self, now: float) -> list[Token]:
@@ -156,7 +156,7 @@ class Tokenizer:
         if character == ESC:
             cut = self._state, self._text, self._began, self._mark, self._alt, self._mute
             self._ground(character)
-            self._cut = cut
+            self._cut = *cut, self._before
         elif character == " ":
             self._begin()
             self._key(SPACE_ALONE)
@@ -218,7 +218,9 @@ class Tokenizer:
         """What came was no key: the sequence that it came into, whole or late, goes on."""
         self._late_until = self._late_before
         if self._cut is not None:
-            (self._state, self._text, self._began, self._mark, self._alt, self._mute) = self._cut
+            # from its own last character on: reports come twice a second
+            *cut, self._last = self._cut
+            (self._state, self._text, self._began, self._mark, self._alt, self._mute) = cut
             self._cut = None
 
     def _opening(self, character: str) -> None:
