@@ -213,6 +213,30 @@ async def test_a_set_is_compared_and_staged(tmp_path: Path) -> None:
         assert (made.drive.raw("ACC"), made.drive.raw("HSP")) == (30, 500)
 
 
+async def test_what_a_set_has_alike_is_not_staged_by_a_later_change(tmp_path: Path) -> None:
+    async with editing("atv71") as (made, editor):
+        session = made.session
+        upload = Upload(session, ["ACC", "DEC", "LSP", "INR"])
+        await upload.run()
+        file = tmp_path / "set.toml"
+        write_file(file, dump_set(session.profile, upload.parameter_set()))
+        made.drive.set("ACC", 99)
+        editor.source = read_set(file)
+        await read(made, editor, "ACC", "DEC", "LSP", "INR")
+        await made.until(lambda: made.session.image.raws["ACC"] == 99)
+        editor.staging.take_plan(await editor.plan())
+        editor.apply()
+        assert "1 written" in await written(made, editor)
+        made.drive.set("DEC", 77)  # at the keypad
+        await made.until(lambda: made.session.image.raws["DEC"] == 77)
+        editor.staging.stage("LSP", "2 Hz")
+        made.session.work.outcome = None
+        editor.apply()
+        assert "1 written" in await written(made, editor)
+        assert list(editor.staging.edits) == []
+        assert made.drive.raw("DEC") == 77
+
+
 async def test_what_waits_for_a_reset_is_told_until_the_drive_was_off() -> None:
     # a line that does not wait long for late replies: how long it does is not the matter here
     timing = Timing(first_timeout=0.3, late_reply=0.3)

@@ -15,7 +15,6 @@ from tui.bus.errors import LineError
 from tui.drive.errors import DriveError
 from tui.drive.orders import OrderRefused
 from tui.drive.profile.schema import StateKind
-from tui.drive.settings.edits import Edits
 from tui.drive.settings.parameter_set import ParameterSet
 from tui.drive.settings.restore_plan import RestorePlan
 from tui.drive.settings.selection import FilterContext
@@ -143,7 +142,8 @@ class Editor:
                 progress=self._progress,
                 ask_after_failure=True,
             )
-            staging.edits, self.applied = Edits((*applied.left.asked, *held_back)), applied
+            staging.take_left((*applied.left.asked, *held_back))
+            self.applied = applied
             self._applied(applied)
             return _summary(applied)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 
@@ -100,6 +100,21 @@ class Staging:
         wanted = frozenset(codes) or frozenset(edit.code for edit in self.edits.asked)
         chosen = Edits(tuple(edit for edit in self.edits.asked if edit.code in wanted))
         return chosen, tuple(edit for edit in self.edits.asked if edit.code not in wanted)
+
+    def take_left(self, left: Sequence[Edit]) -> None:
+        """What a writing has left; what was no change is staged only while its scale waits yet.
+
+        Kept, it would become one by itself once somebody sets that parameter otherwise.
+        """
+        changing = {edit.code for edit in self.edits}
+        waits = {edit.code for edit in left if edit.code in changing}
+        profile = self.session.profile
+
+        def stays(edit: Edit) -> bool:
+            scale = profile[edit.code].scale_by
+            return edit.code in waits or (scale is not None and scale.parameter in waits)
+
+        self.edits = Edits(tuple(edit for edit in left if stays(edit)))
 
     def take_result(self, result: Result) -> None:
         """One edit was written, or could not be."""
