@@ -65,6 +65,15 @@ async def answer(made: Bench, key: str, text: str) -> None:
     await made.pilot.press("enter")
 
 
+async def stage(made: Bench, value: str, told: str) -> None:
+    """Type a value for the parameter under the cursor; what is told of it."""
+    await made.pilot.press("enter")
+    await until(made.pilot, lambda: isinstance(made.app.screen, EditNumber))
+    made.app.screen.query_one(Input).value = value
+    await made.pilot.press("enter")
+    await message(made, told)
+
+
 async def open_file(made: Bench, file: Path) -> None:
     """Choose a file from the list of those that can be opened."""
     await made.pilot.press("ctrl+o")
@@ -131,6 +140,31 @@ async def test_u_takes_the_last_edit_back_and_delete_the_one_under_the_cursor() 
         await made.pilot.press("u")
         await until(made.pilot, lambda: "0 staged" in shown(made.app, "status"))
         assert writes(made.app) == []
+
+
+async def test_what_is_told_of_edits_is_true_while_the_motor_runs() -> None:
+    """TFR waits for a standstill: nothing says that w writes it, and it is counted until it is."""
+    async with bench("atv71") as made:
+        editor = (await to_parameters(made)).editor
+        await arm(made.pilot)
+        made.app.chosen.commander.run("forward", "20Hz")  # type: ignore[union-attr]
+        await until(made.pilot, lambda: editor.state == "running")
+        await find(made, "ACC")
+        await stage(made, "4", "ACC → 4.0 s: 1 staged. w writes it, with the motor running.")
+        await find(made, "TFR")
+        await stage(made, "70", "TFR → 70.0 Hz: 2 staged. TFR waits until the motor stands.")
+        await find(made, "DEC")
+        await stage(made, "5", "DEC → 5.0 s: 3 staged. TFR waits until the motor stands.")
+        await made.pilot.press("W")
+        await until(made.pilot, lambda: isinstance(made.app.screen, Confirm))
+        await made.pilot.press("y")
+        await message(made, "1 written and read back; 2 still staged: ACC, TFR")
+        await until(made.pilot, lambda: "Now 5.0 s, was 3.0 s." in shown(made.app, "detail"))
+        await made.pilot.press("u")
+        await message(made, "TFR is no longer staged; 1 is staged now.")
+        await made.pilot.press("u")
+        await message(made, "ACC is no longer staged; nothing is staged now.")
+        await until(made.pilot, lambda: "u stages the old value" in shown(made.app, "detail"))
 
 
 async def test_a_parameter_is_found_from_every_screen() -> None:

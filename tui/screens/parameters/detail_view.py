@@ -173,7 +173,10 @@ def _news(editor: Editor, parameter: Parameter) -> Text:
     if code in editor.waits_for_reset:
         return Text("In force only after a reset of the drive.", ALARM)
     if old := old_text(editor, code):
-        return Text(f"Now {value_text(editor, code)}, was {old}: u stages the old value.", PLAIN)
+        said = f"Now {value_text(editor, code)}, was {old}"
+        # u takes back what is staged first
+        u = "" if len(editor.staging.edits) else ": u stages the old value"
+        return Text(f"{said}{u}.", PLAIN)
     if code not in editor.values.raws:
         return Text(editor.values.absent.get(code) or editor.values.trouble, STALE)
     if refused is not None and refused.reason != "read-only":

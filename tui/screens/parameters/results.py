@@ -36,9 +36,10 @@ class Results(KeyQuestion[None]):
 
     BINDINGS: ClassVar = [Binding("enter", "no", show=False)]
 
-    def __init__(self, applied: Applied) -> None:
+    def __init__(self, applied: Applied, *, staged: bool = False) -> None:
+        """`staged` says whether edits are left: u takes those back first."""
         super().__init__()
-        self._applied = applied
+        self._applied, self._staged = applied, staged
 
     def dialog(self) -> ComposeResult:
         """Each with what became of it."""
@@ -47,7 +48,7 @@ class Results(KeyQuestion[None]):
             with VerticalScroll(id="says"):
                 yield Plain(results_table(self._applied))
             keys = [("Enter or Esc", "closes")]
-            if self._applied.written:
+            if self._applied.written and not self._staged:
                 keys.append(("u", "afterwards stages the old values"))
             yield Plain(hint(*keys), id="hint")
 

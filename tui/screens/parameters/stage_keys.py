@@ -9,6 +9,9 @@ from tui.session.settings.editor import Editor
 
 from .parameter_keys import ParameterKeys
 
+WAITING_NAMED = 3
+"""Codes that wait for a standstill and are named; more are counted."""
+
 
 class StageKeys(ParameterKeys):
     """What is typed is checked and staged; nothing here reaches the drive."""
@@ -118,16 +121,22 @@ class StageKeys(ParameterKeys):
 
     def action_undo(self) -> None:
         """Take the last edit back; where nothing is staged, stage what was held before a write."""
-        if len(self.editor.staging.edits.asked):
-            self.editor.staging.undo(self.editor.staging.edits.asked[-1].code)
+        staging = self.editor.staging
+        if staged := staging.edits.items:  # what the drive holds anyway is no edit that is seen
+            self._take_back(staged[-1].code)
         else:
-            self.note(self.editor.staging.stage_old())
+            self.note(staging.stage_old())
         self.list_again()
+
+    def _take_back(self, code: str) -> None:
+        staging = self.editor.staging
+        staging.undo(code)
+        self.note(f"{code} is no longer staged; {len(staging.edits) or 'nothing'} is staged now.")
 
     def action_undo_this(self) -> None:
         """Take the edit under the cursor back."""
         if self.listed.code in self.editor.staging.edits:
-            self.editor.staging.undo(self.listed.code)
+            self._take_back(self.listed.code)
         else:
             self.note("This parameter is not staged.")
         self.list_again()
@@ -182,6 +191,15 @@ def _staged_text(editor: Editor, code: str) -> str:
     edit, count = editor.staging.edits.get(code), len(editor.staging.edits)
     if edit is None:
         return f"{code} holds that already: not staged."
+    if waits := [e.code for e in editor.staging.edits if _waits_for_rest(editor, e.code)]:
+        which = ", ".join(waits) if len(waits) <= WAITING_NAMED else f"{len(waits)} of them"
+        wait = "waits" if len(waits) == 1 else "wait"
+        return f"{code} → {edit.text}: {count} staged. {which} {wait} until the motor stands."
     them = "it" if count == 1 else "both" if count == 2 else f"all {count}"
     running = ", with the motor running" if editor.state == "running" else ""
     return f"{code} → {edit.text}: {count} staged. w writes {them}{running}."
+
+
+def _waits_for_rest(editor: Editor, code: str) -> bool:
+    refused = editor.refusal(code)
+    return refused is not None and refused.reason == "running"

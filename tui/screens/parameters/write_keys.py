@@ -81,7 +81,7 @@ class WriteKeys(ParameterKeys):
         self.list_again()
         stamp = applied.stamp
         if not applied.waits or applied.stopped or stamp != self.session.work.stops:
-            self.app.push_screen(Results(applied))
+            self.app.push_screen(Results(applied, staged=len(self.editor.staging.edits) > 0))
             return
 
         def told(sure: bool | None) -> None:

@@ -6,7 +6,7 @@ in the line's loop; everything else belongs to the thread of the screen.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Coroutine, Mapping
+from collections.abc import Callable, Coroutine, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
 from typing import Any
@@ -32,6 +32,9 @@ from .favourites import Marks, load_marks, save_marks
 from .link_change import LinkChange
 from .staging import Staging
 from .watched_values import WatchedValues
+
+LEFT_NAMED = 8
+"""Codes that are named of what is still staged; more are counted."""
 
 
 @dataclass(slots=True)
@@ -145,7 +148,7 @@ class Editor:
             staging.take_left((*applied.left.asked, *held_back))
             self.applied = applied
             self._applied(applied)
-            return _summary(applied)
+            return _summary(applied, [edit.code for edit in staging.edits])
 
         self._run(work, stamp, self._cut_short)
 
@@ -226,13 +229,13 @@ class Editor:
         self.session.work.tell(kind, text)
 
 
-def _summary(applied: Applied) -> str:
-    """What became of all edits, in a sentence or two."""
-    done, failed = len(applied.written), len(applied.results) - len(applied.written)
+def _summary(applied: Applied, staged: Sequence[str]) -> str:
+    """What became of all edits and what is staged now, in a sentence or two."""
+    done, failed = len(applied.written), [r.edit.code for r in applied.results if not r.done]
     parts = [f"{done} written and read back" if done else "nothing written"]
-    if failed:
-        codes = ", ".join(r.edit.code for r in applied.results if not r.done)
-        parts.append(f"{failed} still staged: {codes}")
+    if left := list(dict.fromkeys((*failed, *staged))):
+        more = f" and {len(left) - LEFT_NAMED} more" if len(left) > LEFT_NAMED else ""
+        parts.append(f"{len(left)} still staged: {', '.join(left[:LEFT_NAMED])}{more}")
     parts += [link.text for link in applied.links]
     if applied.after_reset:
         parts.append(f"in force after a reset of the drive: {', '.join(applied.after_reset)}")

@@ -78,7 +78,7 @@ class Staging:
                 self.stage_raw(code, old)
                 staged += 1
         if not olds:
-            return "Nothing is staged, and nothing was written lately."
+            return "Nothing is staged, and no old value is known that could be."
         values, them = ("old value is", "it") if staged == 1 else ("old values are", "them")
         return f"{staged} {values} staged; w writes {them}."
 
