@@ -311,11 +311,12 @@ async def test_a_fault_is_reset_and_starts_nothing(family: str) -> None:
             await made.done()
         await made.order("forward")
         await made.until(lambda: made.drive.motor.frequency > 3)
-        made.drive.provoke("OC1" if family == "atv21" else "OCF")
+        made.drive.provoke("OC1" if family == "atv21" else "OCF", persists=True)
         await made.until(lambda: made.drive.fault is not None)
         await made.let_go_until(lambda: made.drive.motor.rotor == 0)
         if family != "atv21":
             assert "reset it first" in await made.order("forward", OutcomeKind.REFUSED)
+        assert "the drive is still in fault" in await made.order("reset")
         made.drive.clear_cause()
         await made.order("reset")
         await made.until(lambda: made.drive.fault is None)

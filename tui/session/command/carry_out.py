@@ -14,6 +14,8 @@ from .access import CommandAccess
 from .motor_start import MotorStart
 from .reference import Reference, parse_reference, reference_codes, within_limits
 
+STILL_IN_FAULT = "sent, but the drive is still in fault, as long as its cause is there"
+
 
 async def give_order(access: CommandAccess, id: OrderId) -> str:
     """Carry out a command that nothing speaks against."""
@@ -24,7 +26,8 @@ async def give_order(access: CommandAccess, id: OrderId) -> str:
     # a fault holds no stop back: its word follows the status word alone
     order = choose(chart, id, access.raws, None if id in STOP_ORDERS else state)
     await access.send(chart, order)
-    name = (await access.state(chart)).name
+    now = await access.state(chart)
+    name = STILL_IN_FAULT if id == "reset" and now.kind == "fault" else now.name
     return f"{order.name}: {name}{await _cleared(access, order)}"
 
 
