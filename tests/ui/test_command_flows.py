@@ -39,7 +39,7 @@ from tui.simulator import DriveSpec, Simulation
 from tui.simulator.drive import SimulatedDrive
 from tui.widgets.fields import NumberInput
 
-from .test_flows import shown, until
+from .test_flows import picture, shown, until
 
 SOURCES = Path(__file__).parents[2] / "tui" / "screens"
 FAMILIES = ["atv21", "atv31", "atv312", "atv71", "powerdrive", "proxidrive", "varmeca"]
@@ -202,6 +202,19 @@ async def bench(
 @pytest.fixture(autouse=True)
 def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
+
+
+async def test_a_motor_that_stands_after_a_quick_stop_is_not_told_as_stopping() -> None:
+    """An Altivar 71 keeps the state of its quick stop at rest."""
+    async with bench("atv71") as made:
+        await made.running()
+        await until(made.pilot, lambda: made.speed() > 2)
+        await made.pilot.press("k")
+        await made.message("Stopped")
+        assert "Stopped: stopped" not in shown(made.app, "said")
+        await until(made.pilot, lambda: "□ STOPPED" in shown(made.app, "strip"))
+        await made.pilot.press("1")
+        await until(made.pilot, lambda: "□ stopped" in picture(made.app))
 
 
 @pytest.mark.parametrize("family", kept(FAMILIES, "atv21", "atv71", "powerdrive"))

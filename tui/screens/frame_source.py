@@ -156,7 +156,7 @@ def drive_now(console: DriveConsole, fleet: Fleet, now: float) -> DriveNow:
     report = fleet.stopper.reports.get(session.device)
     by_look = snapshot is None or (look is not None and look.time > snapshot.time)
     state, age, readings = _seen(console, look if by_look else None, now)
-    kind, words = said_state(console, state, report, now)
+    kind, words = said_state(console, state, report, now, readings)
     values = {
         quantity: said_value(console, readings, quantity)
         for quantity in ("output_frequency", "frequency_reference", "motor_current")
@@ -196,7 +196,11 @@ def _seen(
 
 
 def said_state(
-    console: DriveConsole, state: DriveState | None, report: StopReport | None, now: float
+    console: DriveConsole,
+    state: DriveState | None,
+    report: StopReport | None,
+    now: float,
+    readings: Mapping[str, Reading],
 ) -> tuple[str, str]:
     """The kind of the state and its words, a stop on its way before it."""
     if report is not None:
@@ -212,7 +216,15 @@ def said_state(
         return state.kind, f"FAULT {state.fault.code}" if state.fault else "FAULT"
     if stands_by(console, state):
         return "ready", "STANDBY"
+    if state.kind == "stopping" and _is_at_zero(console, readings):
+        return "stopped", "STOPPED"  # some keep the state of their quick stop at rest
     return state.kind, state.headline.upper() or "UNKNOWN"
+
+
+def _is_at_zero(console: DriveConsole, readings: Mapping[str, Reading]) -> bool:
+    parameter = console.session.profile.quantity("output_frequency")
+    reading = readings.get(parameter.code) if parameter else None
+    return reading is not None and reading.quality == "good" and reading.number == 0
 
 
 def stands_by(console: DriveConsole, state: DriveState) -> bool:

@@ -41,7 +41,7 @@ def _row(
         return WallRow(identity.device, who, identity.name, words="no profile")
     state, readings, age, old, vain = _seen(console, look, *at)
     report = fleet.stopper.reports.get(identity.device)
-    kind, words = said_state(console, state, report, at[0])
+    kind, words = said_state(console, state, report, at[0], readings)
     if kind not in ("stop", "stop failed"):
         words = _called(state, words)
     if not connected:

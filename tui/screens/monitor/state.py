@@ -102,6 +102,8 @@ def _present(view: View, state: DriveState, width: int) -> tuple[Text, list[Text
         return Text("? unknown state", ALARM), []
     if state.kind == "running":
         return Text(_running(view, state), RUNNING), []
+    if state.kind == "stopping" and _hertz(view, "output_frequency") == 0:
+        return Text("stopped", STRONG), [Text(short(state.name, width), FAINT)]
     hindrance = view.control.hindrance
     if view.stands_by and hindrance is None:
         if view.read_only:

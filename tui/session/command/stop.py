@@ -132,7 +132,9 @@ class Stopper:
         if not same:
             if self._events is not None:
                 kind = "failed" if phase is Phase.FAILED else "stop"
-                self._events.add(kind, f"{phase.capitalize()}: {text}", session.device)
+                head = "Stopping: " if phase is Phase.STOPPING else ""
+                said = f"{head}{text}" if head else f"{text[:1].upper()}{text[1:]}"
+                self._events.add(kind, said, session.device)
             log.info("stop of device %s: %s, %s", session.device, phase, text)
 
     async def _broadcast(self, sessions: list[DriveSession], order: OrderId) -> None:
