@@ -204,6 +204,15 @@ def no_ports(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("tui.session.connect.open_line.serial_ports", list)
 
 
+async def test_no_message_says_that_an_armed_drive_is_not() -> None:
+    async with bench("atv71") as made:
+        await made.pilot.press("r")
+        await made.message("Not armed: a arms this drive.")
+        await made.armed()
+        await made.message("Armed now")
+        assert "Not armed" not in shown(made.app, "said")
+
+
 async def test_a_motor_that_stands_after_a_quick_stop_is_not_told_as_stopping() -> None:
     """An Altivar 71 keeps the state of its quick stop at rest."""
     async with bench("atv71") as made:

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from ..dialogs.now import MotorsNow
 
 NOT_ARMED = "Not armed: a arms this drive."
+ARMED_AFTER_ALL = "Armed now; each key makes it a minute again."
+"""Takes the place of the message that it is not, which would stand there untrue."""
 
 
 class ArmingKeys(PanelScreen):
@@ -99,6 +101,9 @@ class ArmingKeys(PanelScreen):
             self.commander.arm()
         except OrderRefused as refused:
             self._refuse(str(refused))
+        newest = self.app.events.newest
+        if self._armed() and newest is not None and newest.text == NOT_ARMED:
+            self.app.tell(ARMED_AFTER_ALL)
         self.look()
 
     def _ask_for(self, other: Program) -> None:
