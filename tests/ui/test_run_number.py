@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from tui.drive.profile import library
-from tui.screens.monitor.run_line import DIGITS_MOST, STEPS, RunLine, proposed, run_lines
+from tui.screens.monitor.run_line import DIGITS_MOST, STEPS, Purpose, RunLine, proposed, run_lines
 
 from . import fakes
 
@@ -90,7 +90,7 @@ def test_the_line_says_what_will_happen_and_fits(width: int) -> None:
     profile = library.load("atv71")
     raws = {"HSP": 500, "LSP": 0, "TFR": 600, "ACC": 30, "INR": 1, "FRS": 500}
     readings = fakes.readings_of(profile, raws, fakes.NOW)
-    told, first, second = run_lines(LINE, profile, readings, 200.0, width)
+    told, first, second = run_lines(LINE, profile, readings, 200.0, width, output=Decimal(0))
     assert not told.plain.strip()
     assert "RUN FORWARD at" in first.plain
     assert "30.0  Hz" in first.plain
@@ -100,3 +100,28 @@ def test_the_line_says_what_will_happen_and_fits(width: int) -> None:
     assert second.plain.split()[:2] == ["Enter", "runs"]
     assert "Space stops" in second.plain
     assert max(len(first.plain), len(second.plain)) <= width
+
+
+@pytest.mark.parametrize(
+    ("purpose", "output", "seconds"),
+    [
+        ("forward", "0", "there in 1.8 s"),
+        ("forward", "30.0", "there in 0.0 s"),
+        ("forward", "40.0", "there in 1.0 s"),
+        ("forward", "-10.0", "there in 2.8 s"),
+        ("reverse", "35.0", "there in 5.3 s"),
+        ("forward", None, ""),
+    ],
+)
+def test_how_long_it_takes_begins_at_what_the_motor_does(
+    purpose: Purpose, output: str | None, seconds: str
+) -> None:
+    """30 Hz at 3 s up and 5 s down for 50 Hz."""
+    profile = library.load("atv71")
+    raws = {"HSP": 500, "TFR": 600, "ACC": 30, "DEC": 50, "INR": 1, "FRS": 500}
+    readings = fakes.readings_of(profile, raws, fakes.NOW)
+    line = RunLine(purpose, "30.0", "Hz", 0.0, 0)
+    now = None if output is None else Decimal(output)
+    _, first, _ = run_lines(line, profile, readings, 200.0, 80, output=now)
+    assert seconds in first.plain
+    assert ("there in" in first.plain) is bool(seconds)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from decimal import Decimal
+from typing import TypeVar
 
 from tui.drive.chart import ChartState, Direction, read_chart
 from tui.drive.profile.profile import Profile
@@ -11,6 +13,9 @@ from tui.drive.profile.schema import Bit, FaultCode, Parameter, StateKind
 from tui.drive.values import set_bits
 
 from .reading import Quality, Reading
+
+Signed = TypeVar("Signed", float, Decimal)
+"""A number with the sign of a direction."""
 
 STATE_FRESH = 1.0
 """Seconds for which a state counts as that of now; an older one is read anew."""
@@ -110,7 +115,7 @@ def _headline(chart: ChartState, fault: FaultCode | None) -> str:
     return words
 
 
-def with_direction(parameter: Parameter, number: float, state: DriveState) -> float:
+def with_direction(parameter: Parameter, number: Signed, state: DriveState) -> Signed:
     """A frequency with the sign of its direction.
 
     A drive that gives it without one tells the direction of its motor beside it.

@@ -12,6 +12,7 @@ from textual.events import Key
 from tui.bus.errors import LineError
 from tui.drive.shown import number_of
 from tui.session.command.reference import reference_codes
+from tui.session.drive_state import with_direction
 from tui.session.reading import Reading
 from tui.terminal.stroke import stroke_of
 from tui.widgets.drawing import key_line, key_styles
@@ -61,8 +62,8 @@ class RunKeys(OrderKeys):
         """The limits of a reference, and the ramp."""
         profile = self.session.profile
         codes = reference_codes(profile)
-        if (ramp := profile.quantity("acceleration")) is not None:
-            codes.append(ramp.code)
+        ramps = (profile.quantity("acceleration"), profile.quantity("deceleration"))
+        codes += [ramp.code for ramp in ramps if ramp is not None]
         try:
             self._around = await self.console.read(codes)
         except LineError:
@@ -89,7 +90,8 @@ class RunKeys(OrderKeys):
             return None
         found = hindrance(self.session.profile, self.session.image.raws)
         told = f"{found.text} {_after_esc(found.way)}" if found else ""
-        return run_lines(line, self.session.profile, self._around or {}, now, width, told)
+        around, output = self._around or {}, self._output()
+        return run_lines(line, self.session.profile, around, now, width, told, output)
 
     def run_line_keys(self, now: float) -> Text:
         """The keys that mean something while the line is open."""
@@ -163,12 +165,16 @@ class RunKeys(OrderKeys):
     def _would_start(self) -> bool:
         """Whether the drive is enabled and stands at 0 Hz: a reference turns the motor."""
         latest = self.console.latest
-        if latest is None or latest.state.motion != "running":
-            return False
-        frequency = self.session.profile.quantity("output_frequency")
-        reading = latest.readings.get(frequency.code) if frequency else None
+        return latest is not None and latest.state.motion == "running" and self._output() == 0
+
+    def _output(self) -> Decimal | None:
+        """The output frequency of now, below 0 in reverse; None where it is not known."""
+        latest, frequency = self.console.latest, self.session.profile.quantity("output_frequency")
+        if latest is None or frequency is None:
+            return None
+        reading = latest.readings.get(frequency.code)
         number = reading.value.number if reading is not None and reading.value else None
-        return number == Decimal(0)
+        return number if number is None else with_direction(frequency, number, latest.state)
 
 
 def _after_esc(way: str) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from decimal import Decimal, InvalidOperation
 from typing import Literal
@@ -180,13 +179,15 @@ def run_lines(
     now: float,
     width: int,
     hindrance: str = "",
+    output: Decimal | None = None,
 ) -> list[Text]:
     """The line, what must be known before Enter above it, and its keys below.
 
-    `hindrance` says why a run command would have no effect now, and what opens the way.
+    `hindrance` says why a run command would have no effect now, and what opens the way; `output`
+    is the frequency of the motor now, below 0 in reverse, None where it is not known.
     """
     told = [Text(f" {part}", style) for part, style in _told(line, hindrance, width - 2)]
-    lines = [*(told or [Text("")]), _first(line, profile, readings), _second(line, now)]
+    lines = [*(told or [Text("")]), _first(line, profile, readings, output), _second(line, now)]
     for one in lines:
         one.no_wrap = True
         one.truncate(width, overflow="ellipsis")
@@ -208,7 +209,9 @@ def _told(line: RunLine, hindrance: str, width: int) -> list[tuple[str, Style]]:
     return [(part, style) for part in wrapped(said, width, 2)]
 
 
-def _first(line: RunLine, profile: Profile, readings: Mapping[str, Reading]) -> Text:
+def _first(
+    line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal | None
+) -> Text:
     """What Enter does, the reference as typed, and its limits."""
     first = Text(" ")
     first.append(RUN_HEADINGS[line.purpose], STRONG)
@@ -217,7 +220,7 @@ def _first(line: RunLine, profile: Profile, readings: Mapping[str, Reading]) -> 
     first.append(" at ", STRONG)
     first.append(f" {line.text:>{DIGITS_MOST}} ", "bold white on #101214")
     first.append(f" {line.unit}  ", PLAIN)
-    return first.append(_around(line, profile, readings), FAINT)
+    return first.append(_around(line, profile, readings, output), FAINT)
 
 
 def _second(line: RunLine, now: float) -> Text:
@@ -234,7 +237,9 @@ def _second(line: RunLine, now: float) -> Text:
     return second.append(" stops", FAINT)
 
 
-def _around(line: RunLine, profile: Profile, readings: Mapping[str, Reading]) -> str:
+def _around(
+    line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal | None
+) -> str:
     """The limits and the ramp, as far as they are known."""
     parts = []
     low, high, code = limits(profile, readings)
@@ -243,9 +248,27 @@ def _around(line: RunLine, profile: Profile, readings: Mapping[str, Reading]) ->
     ramp = _number(profile, "acceleration", readings)
     if ramp is not None:
         parts.append(f"ramp {ramp:f} s")
-        rated = _number(profile, "rated_frequency", readings)
-        reaches = rated and line.unit == "Hz" and line.purpose != "reference" and not line.fault
-        if rated and reaches and not line.is_zero:
-            with suppress(InvalidOperation):
-                parts.append(f"there in {Decimal(line.text or 0) / rated * ramp:.1f} s")
+        reaches = line.unit == "Hz" and line.purpose != "reference" and not line.fault
+        if reaches and not line.is_zero and output is not None:
+            parts += _there_in(line, profile, readings, output)
     return " · ".join(parts)
+
+
+def _there_in(
+    line: RunLine, profile: Profile, readings: Mapping[str, Reading], output: Decimal
+) -> list[str]:
+    """How long it takes from the output of now: a motor that turns otherwise slows down first."""
+    rated, up, down = (
+        _number(profile, quantity, readings)
+        for quantity in ("rated_frequency", "acceleration", "deceleration")
+    )
+    try:
+        wanted = Decimal(line.text or 0) * (-1 if line.purpose == "reverse" else 1)
+    except InvalidOperation:
+        return []
+    same = output * wanted >= 0
+    faster = max(Decimal(0), abs(wanted) - abs(output)) if same else abs(wanted)
+    slower = max(Decimal(0), abs(output) - abs(wanted)) if same else abs(output)
+    if not rated or up is None or (slower and down is None):
+        return []
+    return [f"there in {(faster * up + slower * (down or 0)) / rated:.1f} s"]
