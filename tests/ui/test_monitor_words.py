@@ -13,7 +13,7 @@ from tui.screens.monitor.notices import NOTICE_ROWS, line_figures, notice_lines
 from tui.screens.monitor.run_keys import _after_esc
 from tui.screens.monitor.run_line import RunLine, run_lines
 from tui.screens.monitor.state import state_lines
-from tui.screens.monitor.words import word_line
+from tui.screens.monitor.words import bit_grid, word_line, word_pages
 from tui.session.timeout_told import TimeoutWatch
 
 from . import fakes
@@ -132,6 +132,16 @@ def test_a_word_says_what_is_1_and_nothing_of_what_is_so_while_all_is_well() -> 
     assert line.split("16#0437")[1].strip() == (
         "ready · switched on · enabled · power · at reference"
     )
+
+
+def test_a_bit_in_columns_says_of_what_it_tells() -> None:
+    """At 80 columns two bits of LRS7 read 'In force', and nothing told which channels are."""
+    view = view_of(ATV71, {**fakes.RUNNING, "LRS7": 0x0005})
+    grid = bit_grid(view, word_pages([ATV71["LRS7"]], 15)[0], 79, 6)
+    told = "\n".join(line.plain for line in grid)
+    assert "● Reference channel" in told
+    assert "● Command channel 1" in told
+    assert "In force" not in told
 
 
 def test_addresses_that_are_empty_are_no_failures() -> None:

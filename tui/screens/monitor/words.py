@@ -35,7 +35,10 @@ BIT_CELLS = 26
 """Least cells of a bit where bits stand in columns."""
 SHORTEST_NAME = 6
 """Characters of a bit's name that still tell which one it is."""
-PLAIN_ANSWERS = frozenset({"", "yes", "no", "on", "off", "none", "normal", "0", "1"})
+PLAIN_ANSWERS = frozenset(
+    {"", "yes", "no", "on", "off", "none", "normal", "0", "1", "in force", "in progress"}
+)
+"""What a bit says that is no more than yes or no: alone it would not tell of what."""
 GENERIC = frozenset({"active", "reached", "supplied", "disabled", "warning", "fault"})
 """What a bit that is 1 says without more than its name does."""
 ALL_BITS = (("Tab", KEY), (" all bits ", FAINT))
