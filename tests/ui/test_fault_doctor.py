@@ -76,6 +76,17 @@ def test_how_it_ends_is_never_cut_off(raw: int, width: int, height: int) -> None
         assert len(text.splitlines()) <= height
 
 
+def test_which_input_tripped_it_is_told_at_80_columns() -> None:
+    """'Logic input ...' and 16#000C told nobody where to look."""
+    external = next(f for f in ATV71.data.faults.codes if f.code == "EPF1")
+    read = readings_of(ATV71, {"ETF": 132, "LET": 1, "IL1R": 0x000C, "EPL": 1}, NOW)
+    text = told(view(external.raw, readings=read))
+    assert "ETF    Logic input LI4 input or bit that trips it     Enter opens" in text
+    assert "IL1R   LI3, LI4        state of the inputs now" in text
+    still = told(view(external.raw, readings=readings_of(ATV71, {"IL1R": 0}, NOW)))
+    assert "IL1R   none " in still
+
+
 def test_an_alarm_points_at_something_too() -> None:
     text = told(view(None, present=False, alarms=[("LRS6", 8, "Undervoltage alarm")]))
     for part in ("UNDERVOLTAGE ALARM", "alarm, no fault", "Mains low or a dip", "ULN", "practice"):

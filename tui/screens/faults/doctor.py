@@ -12,7 +12,7 @@ from tui.drive.hints import reset_text
 from tui.drive.plain import plain
 from tui.drive.profile.profile import is_verified
 from tui.drive.profile.schema import FaultHelp, Quantity
-from tui.drive.values import NOT_AVAILABLE
+from tui.drive.values import NOT_AVAILABLE, set_bits
 from tui.session.reading import Reading
 from tui.widgets.drawing import cut, cut_at_word, wrapped
 from tui.widgets.palette import (
@@ -34,6 +34,7 @@ LABEL = 13
 TRUST_WIDTH = 11
 """Columns at the right that say how surely a thing is known."""
 CODE_WIDTH, LOOK_VALUE_WIDTH = 7, 13
+OPENS = "Enter opens "
 TRUST_MARKS: Mapping[str, str] = {"manual": "manual", "public": "guide", "practice": "practice"}
 """How surely the first cause is known, in a word; `practice` is general practice."""
 TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
@@ -41,6 +42,8 @@ TOLD_OF_A_TRIP: Mapping[Quantity, str] = {
     "motor_current": "",
     "mains_voltage": "mains ",
 }
+CONTACTS = ("digital_inputs", "digital_outputs")
+"""Words that are told by the names of what is closed, not in hexadecimal."""
 STORED_UNITS = ("Hz", "A", "h")
 """What is told of a fault of the history, where the drive stores it."""
 
@@ -119,7 +122,7 @@ def _tripped(view: DoctorView) -> str:
     """When it tripped, and what the motor did then, as far as this panel saw it."""
     record = view.record
     if record is None:
-        return "tripped before this panel watched it"
+        return "tripped before it was watched"
     before = [moment for moment in record.moments if moment.wall < record.wall]
     texts = before[-1].texts if before else ()  # at the trip itself the motor is free already
     values = dict(zip(record.codes, texts, strict=False))
@@ -164,7 +167,7 @@ def _probable(view: DoctorView, width: int) -> list[Text]:
 
 
 def _look_at(view: DoctorView, width: int) -> list[Text]:
-    lines = []
+    lines, cells = [], _value_cells(view, width)
     for number, look in enumerate(view.look_at):
         reading = view.readings.get(look.code)
         chosen = number == view.at
@@ -173,9 +176,9 @@ def _look_at(view: DoctorView, width: int) -> list[Text]:
         text.append(look.code, STRONG)
         text.append(f"{unsure:<{max(1, CODE_WIDTH - len(look.code))}}", STALE)
         value, style = _value(reading)
-        text.append(f"{cut(value, LOOK_VALUE_WIDTH)} ", style)
+        text.append(f"{cut(value, cells)} ", style)
         room = max(4, width - LABEL - text.cell_len - 1)
-        hint = "Enter opens " if chosen and len(look.why) < room - 12 else ""
+        hint = OPENS if chosen and len(look.why) < room - 12 else ""
         text.append(cut(look.why, room - len(hint)), PLAIN if chosen else FAINT)
         text.append(hint, FAINT)
         if chosen:
@@ -184,12 +187,25 @@ def _look_at(view: DoctorView, width: int) -> list[Text]:
     return _labelled("Look at", lines)
 
 
+def _value_cells(view: DoctorView, width: int) -> int:
+    """Columns of the values: as many as they take, where their reasons leave so many."""
+    longest = max(
+        (len(_value(view.readings.get(look.code))[0]) for look in view.look_at), default=0
+    )
+    why = max((len(look.why) for look in view.look_at), default=0)
+    room = width - LABEL - CODE_WIDTH - why - len(OPENS) - 2
+    return max(LOOK_VALUE_WIDTH, min(longest, room))
+
+
 def _value(reading: Reading | None) -> tuple[str, Style]:
     if reading is None:
         return NOT_AVAILABLE, FAINT
     value = reading.physical or reading.value
     if value is None:
         return NOT_AVAILABLE, FAINT
+    if reading.parameter.quantity in CONTACTS and reading.raw is not None:
+        ones = ", ".join(bit.name for bit in set_bits(reading.parameter.bits, reading.raw))
+        return ones or "none", PLAIN if reading.quality == "good" else STALE
     return f"{value.text} {value.unit}".rstrip(), PLAIN if reading.quality == "good" else STALE
 
 
