@@ -297,10 +297,11 @@ async def test_back_up_change_compare_stage_and_write(
         await to_parameters(made)
         file = Path("pump.toml")
         await answer(made, "ctrl+s", str(file))
-        await message(made, "parameters", "pump.toml")
+        await message(made, "Saved: ", " parameters", "pump.toml")
         assert re.search(r"^ACC = \{.*raw = 30", read(file), re.MULTILINE)
         made.drive().set("ACC", 99)
         made.drive().set("HSP", 400)
+        await find(made, "HSP")  # a search of before hides nothing of what differs
         await open_file(made, file)
         await message(made, "pump.toml: 2 differ")
         await until(made.pilot, lambda: "Differs 1 of 2" in shown(made.app, "status"))

@@ -33,6 +33,13 @@ class ParameterKeys(TeachKeys):
             self.listed.fill(self.editor, search.value)
             self.look()
 
+    def clear_search(self) -> None:
+        """Nothing is searched for: the list is that of what was chosen."""
+        for search in self.query("#search").results(Input):
+            with search.prevent(Input.Changed):
+                search.value = ""
+        self.list_again()
+
     def note(self, text: str) -> None:
         """Say what a key has come to."""
         self._add("told", text)

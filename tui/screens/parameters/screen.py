@@ -149,18 +149,12 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
     def action_group(self, step: int) -> None:
         """The next or previous group, or one of the selections above and below them."""
         self.listed.group(self.editor, step)
-        self._clear_search()
+        self.clear_search()
 
     def action_filter(self, step: int) -> None:
         """The next selection that shows anything."""
         self.listed.choose_next(self.editor.facts, step)
-        self._clear_search()
-
-    def _clear_search(self) -> None:
-        search = self.query_one("#search", Input)
-        with search.prevent(Input.Changed):
-            search.value = ""
-        self.list_again()
+        self.clear_search()
 
     def action_search(self) -> None:
         """Into the search, at once: what is typed next is searched for."""
@@ -185,7 +179,7 @@ class ParametersScreen(StageKeys, WriteKeys, SetKeys):
         search = self.query_one("#search", Input)
         if search.has_focus or search.value:
             self.set_focus(None)
-            self._clear_search()
+            self.clear_search()
         elif not self.listed.chosen.group:
             self.listed.go_home()
             self.list_again()

@@ -99,7 +99,7 @@ class SetKeys(ParameterKeys):
         else:
             bad = len(upload.absent)
             without = f"; {bad} the drive does not tell" if bad else ""
-            self.note(f"{len(upload.raws)} parameters{without}: {path}")
+            self.note(f"Saved: {len(upload.raws)} parameters{without}, in {path}")
         finally:
             self._tell_reading("")
 
@@ -198,7 +198,7 @@ class SetKeys(ParameterKeys):
             f" are equal, {skips} left out."
         )
         self.listed.choose(Choice("differs"))
-        self.list_again()
+        self.clear_search()
 
     def action_stage_set(self) -> None:
         """Stage what the set has otherwise; nothing is written."""
