@@ -21,7 +21,7 @@ from tui.session.blocks.editor import BlockEditor
 
 from .fakes import press
 from .test_command_flows import Bench, bench
-from .test_flows import arm, shown, until
+from .test_flows import arm, picture, shown, until
 from .test_parameter_flows import open_file
 from .walk import every_step
 
@@ -75,9 +75,14 @@ async def test_pick_move_write_and_verify() -> None:
     async with bench("atv71") as made:
         await to_blocks(made)
         await made.pilot.press("down", "down")
+        await until(made.pilot, lambda: "  unused" in shown(made.app, "detail"))
+        assert "mapped to" not in shown(made.app, "detail")
         await pick(made, "lcr")
         await until(made.pilot, lambda: "→ LCR" in shown(made.app, "first"))
-        await made.pilot.press("minus")
+        await arm(made.pilot)
+        await made.pilot.press("w")
+        await until(made.pilot, lambda: "Write 1 slot?" in picture(made.app))
+        await made.pilot.press("escape", "A", "minus")
         await message(made, "2 slots proposed otherwise")
         assert made.drive().raw("NMA2") == 8604
         await made.pilot.press("w")

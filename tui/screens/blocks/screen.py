@@ -216,8 +216,9 @@ class BlocksScreen(BlockKeys):
             return
 
         yes, no = "writes, each slot read back", "writes nothing"
+        slots = "1 slot" if proposals.count == 1 else f"{proposals.count} slots"
         self._ask(
-            f"Write {proposals.count} slots?",
+            f"Write {slots}?",
             self._follows(),
             yes,
             no,

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from rich.style import Style
 from rich.text import Text
 
-from tui.drive.blocks.assignment import Assignment, describe, slot_target
+from tui.drive.blocks.assignment import UNUSED, Assignment, describe, slot_target
 from tui.drive.blocks.user_words import UserWords
 from tui.drive.blocks.wire_cost import Saving, Stretch, block_request, microseconds, together
 from tui.drive.profile.profile import is_verified
@@ -148,7 +148,7 @@ def slot_lines(block_editor: BlockEditor, block: Block, place: int, width: int) 
     own = block_editor.session.profile[code]
     first = Text(f" {code}", STRONG)
     first.append(f"  {notation_text(own)}", FAINT)
-    first.append("  mapped to ", FAINT)
+    first.append("  " if raw == UNUSED else "  mapped to ", FAINT)
     if parameter is None:
         first.append(describe(block_editor.session.profile, block, raw), PLAIN)
         return [first, *_remarks(block_editor, view, slot, code, width), *[Text("")] * 3][:4]
