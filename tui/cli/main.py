@@ -69,7 +69,7 @@ Exit status:
     2  usage: options, files, codes, profiles
     3  no answer, or trouble on the line
     4  the drive refused
-    5  refused here: nothing was sent
+    5  refused here: nothing was written
    70  an error of drivepanel itself; its log has more
   130  ended by Ctrl-C
 """
