@@ -120,6 +120,8 @@ def test_where_a_key_has_a_meaning() -> None:
     assert elsewhere("frames", "V").startswith("V has a meaning on Scanner (4)")
     assert elsewhere("monitor", "asterisk", "*").startswith("* has a meaning on Parameters (3)")
     assert elsewhere("parameters", "less_than_sign", "<").startswith("< has a meaning on Monitor")
+    # what waits to be written may be on either
+    assert elsewhere("monitor", "w") == "w has a meaning on Parameters (3) and Scanner (4)."
     assert elsewhere("monitor", "r") == ""
     assert elsewhere("monitor", "Y", "Y") == ""
 

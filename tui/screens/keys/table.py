@@ -228,12 +228,17 @@ def elsewhere(screen: str, key: str, character: str | None = None) -> str:
 
     Of a key with a sign the table has the `character`, as `*`, and not its name.
     """
-    for action in ACTIONS:
-        if {key, character} & {*action.keys.split(",")} and screen not in action.screens:
-            place = next(((k, name) for p, k, name in PLACES if p == action.screens[0]), None)
-            where = f"{place[1]} ({place[0]})" if place else "another screen"
-            return f"{action.shown} has a meaning on {where}: {action.help}"
-    return ""
+    keys = {key, character}
+    found = [a for a in ACTIONS if keys & {*a.keys.split(",")} and screen not in a.screens]
+    if not found:
+        return ""
+    first = found[0]
+    names = {place: f"{name} ({digit})" for place, digit, name in PLACES}
+    where = [names[a.screens[0]] for a in found if a.screens[0] in names] or ["another screen"]
+    if len(set(where)) == 1:
+        return f"{first.shown} has a meaning on {where[0]}: {first.help}"
+    *most, last = sorted(set(where), key=lambda name: name[-2])
+    return f"{first.shown} has a meaning on {', '.join(most)} and {last}."
 
 
 __all__ = [
