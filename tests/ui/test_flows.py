@@ -108,6 +108,16 @@ async def test_next_and_previous_drive() -> None:
         await pilot.press("right_square_bracket")
         await until(pilot, lambda: shown(app, "strip").startswith(" 2 "))
         assert not first.console.monitor.running
+        # back on Line, Enter opens the drive that is open, not the one chosen there before
+        await pilot.press("escape")
+        await until(pilot, lambda: isinstance(app.screen, ConnectionScreen))
+        assert app.connection.drives.chosen == 2
+        await pilot.press("right_square_bracket")
+        assert app.connection.drives.chosen == 3
+        await pilot.press("left_square_bracket", "enter")
+        await until(pilot, lambda: isinstance(app.screen, MonitorScreen))
+        assert app.chosen is not None
+        assert app.chosen.device == 2
         await pilot.press("left_square_bracket")
         await until(pilot, lambda: shown(app, "strip").startswith(" 1 "))
         await until(pilot, lambda: "FORWARD" in shown(app, "strip"))

@@ -46,13 +46,19 @@ class Places(Panel):
         from .monitor.screen import MonitorScreen
 
         log.info("watching device %s, %s", console.device, console.session.profile.id)
-        self.chosen = console
+        self._choose(console)
         while len(self.screen_stack) > 2:
             self.pop_screen()
         if len(self.screen_stack) == 2:  # no picture of Line in between
             self.switch_screen(MonitorScreen(console))
         else:
             self.push_screen(MonitorScreen(console))
+
+    def _choose(self, console: DriveConsole) -> None:
+        """This drive is the open one; the cursor of Line is on no other when one comes back."""
+        self.chosen = console
+        if (point_at := getattr(self.screen_stack[0], "point_at", None)) is not None:
+            point_at(console.device)
 
     def _to_base(self) -> None:
         """Back to the list of lines, whatever is above it."""
@@ -100,7 +106,7 @@ class Places(Panel):
         place = self.place
         wanted = consoles[(consoles.index(self.chosen) + step) % len(consoles)]
         if place == CONNECTION:
-            self.chosen = wanted
+            self._choose(wanted)
             self._ask_screen("draw_stop_keys")
             return
         self.show_monitor(wanted)

@@ -31,6 +31,11 @@ class DriveList(OptionList):
         at = self.highlighted
         return None if at is None else int(self.get_option_at_index(at).id or 0)
 
+    def point_at(self, device: int) -> None:
+        """Put the cursor on a drive, where it is listed."""
+        if device in self._drawn:
+            self.highlighted = list(self._drawn).index(device)
+
     def fill(self, lines: Mapping[int, Text], order: Iterable[int], *, sort: bool = True) -> None:
         """Show these lines in order; without `sort` none changes its place, new ones are last."""
         wanted = list(order)

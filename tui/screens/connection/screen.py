@@ -53,6 +53,10 @@ class ConnectionScreen(WhyMeant, OtherSettings):
         searches = asks or self.is_on_open_line()
         return (("Enter", "search" if searches else "open"), ("Esc", "to the list"))
 
+    def point_at(self, device: int) -> None:
+        """The cursor on the drive that is open: Enter opens that one again."""
+        self.drives.point_at(device)
+
     @property
     def pointed(self) -> DriveConsole | None:
         """The drive under the cursor, where it is known what it is."""
