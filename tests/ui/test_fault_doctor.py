@@ -125,3 +125,10 @@ def test_nothing_is_told_of_no_fault() -> None:
     text = told(view(None, present=False))
     assert "No fault now" in text
     assert "Probably" not in text
+
+
+def test_no_history_is_read_where_a_family_has_none() -> None:
+    profile = library.load("powerdrive")
+    text = told(view(None, profile=profile, present=False, unread=True))
+    assert "not known on this drive" in text
+    assert "reading the history" not in text

@@ -106,7 +106,7 @@ def _headline(view: DoctorView, width: int) -> list[Text]:
             text.append(f"   and {more} more" if more else "", PLAIN)
         else:
             text.append("No fault now.", STRONG)
-            text.append("   reading the history" if view.unread else "", FAINT)
+            text.append("   reading the history" if view.unread and view.history else "", FAINT)
         return [text]
     if view.present:
         text.append(f" ■ {fault.code}  {fault.name.upper()} ", FAULT_BLOCK)
