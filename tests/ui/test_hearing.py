@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import AsyncIterator, Callable, Sequence
 from contextlib import asynccontextmanager
 from dataclasses import dataclass, field
@@ -93,6 +94,34 @@ async def test_a_line_that_is_not_open_is_listened_to_and_given_back() -> None:
             await until(pilot, lambda: isinstance(app.screen, HeardScreen))
             await pilot.press("1")
             await until(pilot, lambda: app.screen is app.connection and not app.hearing)
+
+
+async def test_a_second_key_while_the_line_is_opened_leaves_nobody_listening_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """A slow computer opens it for a while: a second listener would keep the port for ever."""
+    opens, may_open = HeardLine.open, threading.Event()
+
+    def slow(heard: HeardLine) -> None:
+        may_open.wait(10)
+        opens(heard)
+
+    monkeypatch.setattr(HeardLine, "open", slow)
+    with PtyPeer(silent) as peer:
+        app = DrivePanelApp()
+        async with app.run_test(size=(80, 24)) as pilot:
+            app.connection.lines.offer(f"{peer.path},19200,8E1")
+            await pilot.press("H")
+            await pilot.pause(0.2)
+            await pilot.press("H")
+            await until(pilot, lambda: "listens already" in said(app))
+            may_open.set()
+            await until(pilot, lambda: isinstance(app.screen, HeardScreen))
+            await pilot.press("escape")
+            await until(pilot, lambda: app.screen is app.connection)
+            assert not [one for one in threading.enumerate() if one.name == "listening"]
+            await pilot.press("H")
+            await heard(app, pilot, peer)
 
 
 async def test_another_master_on_opening_is_offered_to_be_listened_to() -> None:

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 
     from .app_port import Panel
 
+LISTENS_ALREADY = "The panel listens already; Esc ends that."
 NO_LINE = "No line is meant yet: choose one on Line, then H listens to it."
 CLOSES = (
     "The panel asks these drives no more: the port is opened for reading only, and nothing is sent"
@@ -54,9 +55,6 @@ def why_not_hear(fleet: Fleet) -> str:
 
 async def hear(app: Panel) -> None:
     """Listen to the line under the cursor of Line, else to the one that is shown."""
-    if app.hearing:
-        app.tell("The panel listens already; Esc ends that.")
-        return
     meant = getattr(app.screen, "line_to_hear", None)
     text, profile = meant() if meant is not None else (app.line_text, "")
     if not text:
@@ -74,8 +72,14 @@ async def hear(app: Panel) -> None:
             app.notify(why, severity="warning")
             return
         app.show_line(here)
-        await app.disconnect()
-    await _listen(app, text, profile)
+    app.hearing = text  # from here on no second key may begin it: the port would be taken twice
+    try:
+        if here is not None:
+            await app.disconnect()
+        await _listen(app, text, profile)
+    except BaseException:
+        app.hearing = ""
+        raise
 
 
 async def _listen(app: Panel, text: str, profile: str) -> None:
@@ -89,9 +93,9 @@ async def _listen(app: Panel, text: str, profile: str) -> None:
         heard = HeardLine(text, "panel", named)
         await asyncio.to_thread(heard.open)
     except (LineError, DriveError) as error:
+        app.hearing = ""
         app.say_first(str(error), "Enter opens the line; H tries to listen again.", "error")
         return
-    app.hearing = text
     app.push_screen(HeardScreen(heard))
 
 

@@ -159,8 +159,11 @@ class Places(Panel):
 
     async def action_hear(self) -> None:
         """Listen to a line on which another master asks."""
-        from .hear import hear
+        from .hear import LISTENS_ALREADY, hear
 
+        if self.hearing:
+            self.tell(LISTENS_ALREADY)
+            return
         self.run_worker(hear(self), exclusive=True, group="hear", exit_on_error=False)
 
     def action_save_shown(self) -> None:
