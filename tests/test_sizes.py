@@ -19,7 +19,7 @@ EXCEPTIONS: dict[str, tuple[int, str]] = {
     "bus/fake.py:FakeLine": (18, "the same as the line that it stands for"),
     "bus/fake.py": (325, "a line in one place, its use shown at the top"),
     "bus/shared_facts.py:SharedFacts": (18, "all that programs on a line must agree on"),
-    "screens/app_port.py:Panel": (25, "all that screens ask of the app, most of it abstract"),
+    "screens/app_port.py:Panel": (26, "all that screens ask of the app, most of it abstract"),
     "screens/connection/state.py:LineView": (
         19,
         "lists, form, search, named for the keys",

@@ -5,6 +5,7 @@ from __future__ import annotations
 from .defect import Defect
 
 KEYS = ("tests/ui/test_dialog_keys.py",)
+ARMING_KEY = "tests/ui/test_stop_keys.py"
 
 DEFECTS = (
     Defect(
@@ -55,6 +56,22 @@ DEFECTS = (
         "Task(self._reset_drive, armed=False)",
         "A drive is written to though its arming has ended while a question stood.",
         ("tests/ui/test_frames_screen.py",),
+    ),
+    Defect(
+        "arming-behind-a-stop",
+        "tui/session/work.py",
+        "if stamp == self.stops:\n                self.arming.arm(",
+        "if True:\n                self.arming.arm(",
+        "A stop comes while the key that arms has its effect, and the drive stays armed.",
+        ("tests/session/test_command.py", ARMING_KEY),
+    ),
+    Defect(
+        "arming-key-not-asked-anew",
+        "tui/screens/command/arming.py",
+        "if stroke is not None and stroke.stamp != self.app.stop_stamp():",
+        "if stroke is not None and stroke.stamp is None:",
+        "A stop comes just before the key that arms has its effect, and the drive stays armed.",
+        (ARMING_KEY,),
     ),
     Defect(
         "typed-on-into-a-question",

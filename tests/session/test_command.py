@@ -240,6 +240,16 @@ async def test_a_stop_while_the_state_is_read_leaves_the_drive_disarmed() -> Non
             made.commander.order("forward")
 
 
+async def test_a_stop_since_the_key_that_arms_leaves_the_drive_disarmed() -> None:
+    async with bench("atv71", armed=False) as made:
+        typed = made.session.work.stops
+        made.stopper.stop([made.session])
+        made.commander.arm(stamp=typed)
+        assert made.commander.armed_for is None
+        made.commander.arm()
+        assert made.commander.armed_for is not None
+
+
 async def test_a_stop_ends_arming() -> None:
     async with bench("atv71") as made:
         made.stopper.stop([made.session])

@@ -5,19 +5,23 @@ from __future__ import annotations
 import asyncio
 import time
 from dataclasses import replace
+from typing import Any
 
 import pytest
 from textual.events import Key, Paste
 from textual.widgets import Input
 
+from tui.bus.shared_facts import SharedFacts
 from tui.screens.base import PanelScreen
 from tui.screens.dialogs.ask import Ask
 from tui.screens.hands import NOBODY_TO_STOP
+from tui.session.command.commander import Commander
 from tui.session.fleet import FoundDrive
 from tui.terminal.stroke import Stroke, attach
 
 from . import fakes
 from .fakes import app_of
+from .test_command_flows import bench
 from .test_flows import until
 
 
@@ -178,3 +182,25 @@ async def test_a_stop_tells_of_a_device_that_nobody_knows_how_to_stop() -> None:
         assert app.take_stop_key("space")  # one drive is meant, and reached
         await pilot.pause()
         assert [event for event in app.events.events if event.kind == "failed"] == told
+
+
+@pytest.mark.parametrize("passed", [(SharedFacts, "commander"), (Commander, "arm")])
+async def test_a_stop_while_the_key_that_arms_has_its_effect_is_the_last_word(
+    monkeypatch: pytest.MonkeyPatch, passed: tuple[type, str]
+) -> None:
+    """The keys are read in a thread of their own: a stop may come at any place of that way."""
+    kind, name = passed
+    async with bench("atv71") as made:
+        goes_on, stops = getattr(kind, name), iter(["f12"])
+
+        def behind_a_stop(*given: Any, **named: Any) -> Any:
+            for key in stops:
+                made.app.take_stop_key(key)
+            return goes_on(*given, **named)
+
+        monkeypatch.setattr(kind, name, behind_a_stop)
+        await made.pilot.press("a")
+        await made.stopped()
+        assert made.app.chosen is not None
+        assert not made.app.chosen.session.arming.armed
+        await made.armed()

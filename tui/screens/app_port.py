@@ -54,6 +54,10 @@ class Panel(LeanApp):
         """What is known of the key that has its effect now; None while there is none."""
 
     @abstractmethod
+    def stop_stamp(self) -> object:
+        """Another object after every stop."""
+
+    @abstractmethod
     def follow(self, line: str, device: int) -> None:
         """Open the line anew as a drive now wants it, and watch that drive."""
 

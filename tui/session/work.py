@@ -150,6 +150,12 @@ class WorkQueue:
         made.check()
         return made
 
+    def arm(self, stamp: int, seconds: float) -> None:
+        """Arm the drive, unless it was given a stop since that count; raises as `Arming.arm`."""
+        with self._lock:  # a stop comes before it, or after it and ends it
+            if stamp == self.stops:
+                self.arming.arm(seconds=seconds)
+
     def put(self, task: Task, stamp: int | None = None) -> None:
         """Do a task behind those before it; `stamp` is the count of stops when it was typed.
 

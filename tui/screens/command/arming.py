@@ -97,8 +97,11 @@ class ArmingKeys(PanelScreen):
         if (other := self.session.line.facts.commander(self.session.device)) is not None:
             self._ask_for(other)
             return
+        stamp, stroke = self.session.work.stops, self.app.stroke
+        if stroke is not None and stroke.stamp != self.app.stop_stamp():
+            return  # a stop came while the key went through the screen
         try:
-            self.commander.arm()
+            self.commander.arm(stamp=stamp)
         except OrderRefused as refused:
             self._refuse(str(refused))
         newest = self.app.events.newest

@@ -52,17 +52,18 @@ class Commander:
 
     # Arming
 
-    def arm(self, *, seconds: float = ARMED_FOR) -> None:
+    def arm(self, *, seconds: float = ARMED_FOR, stamp: int | None = None) -> None:
         """Let commands through from now on; a state that is not fresh is read first.
 
+        `stamp` is the count of stops when that was asked for: a stop since is the last word.
         Raises OrderRefused where the line is read-only or lost, or the drive is not to be armed.
         """
         session = self.session
+        asked = session.work.stops if stamp is None else stamp
         refused = session.line.read_only or bool(session.arming.barred)
         if refused or session.state(STATE_FRESH).kind != "unknown":
-            session.arming.arm(seconds=seconds)
+            session.work.arm(asked, seconds)
             return
-        stamp = session.work.stops
 
         async def work(_permit: Permit) -> str:
             charts = session.profile.data.charts
@@ -70,8 +71,7 @@ class Commander:
             await Reader(session).read(dict.fromkeys(codes))
             if session.state(STATE_FRESH).kind == "unknown":
                 raise OrderRefused("The state of the drive is not known; nothing is commanded.")
-            if stamp == session.work.stops:
-                session.arming.arm(seconds=seconds)
+            session.work.arm(asked, seconds)
             return ""
 
         session.work.put(Task(work, owner=self, armed=False))
