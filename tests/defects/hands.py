@@ -74,9 +74,17 @@ DEFECTS = (
         (ARMING_KEY,),
     ),
     Defect(
+        "named-like-a-key",
+        "tui/screens/dialogs/question.py",
+        "self._voided = self._answered = False\n",
+        "self._voided = self._answered = False\n        self._key_at = 0.0\n",
+        "Who types @ while a question stands ends the panel, and every motor with it.",
+        ("tests/ui/test_keys.py",),
+    ),
+    Defect(
         "typed-on-into-a-question",
         "tui/screens/dialogs/question.py",
-        "return now - max(self._drawn, self._key_at) < NOT_TYPING",
+        "return now - max(self._drawn, self._typed_at) < NOT_TYPING",
         "return now - self._drawn < self.SETTLED",
         "Who types a word with a y in it writes what a question that has just come asks about.",
         ("tests/ui/test_questions.py",),

@@ -125,7 +125,7 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives(
             app.fleet.hold(FoundDrive(identity, fakes.console_of(None, device=device)))
             line_watch.looks[device] = fakes.look_of(fakes.READY)
         screen.show_drives()
-        screen._key_at = fakes.NOW
+        screen._typed_at = fakes.NOW
         drives.focus()
         drives.highlighted = 31
         await pilot.pause()
@@ -149,7 +149,7 @@ async def test_a_new_state_moves_nothing_in_a_long_list_of_drives(
         assert "■ OHF" in str(drives.get_option("26").prompt)
         # nobody touches a key for a while: faults go first, the cursor stays on its drive
         app.clock.monotonic = lambda: fakes.NOW + QUIET  # type: ignore[method-assign]
-        screen._key_at = fakes.NOW
+        screen._typed_at = fakes.NOW
         screen.show_drives()
         assert [option.id for option in drives.options][:3] == ["5", "26", "1"]
         assert drives.chosen == 26

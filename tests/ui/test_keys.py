@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import string
 import time
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from textual.app import ComposeResult
@@ -13,8 +16,10 @@ from textual.events import Key
 from textual.screen import ModalScreen
 from textual.widgets import Input
 
+from tests.sources import PACKAGE, modules, nodes_of
 from tui.drive.profile import library
 from tui.screens.command.control import Control
+from tui.screens.dialogs.confirm import Confirm
 from tui.screens.keys.action import Action
 from tui.screens.keys.table import (
     ACTIONS,
@@ -160,6 +165,39 @@ async def test_a_key_without_a_meaning_says_where_it_has_one_and_does_nothing() 
                 await until(made.pilot, lambda: notices(made).startswith(told))  # noqa: B023
                 assert list(made.app.screen_stack) == stack, (screen, key)
             assert writes(made.app, before) == [], screen
+
+
+def attributes_of_classes(path: Path) -> Iterator[str]:
+    """Names that the classes of a module give to what they have."""
+    for node in nodes_of(path):
+        match node:
+            case ast.Attribute(value=ast.Name(id="self"), attr=name, ctx=ast.Store()):
+                yield name
+            case ast.ClassDef(body=body):
+                parts = (part for part in body if isinstance(part, ast.FunctionDef))
+                yield from (part.name for part in parts)
+
+
+def test_nothing_has_the_name_of_a_key() -> None:
+    """Textual calls what is named key_ and the name of a key: @ is called at."""
+    named = {
+        f"{path.relative_to(PACKAGE)}: {name}"
+        for path in modules()
+        for name in attributes_of_classes(path)
+        if name.startswith(("key_", "_key_"))
+    }
+    assert named == set()
+
+
+async def test_a_sign_that_is_called_like_a_word_ends_nothing() -> None:
+    app = fakes.app_of()
+    async with app.run_test() as pilot:
+        for place in (None, Confirm("Write?", "It is written.", yes="y", no="n", loses=True)):
+            if place is not None:
+                await app.push_screen(place)
+            await pilot.press("@")
+            await pilot.pause()
+            assert app.screen is (place or app.connection)
 
 
 def notices(made: Bench) -> str:

@@ -70,7 +70,7 @@ class LineView(PanelScreen):
         """Who may be there and acts when it is asked no more; said while drives are searched."""
         self._looking: list[Timer] = []
         self._away = self._was_lost = False
-        self._key_at = -math.inf
+        self._typed_at = -math.inf
         """When the last key came, in seconds of the clock."""
 
     def body(self) -> ComposeResult:
@@ -204,11 +204,11 @@ class LineView(PanelScreen):
 
     def on_key(self, event: Key) -> None:
         """While keys come, nothing changes its place under them."""
-        self._key_at = self.app.clock.monotonic()
+        self._typed_at = self.app.clock.monotonic()
         super().on_key(event)
 
     def _hands_are_quiet(self) -> bool:
-        return self.app.clock.monotonic() - self._key_at >= QUIET
+        return self.app.clock.monotonic() - self._typed_at >= QUIET
 
     # The titles
 

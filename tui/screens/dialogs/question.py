@@ -77,7 +77,7 @@ class Question(Framed, ModalScreen[T]):
         super().__init__()
         self._now = now
         self._drawn: float | None = None
-        self._key_at = -math.inf
+        self._typed_at = -math.inf
         """When the last key came."""
         self._voided = self._answered = False
 
@@ -160,11 +160,11 @@ class Question(Framed, ModalScreen[T]):
 
     def on_key(self, event: Key) -> None:
         """Somebody types."""
-        self._key_at = self.app.clock.monotonic()
+        self._typed_at = self.app.clock.monotonic()
 
     def action_swallow(self, of_no: bool = False) -> None:
         """Nothing is done; who types on is told why. A no waits only where nobody asked."""
-        self._key_at = self.app.clock.monotonic()
+        self._typed_at = self.app.clock.monotonic()
         if self.by_itself:
             self.app.tell(TYPED_ON)
 
@@ -180,7 +180,7 @@ class Question(Framed, ModalScreen[T]):
             return True
         now = self.app.clock.monotonic()
         if self.by_itself:
-            return now - max(self._drawn, self._key_at) < NOT_TYPING
+            return now - max(self._drawn, self._typed_at) < NOT_TYPING
         return now - self._drawn < self.SETTLED
 
     def _tell_now(self) -> None:
