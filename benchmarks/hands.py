@@ -5,8 +5,10 @@
 The panel runs on a pseudo-terminal with one simulated Altivar 71 on Monitor, over a relay that
 keeps every write. First bursts: the drive is armed, sometimes with the run line open or the motor
 running, and a random piece of keys with one stop key in it arrives in one read or cut at random
-places, as after a link that hung. Then keys: random ones, alone and in pieces, with the drive not
-armed. Counted is every write that is no stop; each must be 0.
+places, as after a link that hung. The same while a question of Control, of the proof or of Frames
+stands or is carried out, and on two panels of one line of which either gets the stop. Then keys:
+random ones, alone and in pieces, and each by itself, with the drive not armed. Counted is every
+write that is no stop; each must be 0.
 """
 
 from __future__ import annotations
@@ -16,12 +18,21 @@ import json
 import random
 import sys
 import time
+from collections import defaultdict
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 
 from rich.console import Console
 from rich.table import Table
 
-from tests.line.pty_panel import COMMAND, PtyPanel, Write, panel_on_a_pty
+from tests.line.pty_panel import (
+    COMMAND,
+    LINE_SETTLED,
+    PtyPanel,
+    Write,
+    panel_beside,
+    panel_on_a_pty,
+)
 
 REFERENCE = 8502
 """Register of the reference LFR."""
@@ -30,8 +41,16 @@ STOPS = (b" ", b"\x1b[24~", b"\x1b[20~")
 KEYS = [bytes([code]) for code in range(33, 127) if code != ord("q")]
 """Without q, which leaves a panel whose motor stands, and ends the count."""
 KEYS += [b"\r", b"\t", b"\x7f", b"\x1b[A", b"\x1b[B", b"\x1b[5~", b"\x1b[6~", b"\x1b", b"\x1bOP"]
-TEXTS = {b"/", b"n"}
-"""Keys that open a text, where a Space is one: a search, the name of a line."""
+TEXTS = {b"/", b"n", b"O", b"j"}
+"""Keys that open a text, where a Space is one: a search, the name of a line, a filter."""
+QUESTIONS: dict[str, tuple[bytes, ...]] = {
+    "of Control": (b"6", b"\x1b[B", b"\r"),
+    "of the proof": (b"6", b"P"),
+    "of the counters": (b"7", b"\t", b"\t", b"Z"),
+}
+"""Keys that lead an armed drive from Monitor to a question that writes, or lets it alone."""
+MIXED = (1, 1, 1, 2, 5, 20, 100)
+"""Sizes of pieces of keys."""
 QUIET = 0.15
 """Seconds after a piece in which whatever it does has been sent."""
 AWAY = 0.12
@@ -57,16 +76,22 @@ class Counted:
     """Spaces that went into a text which keys before them had opened."""
 
 
+Lead = Callable[[PtyPanel, random.Random], None]
+"""Brings a panel whose drive is armed to where a burst meets it."""
+
+
 def is_stop(write: Write) -> bool:
     """Whether a write can only stop the motor."""
     return write.register == COMMAND and write.words[0] in STOP_WORDS
 
 
-def settle(panel: PtyPanel, seconds: float = QUIET) -> None:
-    """Take what the panel draws until nothing of a piece is under way any more."""
+def settle(panel: PtyPanel, seconds: float = QUIET, beside: PtyPanel | None = None) -> None:
+    """Take what the panels draw until nothing of a piece is under way any more."""
     end = time.monotonic() + seconds
     while time.monotonic() < end:
-        panel.look(0.02)
+        for one in (panel, beside):
+            if one is not None and not one.look(0.02):
+                raise SystemExit(f"the panel has ended:\n{one.text()}")
 
 
 def home(panel: PtyPanel) -> None:
@@ -104,25 +129,57 @@ def send(panel: PtyPanel, chance: random.Random, keys: list[bytes]) -> None:
             time.sleep(chance.random() * AWAY)
 
 
-def bursts(panel: PtyPanel, chance: random.Random, count: int, counted: Counted) -> None:
-    """Pieces with a stop in each, on an armed drive."""
+def to_the_run_line(panel: PtyPanel, chance: random.Random) -> None:
+    """One in three with the run line open, or the motor running."""
+    if chance.random() < 0.3:
+        panel.type(b"r")
+        settle(panel)
+        if chance.random() < 0.5:
+            settle(panel, 0.35)
+            panel.type(b"\r")
+            settle(panel, 0.3)
+
+
+def to_a_question(panel: PtyPanel, chance: random.Random) -> None:
+    """A question stands, or what it asks about has just begun."""
+    home(panel)
+    arm(panel)
+    for key in chance.choice([*QUESTIONS.values()]):
+        panel.type(key)
+        settle(panel, LINE_SETTLED)
+    if chance.random() < 0.5:
+        panel.type(b"y")
+        settle(panel, chance.random() * QUIET)
+
+
+def bursts(
+    panel: PtyPanel,
+    chance: random.Random,
+    count: int,
+    counted: Counted,
+    lead: Lead = to_the_run_line,
+    beside: PtyPanel | None = None,
+) -> None:
+    """Pieces with a stop in each, on an armed drive.
+
+    With another panel `beside` either has the stop, and the other one some keys at the same time.
+    """
     for number in range(count):
         if number % 20 == 0:
             home(panel)
         arm(panel)
-        if chance.random() < 0.3:
-            panel.type(b"r")
-            settle(panel)
-            if chance.random() < 0.5:
-                settle(panel, 0.35)
-                panel.type(b"\r")
-                settle(panel, 0.3)
+        lead(panel, chance)
+        stopping = panel
+        if beside is not None:
+            stopping, other = chance.sample((panel, beside), 2)
+            other.type(b"".join(chance.choices(KEYS, k=chance.randint(2, 8))))
         before_keys = chance.choices(KEYS, k=chance.randint(1, 6))
         after_keys = chance.choices(KEYS, k=chance.randint(0, 4))
-        stop = chance.choice(STOPS)
+        # beside, where nothing closes what keys have opened, a Space may be text
+        stop = chance.choice(STOPS if stopping is panel else STOPS[1:])
         before = len(panel.log.writes)
-        send(panel, chance, [*before_keys, stop])
-        settle(panel)
+        send(stopping, chance, [*before_keys, stop])
+        settle(panel, beside=beside)
         sent = panel.log.writes[before:]
         counted.pieces += 1
         counted.keys += len(before_keys) + 1
@@ -139,8 +196,8 @@ def bursts(panel: PtyPanel, chance: random.Random, count: int, counted: Counted)
             print(f"no stop: {before_keys} {stop!r}\n{panel.text()}", file=sys.stderr)
         if after_keys:
             mark = len(panel.log.writes)
-            send(panel, chance, after_keys)
-            settle(panel)
+            send(stopping, chance, after_keys)
+            settle(panel, beside=beside)
             if at is not None:
                 _count(panel.log.writes[mark:], behind)
             counted.keys += len(after_keys)
@@ -159,13 +216,19 @@ def _disarmed(panel: PtyPanel) -> bool:
     return not panel.armed
 
 
-def unarmed(panel: PtyPanel, chance: random.Random, count: int, counted: Counted) -> None:
-    """Random keys without arming."""
+def unarmed(
+    panel: PtyPanel,
+    chance: random.Random,
+    count: int,
+    counted: Counted,
+    sizes: Sequence[int],
+) -> None:
+    """Random keys without arming, in pieces of these sizes."""
     keys = [key for key in KEYS if key != b"a"]
     home(panel)
     left = count
     while left > 0:
-        size = min(left, chance.choice((1, 1, 1, 2, 5, 20, 100)))
+        size = min(left, chance.choice(sizes))
         before = len(panel.log.writes)
         panel.type(b"".join(chance.choices([*keys, b" "], k=size)))
         settle(panel, 0.08)
@@ -197,11 +260,15 @@ def main() -> None:
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     chance = random.Random(arguments.seed)
-    found = {"bursts with a stop": Counted(), "keys, not armed": Counted()}
-    with panel_on_a_pty() as panel:
-        bursts(panel, chance, arguments.bursts, found["bursts with a stop"])
-    with panel_on_a_pty() as panel:
-        unarmed(panel, chance, arguments.keys, found["keys, not armed"])
+    found: dict[str, Counted] = defaultdict(Counted)
+    for name, lead in (("bursts with a stop", to_the_run_line), ("at questions", to_a_question)):
+        with panel_on_a_pty() as panel:
+            bursts(panel, chance, arguments.bursts, found[name], lead)
+    with panel_on_a_pty() as panel, panel_beside(panel) as beside:
+        bursts(panel, chance, arguments.bursts, found["two panels"], beside=beside)
+    for name, sizes in (("keys, not armed", MIXED), ("each by itself", (1,))):
+        with panel_on_a_pty() as panel:
+            unarmed(panel, chance, arguments.keys, found[name], sizes)
     table = Table("", *(name.replace("_", " ") for name in asdict(Counted())))
     for name, counted in found.items():
         table.add_row(name, *(str(number) for number in asdict(counted).values()))

@@ -274,14 +274,30 @@ def panel_on_a_pty(
         line = named(f"tcp:127.0.0.1:{log.port}")
         started = _started([*line, *options], size, environment or {})
         panel = PtyPanel(*started, simulation, log)
-        try:
-            panel.shows("STANDBY")
+        with _until_the_end(panel):
             yield panel
-        finally:
-            with suppress(ProcessLookupError):
-                os.kill(panel.pid, signal.SIGKILL)
-            os.waitpid(panel.pid, 0)
-            os.close(panel.terminal)
+
+
+@contextmanager
+def panel_beside(panel: PtyPanel) -> Iterator[PtyPanel]:
+    """Another panel on the line of that one, with its first drive on Monitor."""
+    line = (f"tcp:127.0.0.1:{panel.log.port}", "-d", "1")
+    started = _started([*line], (COLUMNS, ROWS), {})
+    with _until_the_end(PtyPanel(*started, panel.simulation, panel.log)) as other:
+        yield other
+
+
+@contextmanager
+def _until_the_end(panel: PtyPanel) -> Iterator[PtyPanel]:
+    """A panel that was started, once its drive is shown; it is killed at the end."""
+    try:
+        panel.shows("STANDBY")
+        yield panel
+    finally:
+        with suppress(ProcessLookupError):
+            os.kill(panel.pid, signal.SIGKILL)
+        os.waitpid(panel.pid, 0)
+        os.close(panel.terminal)
 
 
 def _started(
