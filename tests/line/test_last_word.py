@@ -6,7 +6,7 @@ import random
 
 import pytest
 
-from benchmarks.hands import Counted, bursts, is_stop, unarmed
+from benchmarks.hands import MIXED, Counted, bursts, is_stop, unarmed
 from tests.programs import wait_until
 
 from .pty_panel import LINE_SETTLED, PtyPanel, Write
@@ -269,7 +269,7 @@ def test_bursts_with_a_stop_run_nothing_behind_it(fresh_panel: PtyPanel) -> None
 
 def test_random_keys_write_nothing_unarmed(fresh_panel: PtyPanel) -> None:
     counted = Counted()
-    unarmed(fresh_panel, random.Random(8), 1000, counted)
+    unarmed(fresh_panel, random.Random(8), 1000, counted, MIXED)
     assert counted.keys == 1000
     moved = counted.runs_after_stop, counted.references_after_stop, counted.other_writes
     assert moved == (0, 0, 0)
