@@ -56,9 +56,11 @@ def test_names_in_a_sentence() -> None:
 
 
 def test_of_two_that_are_as_likely_the_faster_comes_first() -> None:
-    link = profile_of(link={"baud": 9600, "format": "8E1", "bauds": [300, 9600, 38400]}).data.link
+    link = profile_of(
+        link={"baud": 9600, "format": "8E1", "bauds": [300, 1200, 9600, 38400]}
+    ).data.link
     found = likely_settings([link], 0.005)
-    assert [one.baud for one in found] == [9600, 38400, 300]
+    assert [one.baud for one in found] == [9600, 38400, 1200, 300]
 
 
 def test_an_empty_address_costs_its_request_and_the_turnaround() -> None:

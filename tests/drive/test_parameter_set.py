@@ -153,6 +153,14 @@ def test_a_file_that_was_cut_short_is_always_noticed(share: float) -> None:
         read(cut)
 
 
+def test_a_file_that_was_cut_short_between_two_lines_is_always_noticed() -> None:
+    """As a disk that was full leaves it: what is there is whole TOML."""
+    lines = small().splitlines(keepends=True)
+    for count in range(len(lines) - 1):
+        with pytest.raises(SetError):
+            read("".join(lines[:count]))
+
+
 @pytest.mark.parametrize("text", ["", "\x00\x01", "a = 1\n", "[profile]\nid = 'atv71'\n", "{}"])
 def test_foreign_files_are_refused(text: str) -> None:
     with pytest.raises(SetError, match=r"set\.toml:\d+: this is no parameter set"):
