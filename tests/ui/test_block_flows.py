@@ -92,6 +92,11 @@ async def test_pick_move_write_and_verify() -> None:
         await write(made)
         await message(made, "Written and read back: NMA2, NMA3", "Lost at power-off")
         assert [made.drive().raw(f"NMA{n}") for n in (1, 2, 3)] == [3201, 3204, 8604]
+        # nobody has looked at Parameters: what is lost at power-off is told all the same
+        await until(made.pilot, lambda: "3 Parameters S" in shown(made.app, "tabs"))
+        await made.pilot.press("q")
+        await until(made.pilot, lambda: "2 written settings are not saved" in picture(made.app))
+        await made.pilot.press("escape")
         await made.pilot.press("V")
         await message(made, "3 slots bring the same as direct reads")
         await press(made.pilot, "(factory)")

@@ -172,7 +172,7 @@ def elsewhere(editor: Editor) -> None:
 
 
 def done(editor: Editor) -> None:
-    editor.unsaved = {"ACC", "DEC"}
+    editor.session.unsaved = frozenset({"ACC", "DEC"})
     editor.waits_for_reset = {"ADD"}
     say(editor, OutcomeKind.DONE, "3 written and read back")
 

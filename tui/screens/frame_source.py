@@ -279,7 +279,7 @@ def _marks(console: DriveConsole | None, fleet: Fleet | None) -> dict[str, tuple
     editor = console.begun_editor
     if editor is not None and len(editor.staging.edits):
         marks[PARAMETERS] = (f"●{min(99, len(editor.staging.edits))}", ATTENTION)
-    elif editor is not None and editor.unsaved:
+    elif console.session.unsaved:
         marks[PARAMETERS] = ("S", ALARM)
     blocks = console.begun_blocks
     if blocks is not None and (count := blocks.proposals.count):

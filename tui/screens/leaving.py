@@ -196,14 +196,11 @@ class Leaving(Panel):
         told = []
         for console in fleet.consoles:
             device, editor = console.device, console.begun_editor
-            if editor is None:
-                continue
-            if len(editor.staging.edits):
+            if editor is not None and len(editor.staging.edits):
                 count = len(editor.staging.edits)
                 edits = "edit is" if count == 1 else "edits are"
                 told.append(f"Device {device}: {count} staged {edits} not written.")
-            if editor.unsaved:
-                count = len(editor.unsaved)
+            if count := len(console.session.unsaved):
                 are, they = ("setting is", "it is") if count == 1 else ("settings are", "they are")
                 told.append(
                     f"Device {device}: {count} written {are} not saved to EEPROM; {they} lost at"

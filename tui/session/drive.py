@@ -67,6 +67,8 @@ class DriveSession:
         """What it has told of its communication time-out; None while it was not asked."""
         self.told_by_line = False
         """Whether a command or reference word was written to it from here, a stop among them."""
+        self.unsaved: frozenset[str] = frozenset()
+        """Codes of settings that were written from here and are lost at power-off until saved."""
         self.followed: tuple[str, ...] = ()
         """Codes of words that were written from here and are polled on."""
         self.starts: StartKeeper | None = None

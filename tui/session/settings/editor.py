@@ -47,7 +47,6 @@ class Editor:
     """The drive's state as it is watched; None while it is not known."""
     values: WatchedValues = field(init=False)
     staging: Staging = field(init=False)
-    unsaved: set[str] = field(default_factory=set)
     waits_for_reset: set[str] = field(default_factory=set)
     applied: Applied | None = None
     """What the last writing came to, until a screen has shown it."""
@@ -63,6 +62,11 @@ class Editor:
         self.marks = load_marks(self.session.profile.id)
         self.staging = Staging(self.session, lambda: self.busy)
         self.values = WatchedValues(self.session, lambda: self.state, self._was_reset)
+
+    @property
+    def unsaved(self) -> frozenset[str]:
+        """What was written to the drive, here or as slots of a block, and is not saved."""
+        return self.session.unsaved
 
     @property
     def said(self) -> Outcome | None:
@@ -158,7 +162,7 @@ class Editor:
 
     def _applied(self, applied: Applied) -> None:
         self._mark(self.marks.edited([result.edit.code for result in applied.written]))
-        self.unsaved |= set(applied.unsaved)
+        self.session.unsaved |= set(applied.unsaved)
         self.waits_for_reset |= set(applied.after_reset)
         self.moved = next((link for link in applied.links if link.at_once), None)
 
@@ -167,7 +171,7 @@ class Editor:
         done = self.staging.drop_written()
         self._mark(self.marks.edited(done))
         profile = self.session.profile
-        self.unsaved |= {c for c in done if profile[c].storage == "ram-until-saved"}
+        self.session.unsaved |= {c for c in done if profile[c].storage == "ram-until-saved"}
         with suppress(LineError):
             self.session.line.spawn(self._see_what_is_held, f"edits {self.session.device}")
         left = len(self.staging.edits)
@@ -186,14 +190,14 @@ class Editor:
             lost = ", ".join(sorted(self.unsaved))
             gone = f" Not saved before, so look at: {lost}." if lost else ""
             self._say(f"The drive was reset or switched off.{gone}", OutcomeKind.DONE)
-        self.waits_for_reset, self.unsaved = set(), set()
+        self.waits_for_reset, self.session.unsaved = set(), frozenset()
 
     def save(self, stamp: int | None = None) -> None:
         """Copy the settings to EEPROM, where the family needs that."""
 
         async def work(permit: Permit) -> str:
             done = await save_to_eeprom(self.session, self.journal, permit)
-            self.unsaved = set()
+            self.session.unsaved = frozenset()
             return done
 
         self._run(work, stamp)
