@@ -198,6 +198,8 @@ async def test_an_indirect_block_waits_for_a_reset() -> None:
         await write(made)
         await message(made, "after the drive's next reset")
         await until(made.pilot, lambda: "pending" in shown(made.app, "first"))
+        # until then the cycle is that of before
+        assert " after a reset" in shown(made.app, "cost")
         made.drive().power_cycle()
         await until(made.pilot, lambda: "F875 FD01" in shown(made.app, "first"))
 

@@ -83,7 +83,7 @@ class Places(Panel):
 
         if place == SOURCES and not console.session.profile.data.control_sources:
             self.tell(
-                "The control source of this drive is set at its keypad; t takes the control,"
+                f"Who commands drive {console.device} is set at its keypad; t takes the control,"
                 " g gives it back, where it has a word for that."
             )
             return None

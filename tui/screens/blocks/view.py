@@ -212,6 +212,8 @@ def cost_lines(
     else:
         text.append(f"monitoring cycle {_ms(saving.before.microseconds)}", PLAIN)
         text.append(f" in {saving.before.requests}", FAINT)
+        if _waits_for_a_reset(block_editor):
+            text.append(" after a reset", ALARM)
         if block_editor.proposals.plans:
             text.append("  → proposed ", FAINT)
             text.append(f"{_ms(saving.after.microseconds)}", STRONG)
@@ -231,6 +233,12 @@ def cost_lines(
         for line in range(2)
     ]
     return [*lines, text, *frames]
+
+
+def _waits_for_a_reset(block_editor: BlockEditor) -> bool:
+    """Whether slots hold what a block does not bring yet: the figures are those of then."""
+    views = block_editor.views.values()
+    return any(slot.force is Force.PENDING for view in views for slot in view.slots)
 
 
 def _output_words(block_editor: BlockEditor) -> list[int]:
