@@ -255,8 +255,8 @@ def _count(sent: list[Write], counted: Counted) -> None:
 def main() -> None:
     """Count, and print a table and a JSON object."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("--bursts", type=int, default=1000)
-    parser.add_argument("--keys", type=int, default=10_000)
+    parser.add_argument("--bursts", type=int, default=60)
+    parser.add_argument("--keys", type=int, default=1500)
     parser.add_argument("--seed", type=int, default=1)
     arguments = parser.parse_args()
     chance = random.Random(arguments.seed)
